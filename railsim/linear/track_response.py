@@ -12,7 +12,11 @@ stands l_w ahead of the reference body, hence over the angular wave number k at 
 
 The matrix i k V - A is solved by Schur's form A = Z T Z*, which exists for a free vehicle too,
 whose two zero eigenvalues have one eigenvector.  Outputs are what accelerometers read (see
-`railsim.result.sensors`: of a small roll, y reads -g roll as well), Q and Y.
+`railsim.result.sensors`: of a small roll, y reads -g roll as well), Q, Y and the lateral
+displacements of the wheelsets from the middle of their rails.
+
+What this model does not hold of the contact forces of a wheelset is an input too: an acceleration d
+of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belong to.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,30 +26,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import schur
 
-from railsim.constants import GRAVITY
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.kernels.system import System
 from railsim.linear.circle import POSITION
-from railsim.linear.coordinates import FreeVehicle
+from railsim.linear.coordinates import Coordinates, FreeVehicle
 from railsim.linear.vehicle import LinearVehicle
 from railsim.result.sensors import Sensor
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Indices = NDArray[np.int64]
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
 """Irregularities [m]; the cross level as height of the left rail over the right one."""
 # y_left, z_left, y_right, z_right by one metre of each
 RAILS = np.array(
-    [
-        [1.0, 0.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0, 1.0],
-        [0.0, -0.5, 0.0, 0.5],
-        [-0.5, 0.0, 0.5, 0.0],
-    ]
+    [[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0], [0.0, -0.5, 0.0, 0.5], [-0.5, 0.0, 0.5, 0.0]]
 )
 ORDERS = 3  # displacement of the rails, its slope and the slope's change
 STEPS = (1e-8, 1e-7, 1e-6)  # of these in difference quotients [m, 1, 1/m]
 FORCES = ("Q", "Y")
+COMPONENTS = (1, 2, 3, 5)  # of a wheelset whose accelerations are partly unknown: y, z, roll, yaw
 TOGETHER = 4096  # wave numbers that are solved at once
 
 
@@ -63,9 +65,15 @@ class TrackResponse:
     offsets : float64[w]
         Of the wheelsets from the reference body along the track [m].
     A, C : float64[n, n], float64[m, n]
-        State and output matrix.
+        State matrix; output matrix apart from accelerations.
     B, D : float64[n or m, wheelset, quantity, order]
         Of the displacements of the rails, their slopes and curvatures.
+    R : float64[m, n]
+        Outputs by the derivative of the state: y = C x + D u + R x'.
+    rows : int64[wheelset, component]
+        Where the accelerations of the wheelsets in y, z, roll, yaw stand in x'.
+    own : float64[m, wheelset, component]
+        Outputs by unknown accelerations of the wheelsets, beside R.
     """
 
     speed: float
@@ -75,9 +83,14 @@ class TrackResponse:
     B: Floats
     C: Floats
     D: Floats
+    R: Floats
+    rows: Indices
+    own: Floats
 
     def over(self, wave_numbers: Floats, chosen: Sequence[int] | None = None) -> Complex:
-        """Frequency response H over the angular wave number, complex128[k, output, quantity].
+        """Frequency response H over the angular wave number, complex128[k, output, input].
+
+        Inputs are the quantities, then the unknown accelerations of the wheelsets.
 
         Parameters
         ----------
@@ -86,23 +99,29 @@ class TrackResponse:
         chosen : sequence of int, optional
             Outputs; all by default.
         """
-        rows = slice(None) if chosen is None else list(chosen)
-        C, D = self.C[rows], self.D[rows]
-        found = np.empty((len(wave_numbers), len(C), len(QUANTITIES)), dtype=complex)
+        out = slice(None) if chosen is None else list(chosen)
+        C, D = (self.C + self.R @ self.A)[out], self.D[out]
+        D = D + np.einsum("mn,nwqo->mwqo", self.R[out], self.B)
+        unknown = self.rows.ravel()
+        direct = self.own.reshape(len(self.own), -1)[out] + self.R[out][:, unknown]
+        found = np.empty((len(wave_numbers), len(C), len(QUANTITIES) + len(unknown)), complex)
         T, Z = schur(self.A, output="complex")
-        B, CZ = np.einsum("nm,nwqo->mwqo", Z.conj(), self.B), C @ Z
+        B = np.einsum("nm,nwqo->mwqo", Z.conj(), self.B)
+        E, CZ = Z.conj().T[:, unknown], C @ Z
         for begin in range(0, len(wave_numbers), TOGETHER):
             part = slice(begin, begin + TOGETHER)
             k = wave_numbers[part]
             shift = np.exp(1j * k[:, None] * self.offsets)[:, :, None]
             shift = shift * (1j * k[:, None, None]) ** np.arange(ORDERS)
             x = np.einsum("nwqo,kwo->nkq", B, shift, optimize=True)
+            x = np.concatenate([x, np.repeat(E[:, None], len(k), axis=1)], axis=2)
             turn = 1j * self.speed * k[:, None]
             for i in range(len(T) - 1, -1, -1):
                 x[i] += np.tensordot(T[i, i + 1 :], x[i + 1 :], 1)
                 x[i] /= turn - T[i, i]
             found[part] = np.einsum("mn,nkq->kmq", CZ, x, optimize=True)
-            found[part] += np.einsum("mwqo,kwo->kmq", D, shift, optimize=True)
+            found[part, :, : len(QUANTITIES)] += np.einsum("mwqo,kwo->kmq", D, shift, optimize=True)
+            found[part, :, len(QUANTITIES) :] += direct
         return found
 
 
@@ -157,22 +176,61 @@ def track_response(
                     ends.append(evaluated(x))
                 columns.append((ends[0] - ends[1]) / (2.0 * step))
         rail[cell] = smooth
-    whole = np.transpose(columns)
-    readings, names = _readings(sensors, free, whole)
-    names += [
+    whole = _without_forceless(np.transpose(columns), c.forceless)
+    n, wheels = len(x) - len(c.forceless), 2 * len(offsets)  # rates without force stand last
+    inputs = whole[:, n:].reshape(len(whole), len(offsets), len(QUANTITIES), ORDERS)
+    C, R, names = _readings(sensors, free, n)
+    lateral = np.zeros((len(offsets), *inputs.shape[1:]))
+    lateral[range(len(offsets)), range(len(offsets)), 0, 0] = -1.0
+    bodies = system.contact.body
+    places = np.array([c.index_of(int(b), 1) for b in bodies])
+    return TrackResponse(
+        speed,
+        (*names, *_of_wheelsets(len(offsets))),
+        offsets,
+        whole[:n, :n],
+        inputs[:n],
+        np.concatenate([C, whole[n:, :n], np.eye(n)[places]]),
+        np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:], lateral]),
+        np.concatenate([R, np.zeros((2 * wheels + len(offsets), n))]),
+        np.array([[_velocity(c, int(b), k) for k in COMPONENTS] for b in bodies]),
+        _forces_of(system, len(C)),
+    )
+
+
+def _of_wheelsets(count: int) -> list[str]:
+    """Names of the outputs Q, Y and lateral displacement."""
+    names = [
         f"{force}.{w + 1}.{side}"
         for force in FORCES
-        for w in range(len(offsets))
+        for w in range(count)
         for side in ("left", "right")
     ]
-    whole = np.concatenate([whole[: len(x)], readings, whole[len(x) :]])
-    kept = np.setdiff1d(np.arange(len(x)), c.forceless)
-    whole = _without_forceless(whole, c.forceless)
-    n = len(kept)
-    inputs = whole[:, n:].reshape(len(whole), len(offsets), len(QUANTITIES), ORDERS)
-    return TrackResponse(
-        speed, tuple(names), offsets, whole[:n, :n], inputs[:n], whole[n:, :n], inputs[n:]
-    )
+    return names + [f"lateral.{w + 1}" for w in range(count)]
+
+
+def _forces_of(system: System, before: int) -> Floats:
+    """What Q and Y have of unknown accelerations of the wheelsets, float64[m, w, component].
+
+    With F_y = -m d_y on the rails at the radius r below the axle, the moments about x leave
+    dQ_left - dQ_right = (I_x d_roll + r m d_y)/b0, and dQ_left + dQ_right = -m d_z.
+    """
+    bodies, count = system.contact.body, len(system.contact.body)
+    own = np.zeros((before + 5 * count, count, len(COMPONENTS)))
+    for w, b in enumerate(bodies):
+        mass, roll = system.bodies.mass[b], system.bodies.inertia[b, 0]
+        for side, sign in enumerate((1.0, -1.0)):
+            Q = before + 2 * w + side
+            turned = sign * np.array([system.bodies.radius[b] * mass, 0.0, roll, 0.0]) / CANT_BASE
+            own[Q, w] = turned + np.array([0.0, -0.5 * mass, 0.0, 0.0])
+            own[Q + 2 * count, w, 0] = -0.5 * mass
+    return own
+
+
+def _velocity(c: Coordinates, body: int, component: int) -> int:
+    """Index of a body's velocity."""
+    there = (c.bodies == body) & (c.components == component)
+    return int(np.flatnonzero(there & (np.arange(len(there)) >= c.n_positions))[0])
 
 
 def _power(order: int, u: float) -> Floats:
@@ -190,38 +248,30 @@ def _without_forceless(whole: Floats, w: NDArray[np.int64]) -> Floats:
 
 
 def _readings(
-    sensors: Mapping[str, Sensor], free: FreeVehicle, whole: Floats
-) -> tuple[Floats, list[str]]:
-    """Rows of what sensors read along x, y, z and of their roll rate, and their names."""
+    sensors: Mapping[str, Sensor], free: FreeVehicle, n: int
+) -> tuple[Floats, Floats, list[str]]:
+    """C and R of what sensors read along x, y, z and of their roll rate, and their names."""
     bodies, c = free.model.index.bodies, free.coordinates
-    n = c.n_positions
-
-    def row(body: int, component: int, derivative: int) -> Floats:
-        """Row of a displacement, velocity or acceleration; zero where a body does not move so."""
-        first = 0 if derivative == 0 else n
-        last = n if derivative == 0 else n + c.n_velocities
-        there = (c.bodies[first:last] == body) & (c.components[first:last] == component)
-        if not there.any():
-            return np.zeros(whole.shape[1])
-        index = first + int(np.flatnonzero(there)[0])
-        return whole[index] if derivative == 2 else np.eye(1, whole.shape[1], index)[0]
-
-    rows, names = [], []
+    known = {
+        (int(b), int(k), i >= c.n_positions): i
+        for i, (b, k) in enumerate(zip(c.bodies, c.components, strict=True))
+        if b >= 0
+    }
+    C, R, names = [], [], []
     for name, sensor in sensors.items():
         b = bodies.index(sensor.body)
-        turn = np.array([row(b, k, 2) for k in (3, 4, 5)])
-        if sensor.axlebox:
-            turn[1] = 0.0
-        point = np.array([row(b, k, 2) for k in (0, 1, 2)]) + np.cross(
-            turn, np.array(sensor.arm)[:, None], axis=0
-        )
-        roll, pitch = row(b, 3, 0), np.zeros(whole.shape[1])
-        if not sensor.axlebox:
-            pitch = row(b, 4, 0)
-        point[0] += GRAVITY * pitch
-        point[1] -= GRAVITY * roll
-        rows += [*point, row(b, 3, 1)]
+
+        def row(component: int, velocity: bool, b: int = b) -> Floats:
+            """Unit row of a displacement or velocity; zero where the body does not move so."""
+            found = known.get((b, component, velocity))
+            return np.zeros(n) if found is None else np.eye(1, n, found)[0]
+
+        turn = np.array([row(k, True) for k in (3, 4, 5)])
+        pitch = np.zeros(n) if sensor.axlebox else row(4, False)
+        turn[1] *= not sensor.axlebox
+        point = np.array([row(k, True) for k in (0, 1, 2)])
+        point += np.cross(turn, np.array(sensor.arm)[:, None], axis=0)
+        R += [*point, np.zeros(n)]
+        C += [GRAVITY * pitch, -GRAVITY * row(3, False), np.zeros(n), row(3, True)]
         names += [f"{name}.{axis}" for axis in ("x", "y", "z", "roll_rate")]
-    return np.reshape(rows, (-1, whole.shape[1])), names
-
-
+    return np.reshape(C, (-1, n)), np.reshape(R, (-1, n)), names

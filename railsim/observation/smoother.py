@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 
-RESIDUAL = 1e-9  # of the linear equations, over the norm of the data
+RESIDUAL = 1e-3  # of the linear equations, over the rms of the errors
 MOST_ITERATIONS = 2000
 
 
@@ -64,7 +64,9 @@ class Fields:
             np.linalg.solve(one + self.power[:, :, None] * seen, self.power[:, :, None] * one)
         )
 
-    def mean(self, data: Floats, there: Bools | None = None) -> Floats:
+    def mean(
+        self, data: Floats, there: Bools | None = None, residual: float = RESIDUAL
+    ) -> Floats:
         """E[r | y] of (2), float64[field, points].
 
         Parameters
@@ -73,13 +75,16 @@ class Fields:
             Samples; those that do not exist do not count.
         there : bool[channel, points], optional
             Which samples exist; all by default.
+        residual : float
+            Of the equations, over the rms of the errors.
 
         Raises
         ------
         ModelError
             The equations are not solved after `MOST_ITERATIONS`.
         """
-        weights = self._weights(data, np.ones_like(data, dtype=bool) if there is None else there)
+        there = np.ones_like(data, dtype=bool) if there is None else there
+        weights = self._weights(data, there, residual)
         back = np.einsum(
             "kcq,ck->qk", self.response.conj(), np.fft.rfft(weights, axis=1), optimize=True
         )
@@ -91,8 +96,8 @@ class Fields:
         read = np.einsum("kcq,qk->ck", self.response, spectra, optimize=True)
         return np.asarray(np.fft.irfft(read, self.points, axis=1))
 
-    def _weights(self, data: Floats, there: Bools) -> Floats:
-        """w of (2), zero where no sample exists."""
+    def _weights(self, data: Floats, there: Bools, residual: float) -> Floats:
+        """Weights of the samples, w of (2), zero where no sample exists."""
         forth, back = self._data_covariance()
 
         def applied(matrix: Complex, values: Floats) -> Floats:
@@ -103,10 +108,10 @@ class Fields:
         data = np.where(there, data, 0.0)
         if there.all():
             return applied(back, data)
-        scale = 1.0 / np.sqrt(np.mean(self.errors, axis=0))[:, None]
+        scale = 1.0 / np.sqrt(np.median(self.errors, axis=0))[:, None]
         w = applied(back, data)
         rest = data - applied(forth, w)
-        goal = RESIDUAL * np.linalg.norm(scale * data)
+        goal = residual * np.sqrt(np.count_nonzero(there))
         z = applied(back, rest)
         along, size = z, np.vdot(rest, z)
         for _ in range(MOST_ITERATIONS):

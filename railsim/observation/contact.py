@@ -1,0 +1,177 @@
+"""Wheel-rail contact of a vehicle on a rough track, made linear in the mean.
+
+Profiles are no cones: the forces of a wheelset that moves by some millimetres have little to do
+with the tangent at its middle.  A run over a track of the assumed spectrum is simulated; what the
+accelerations of each wheelset in y and yaw have beyond the tangent's,
+
+    e = a - (A x + B u),
+
+is fitted by least squares over its lateral displacement against the rails, its yaw and their rates:
+the linear system with the smallest mean square error (statistical linearisation, Booton 1954).
+What remains, and all of e in z and roll, is noise of the state with the spectrum found.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import ModelError
+from railsim.linear.track_response import COMPONENTS, ORDERS, RAILS, TrackResponse
+from railsim.linear.vehicle import LinearVehicle
+from railsim.observation.grid import on_grid
+from railsim.simulation.run import simulate
+from railsim.track.irregularity import displacement
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+LENGTH, SEED, TAPER = 1500.0, 11, 60.0  # of the simulated run [m]
+RATE = 1000.0  # 1/s
+STEP = 0.25  # m
+SMOOTHED = 0.15  # width of the average of spectra, over the wave number
+LEAST = 1e-12  # (m/s2)2, (rad/s2)2
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Spectra of what the linear contact leaves out.
+
+    Attributes
+    ----------
+    wave_numbers : float64[k]
+        [rad/m].
+    power : float64[k, component]
+        Two-sided, of samples at `STEP`: of white noise its variance.  Accelerations of a wheelset
+        in y, z, roll, yaw, the mean of all wheelsets.
+    amplitude : float
+        rms of the lateral displacement of the wheelsets against the rails [m].
+    """
+
+    wave_numbers: Floats
+    power: Floats
+    amplitude: float
+
+    def at(self, wave_numbers: Floats, step: float) -> Floats:
+        """Power for samples at a step [m], float64[k, component]."""
+        found = [np.interp(wave_numbers, self.wave_numbers, row) for row in self.power.T]
+        return np.asarray(np.transpose(found) * STEP / step + LEAST)
+
+
+def in_the_mean(
+    vehicle: Vehicle,
+    track: Track,
+    linear: LinearVehicle,
+    tangent: TrackResponse,
+    irregularity: dict[str, object],
+) -> tuple[TrackResponse, Noise]:
+    """Return the response with the contact of a rough track, and the noise that remains.
+
+    Parameters
+    ----------
+    vehicle, track : Vehicle, Track
+        The track's rails and friction count.
+    linear, tangent : LinearVehicle, TrackResponse
+        About steady rolling, at the speed in question.
+    irregularity : dict
+        Of the type ``random``, as in a track file.
+
+    Raises
+    ------
+    ModelError
+        The vehicle does not complete the run.
+    """
+    rough = track.replace(
+        plan=[{"type": "STR", "length": LENGTH}],
+        cant=[{"type": "CST", "length": LENGTH, "cant": 0.0}],
+        irregularities=[{**irregularity, "type": "random", "seed": SEED}],
+    )
+    result = simulate(
+        vehicle, rough, speed=tangent.speed, settings=Settings(output_rate=RATE)
+    )
+    if result.status != "complete":
+        raise ModelError(f"the run for the contact's linearisation: {result.status}")
+    s = result["distance"]
+    reach = float(np.max(np.abs(tangent.offsets))) + 2.0
+    grid = np.arange(reach, float(s[-1]) - reach, STEP)
+    k = 2.0 * np.pi * np.fft.rfftfreq(len(grid), STEP)
+    moved = displacement(rough)
+    assert moved is not None  # it has irregularities
+    window = _window(len(grid))
+
+    def spectrum(values: Floats) -> Complex:
+        return np.fft.rfft((values - values.mean()) * window)
+
+    rails = moved(grid)[0]
+    u = np.stack([spectrum(row) for row in _quantities(rails)])
+    x, places = _states(linear, tangent, result, lambda y: spectrum(on_grid(s, y, grid)))
+    shift = np.exp(1j * k[:, None] * tangent.offsets)[:, :, None]
+    shift = shift * (1j * k[:, None, None]) ** np.arange(ORDERS)
+    driven = np.einsum("nwqo,kwo,qk->nk", tangent.B, shift, u, optimize=True)
+    A, B = tangent.A.copy(), tangent.B.copy()
+    hidden = np.setdiff1d(np.arange(len(A)), places)
+    forcing = A[np.ix_(hidden, places)] @ x[places] + driven[hidden]
+    own = 1j * tangent.speed * k[:, None, None] * np.eye(len(hidden)) - A[np.ix_(hidden, hidden)]
+    x[hidden] = np.linalg.solve(own, forcing.T[:, :, None])[:, :, 0].T
+    inner = slice(int(TAPER / STEP), -int(TAPER / STEP))
+    power = np.zeros((len(COMPONENTS), len(k)))
+    amplitudes = []
+    coordinates = linear.coordinates
+    for w, b in enumerate(linear.model.system.contact.body):
+        y, yaw = coordinates.index_of(int(b), 1), coordinates.index_of(int(b), 5)
+        of = [y, yaw, int(tangent.rows[w, 0]), int(tangent.rows[w, 3])]
+        parts = x[of].copy()
+        parts[0] -= u[0] * shift[:, w, 0]
+        known = np.fft.irfft(parts, len(grid), axis=1)
+        amplitudes.append(known[0, inner].std())
+        for number, component in enumerate(COMPONENTS):
+            row = tangent.rows[w, number]
+            found = spectrum(on_grid(s, result["body_acceleration"][:, b, component], grid))
+            rest = np.fft.irfft(found - tangent.A[row] @ x - driven[row], len(grid))
+            if component in (1, 5):
+                gain = np.linalg.lstsq(known[:, inner].T, rest[inner], rcond=None)[0]
+                A[row, of] += gain
+                B[row, w, 0, 0] -= gain[0]
+                rest = rest - gain @ known
+            power[number] += np.abs(np.fft.rfft(rest * window)) ** 2 / np.sum(window**2)
+    count = len(tangent.offsets)
+    noise = Noise(k, _smoothed(k, power / count).T, float(np.mean(amplitudes)))
+    return replace(tangent, A=A, B=B), noise
+
+
+def _window(n: int) -> Floats:
+    """Cosine rise and fall over `TAPER` at both ends."""
+    m = int(TAPER / STEP)
+    window = np.ones(n)
+    window[:m] = 0.5 - 0.5 * np.cos(np.pi * np.arange(m) / m)
+    window[-m:] = window[:m][::-1]
+    return window
+
+
+def _quantities(rails: Floats) -> Floats:
+    """Alignment, level, cross level and gauge of y_left, z_left, y_right, z_right."""
+    return np.asarray(np.linalg.inv(RAILS.T) @ rails)
+
+
+def _states(linear, tangent, result, spectrum):  # type: ignore[no-untyped-def]
+    """Spectra of the states that a result holds, and which these are."""
+    c, n = linear.coordinates, len(tangent.A)
+    places = np.flatnonzero(c.bodies[:n] >= 0)
+    first = result["body_position"]
+    x = np.zeros((n, len(spectrum(first[:, 0, 0]))), dtype=complex)
+    for i in places:
+        of = first if i < c.n_positions else result["body_velocity"]
+        x[i] = spectrum(of[:, c.bodies[i], c.components[i]])
+    return x, places
+
+
+def _smoothed(k: Floats, power: Floats) -> Floats:
+    """Mean over a band around each wave number."""
+    total = np.concatenate([np.zeros((len(power), 1)), np.cumsum(power, axis=1)], axis=1)
+    half = np.maximum(4, (SMOOTHED * np.arange(len(k))).astype(int))
+    low = np.maximum(np.arange(len(k)) - half, 0)
+    high = np.minimum(np.arange(len(k)) + half + 1, len(k))
+    return np.asarray((total[:, high] - total[:, low]) / (high - low))
