@@ -51,6 +51,7 @@ COMMANDS = {
     "stationary": "Standing on twisted track and on cant, against limits.",
     "wear": "Wheel profile over the distance run, with the worn profile run again.",
     "rail-wear": "Rail profiles over the tonnage of a mix of traffic.",
+    "irregularity": "The track and wheel forces from accelerations of a vehicle.",
     "contact": "Contact geometry of a wheel on a rail, equivalent conicity.",
     "spring": "Trailing-arm suspension: design and verify its coil springs.",
     "mechanism": "Planar linkages: kinematics, forces, optimisation.",

@@ -74,6 +74,8 @@ class TrackResponse:
         Where the accelerations of the wheelsets in y, z, roll, yaw stand in x'.
     own : float64[m, wheelset, component]
         Outputs by unknown accelerations of the wheelsets, beside R.
+    steady : float64[m]
+        Outputs in steady rolling.
     """
 
     speed: float
@@ -86,6 +88,7 @@ class TrackResponse:
     R: Floats
     rows: Indices
     own: Floats
+    steady: Floats
 
     def over(self, wave_numbers: Floats, chosen: Sequence[int] | None = None) -> Complex:
         """Frequency response H over the angular wave number, complex128[k, output, input].
@@ -177,7 +180,11 @@ def track_response(
                 columns.append((ends[0] - ends[1]) / (2.0 * step))
         rail[cell] = smooth
     whole = _without_forceless(np.transpose(columns), c.forceless)
-    n, wheels = len(x) - len(c.forceless), 2 * len(offsets)  # rates without force stand last
+    steady = evaluated(x)[len(x) :]
+    steady = np.concatenate([steady, steady[len(steady) // 2 :].reshape(-1, 2).sum(axis=1)])
+    guiding = whole[-2 * len(offsets) :].reshape(len(offsets), 2, -1)
+    whole = np.concatenate([whole, guiding.sum(axis=1)])
+    n, count = len(x) - len(c.forceless), len(offsets)  # rates without force stand last
     inputs = whole[:, n:].reshape(len(whole), len(offsets), len(QUANTITIES), ORDERS)
     C, R, names = _readings(sensors, free, n)
     lateral = np.zeros((len(offsets), *inputs.shape[1:]))
@@ -192,21 +199,22 @@ def track_response(
         inputs[:n],
         np.concatenate([C, whole[n:, :n], np.eye(n)[places]]),
         np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:], lateral]),
-        np.concatenate([R, np.zeros((2 * wheels + len(offsets), n))]),
+        np.concatenate([R, np.zeros((6 * count, n))]),
         np.array([[_velocity(c, int(b), k) for k in COMPONENTS] for b in bodies]),
         _forces_of(system, len(C)),
+        np.concatenate([np.zeros(len(C)), steady, np.zeros(count)]),
     )
 
 
 def _of_wheelsets(count: int) -> list[str]:
-    """Names of the outputs Q, Y and lateral displacement."""
+    """Names of the outputs Q, Y, sum of Y and lateral displacement."""
     names = [
         f"{force}.{w + 1}.{side}"
         for force in FORCES
         for w in range(count)
         for side in ("left", "right")
     ]
-    return names + [f"lateral.{w + 1}" for w in range(count)]
+    return names + [f"{name}.{w + 1}" for name in ("sum_Y", "lateral") for w in range(count)]
 
 
 def _forces_of(system: System, before: int) -> Floats:
@@ -216,7 +224,7 @@ def _forces_of(system: System, before: int) -> Floats:
     dQ_left - dQ_right = (I_x d_roll + r m d_y)/b0, and dQ_left + dQ_right = -m d_z.
     """
     bodies, count = system.contact.body, len(system.contact.body)
-    own = np.zeros((before + 5 * count, count, len(COMPONENTS)))
+    own = np.zeros((before + 6 * count, count, len(COMPONENTS)))
     for w, b in enumerate(bodies):
         mass, roll = system.bodies.mass[b], system.bodies.inertia[b, 0]
         for side, sign in enumerate((1.0, -1.0)):
@@ -224,6 +232,7 @@ def _forces_of(system: System, before: int) -> Floats:
             turned = sign * np.array([system.bodies.radius[b] * mass, 0.0, roll, 0.0]) / CANT_BASE
             own[Q, w] = turned + np.array([0.0, -0.5 * mass, 0.0, 0.0])
             own[Q + 2 * count, w, 0] = -0.5 * mass
+        own[before + 4 * count + w, w, 0] = -mass
     return own
 
 

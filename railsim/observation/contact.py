@@ -8,9 +8,12 @@ accelerations of each wheelset in y and yaw have beyond the tangent's,
 
 is fitted by least squares over its lateral displacement against the rails, its yaw and their rates:
 the linear system with the smallest mean square error (statistical linearisation, Booton 1954).
-What remains, and all of e in z and roll, is noise of the state with the spectrum found.
+What remains, and all of e in z and roll, is noise of the state with the spectrum found.  The
+wheelsets come over the same place one after the other, and what remains of them is alike there;
+the spectrum is that of independent noises with the same effect on their sum, where it is larger.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +26,7 @@ from railsim.errors import ModelError
 from railsim.linear.track_response import COMPONENTS, ORDERS, RAILS, TrackResponse
 from railsim.linear.vehicle import LinearVehicle
 from railsim.observation.grid import on_grid
+from railsim.result import Result
 from railsim.simulation.run import simulate
 from railsim.track.irregularity import displacement
 
@@ -89,15 +93,13 @@ def in_the_mean(
         cant=[{"type": "CST", "length": LENGTH, "cant": 0.0}],
         irregularities=[{**irregularity, "type": "random", "seed": SEED}],
     )
-    result = simulate(
-        vehicle, rough, speed=tangent.speed, settings=Settings(output_rate=RATE)
-    )
+    result = simulate(vehicle, rough, speed=tangent.speed, settings=Settings(output_rate=RATE))
     if result.status != "complete":
         raise ModelError(f"the run for the contact's linearisation: {result.status}")
     s = result["distance"]
     reach = float(np.max(np.abs(tangent.offsets))) + 2.0
     grid = np.arange(reach, float(s[-1]) - reach, STEP)
-    k = 2.0 * np.pi * np.fft.rfftfreq(len(grid), STEP)
+    k: Floats = 2.0 * np.pi * np.fft.rfftfreq(len(grid), STEP).astype(float)
     moved = displacement(rough)
     assert moved is not None  # it has irregularities
     window = _window(len(grid))
@@ -118,6 +120,7 @@ def in_the_mean(
     x[hidden] = np.linalg.solve(own, forcing.T[:, :, None])[:, :, 0].T
     inner = slice(int(TAPER / STEP), -int(TAPER / STEP))
     power = np.zeros((len(COMPONENTS), len(k)))
+    common = np.zeros((len(COMPONENTS), len(k)), dtype=complex)
     amplitudes = []
     coordinates = linear.coordinates
     for w, b in enumerate(linear.model.system.contact.body):
@@ -136,9 +139,12 @@ def in_the_mean(
                 A[row, of] += gain
                 B[row, w, 0, 0] -= gain[0]
                 rest = rest - gain @ known
-            power[number] += np.abs(np.fft.rfft(rest * window)) ** 2 / np.sum(window**2)
+            own_part = np.fft.rfft(rest * window) / np.sqrt(np.sum(window**2))
+            power[number] += np.abs(own_part) ** 2
+            common[number] += own_part * np.conj(shift[:, w, 0])
     count = len(tangent.offsets)
-    noise = Noise(k, _smoothed(k, power / count).T, float(np.mean(amplitudes)))
+    each, together = (_smoothed(k, p / count) for p in (power, np.abs(common) ** 2))
+    noise = Noise(k, np.maximum(each, together).T, float(np.mean(amplitudes)))
     return replace(tangent, A=A, B=B), noise
 
 
@@ -156,7 +162,12 @@ def _quantities(rails: Floats) -> Floats:
     return np.asarray(np.linalg.inv(RAILS.T) @ rails)
 
 
-def _states(linear, tangent, result, spectrum):  # type: ignore[no-untyped-def]
+def _states(
+    linear: LinearVehicle,
+    tangent: TrackResponse,
+    result: Result,
+    spectrum: Callable[[Floats], Complex],
+) -> tuple[Complex, NDArray[np.int64]]:
     """Spectra of the states that a result holds, and which these are."""
     c, n = linear.coordinates, len(tangent.A)
     places = np.flatnonzero(c.bodies[:n] >= 0)

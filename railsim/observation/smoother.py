@@ -64,9 +64,7 @@ class Fields:
             np.linalg.solve(one + self.power[:, :, None] * seen, self.power[:, :, None] * one)
         )
 
-    def mean(
-        self, data: Floats, there: Bools | None = None, residual: float = RESIDUAL
-    ) -> Floats:
+    def mean(self, data: Floats, there: Bools | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].
 
         Parameters

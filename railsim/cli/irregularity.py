@@ -1,0 +1,84 @@
+"""``railsim irregularity``: the track from what a vehicle in service reads."""
+
+from typing import Any
+
+import click
+
+from railsim.cli.analysis import Folder
+from railsim.cli.common import names_of, output_options
+from railsim.cli.progress import progress_bar
+from railsim.errors import Fault, InputError
+
+FILES = ("irregularity.json", "irregularity.png")
+
+
+@click.command()
+@click.argument("measured", metavar="MEASURED", shell_complete=names_of("measurement"))
+@click.option("--vehicle", metavar="F", help="The vehicle that measured; default as MEASURED says.")
+@click.option("--track", metavar="F", help="Rails, gauge, friction, support; default straight.")
+@click.option("--spectrum", default="erri_b176_low", show_default=True, metavar="NAME",
+              help="Spectrum that the track is assumed to have.")  # fmt: skip
+@click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on it.")
+@click.option("--wavelengths", type=float, nargs=2, default=(3.0, 100.0), show_default=True,
+              metavar="A B", help="Shortest and longest wavelength of the track in m.")  # fmt: skip
+@click.option("--noise", type=float, default=0.05, show_default=True, metavar="A",
+              help="rms noise of an accelerometer in m/s2, where MEASURED has none.")  # fmt: skip
+@click.option("--set", "assignments", multiple=True, metavar="KEY.PATH=VALUE",
+              help="Replace one value of MEASURED; may be given several times.")  # fmt: skip
+@click.option("--out", metavar="DIR", help="Folder for recording, track, estimates, forces.")
+@output_options
+def command(
+    measured: str,
+    vehicle: str | None,
+    track: str | None,
+    spectrum: str,
+    scale: float,
+    wavelengths: tuple[float, float],
+    noise: float,
+    assignments: tuple[str, ...],
+    out: str | None,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Irregularities of a track and wheel forces from accelerations of a vehicle.
+
+    MEASURED is a measurement file with channels sensor_acceleration:POINT:AXIS of axleboxes,
+    frames or floor.  A smoother with the linearised vehicle gives alignment, level and cross level
+    with the standard deviation of their errors, in D1 and D2 of EN 13848, and Q, Y and sum Y.
+    Wavelengths that the channels do not see are named and not filled in.
+
+    \b
+    Example:
+      railsim irregularity run.toml --vehicle coach_25t --out track
+      railsim info track/track.toml
+    """  # noqa: D301 - click reads the escape
+    from railsim.definitions.loading import load_track, load_vehicle
+    from railsim.measurement import load_measurement
+    from railsim.observation import Assumed, irregularity
+    from railsim.observation.estimate import FILES as WRITTEN
+    from railsim.plot.observation import irregularity_figure
+
+    assumed = Assumed(spectrum, scale, wavelengths, noise)
+    assumed.check()
+    folder = Folder(out, (*FILES, *WRITTEN), overwrite)
+    measurement = load_measurement(measured, assignments)
+    how = measurement.definition
+    name = vehicle or how.vehicle
+    if name is None:
+        raise InputError([Fault("--vehicle", "", "not given", "the vehicle that measured")])
+    case = getattr(how, "load", None)
+    load = [f"load={case}"] if case else []
+    with progress_bar(measurement.name, quiet=quiet) as progress:
+        found = irregularity(
+            measurement, load_vehicle(name, load), load_track(track or how.track or "straight"),
+            assumed=assumed, progress=progress,
+        )  # fmt: skip
+    if folder.path is not None:
+        folder.written += found.write(folder.path)
+
+    def parts() -> list[Any]:
+        remarks = [f"remark: {remark}" for remark in found.remarks]
+        return [found.table(), "", found.forces_table(), "", *found.notes, *remarks]
+
+    folder.finish(found.record(), lambda: irregularity_figure(found), parts, as_json=as_json)

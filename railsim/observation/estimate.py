@@ -1,0 +1,304 @@
+"""What is known of a track after a measured run: `Irregularity`, its table, files and recording."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.files import make_folder, whole_file
+from railsim.linear.track_response import QUANTITIES
+from railsim.table import Column, Table
+
+Floats = NDArray[np.float64]
+
+BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0)}
+"""Wavelengths of EN 13848-1 [m]."""
+LETTERS = ("y", "z", "cross_level", "gauge")  # columns of a recording
+MILLI, KILO = 1e3, 1e-3
+FILES = ("recording.csv", "track.toml", "estimates.csv", "forces.csv")
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Irregularities and forces of one piece of a run.
+
+    Attributes
+    ----------
+    s : float64[n]
+        Arc length, equal steps [m].
+    speed : float
+        [m/s].
+    values : float64[quantity, n]
+        Alignment, level, cross level, gauge [m], without what is not seen.
+    deviations : float64[quantity]
+        Standard deviations of their errors [m].
+    bands, band_deviations : mapping of str to float64[quantity, n], float64[quantity]
+        The same in D1 and D2.
+    wave_numbers, seen, power : float64[k], float64[quantity, k], float64[quantity, k]
+        Share of the variance that the channels explain; power assumed before.
+    outputs : tuple of str
+        ``Q.1.left``, ``Y.1.left``, ``sum_Y.1``, ``lateral.1``, ...
+    forces, force_deviations : float64[output, n], float64[output]
+        [N], lateral displacements [m].
+    """
+
+    s: Floats
+    speed: float
+    values: Floats
+    deviations: Floats
+    bands: Mapping[str, Floats]
+    band_deviations: Mapping[str, Floats]
+    wave_numbers: Floats
+    seen: Floats
+    power: Floats
+    outputs: tuple[str, ...]
+    forces: Floats
+    force_deviations: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Irregularity:
+    """Irregularities of a track and wheel forces from a measured run.
+
+    Attributes
+    ----------
+    name, vehicle : str
+        Of the run; of the vehicle.
+    s : float64[n]
+        Arc length of the reference body, equal steps [m].
+    values, deviations : float64[quantity, n]
+        Alignment, level, cross level and gauge under the reference body, and the standard
+        deviations of their errors [m].
+    bands, band_deviations : mapping of str to float64[quantity, n]
+        The same in D1 and D2.
+    outputs : tuple of str
+        Names of the forces.
+    forces, force_deviations : float64[output, n]
+        [N], lateral displacements [m].
+    pieces : tuple of Estimate
+        What was put together.
+    flanges : tuple of (int, float, float)
+        Wheelset, begin and end of the places where its flange touches [m].
+    remarks : tuple of str
+    """
+
+    name: str
+    vehicle: str
+    s: Floats
+    values: Floats
+    deviations: Floats
+    bands: Mapping[str, Floats]
+    band_deviations: Mapping[str, Floats]
+    outputs: tuple[str, ...]
+    forces: Floats
+    force_deviations: Floats
+    pieces: tuple[Estimate, ...]
+    flanges: tuple[tuple[int, float, float], ...]
+    remarks: tuple[str, ...]
+
+    def force(self, name: str) -> Floats:
+        """Return a force over the arc length, such as ``Q.1.left`` or ``sum_Y.2`` [N]."""
+        return np.asarray(self.forces[self.outputs.index(name)])
+
+    def unseen(self) -> dict[str, list[tuple[float, float]]]:
+        """Return wavelengths that are not filled in, by quantity: shortest and longest [m].
+
+        Those of the piece that explains least.
+        """
+        found: dict[str, list[tuple[float, float]]] = {}
+        for number, name in enumerate(QUANTITIES):
+            ranges: set[tuple[float, float]] = set()
+            for piece in self.pieces:
+                k = piece.wave_numbers[1:]
+                assumed = piece.power[number, 1:] > 0.0
+                dark = assumed & (piece.seen[number, 1:] < 0.5)
+                edges = np.flatnonzero(np.diff(np.concatenate([[0], dark.astype(int), [0]])))
+                for first, last in zip(edges[::2], edges[1::2], strict=True):
+                    waves = 2.0 * np.pi / k[last - 1], 2.0 * np.pi / k[first]
+                    ranges.add((round(waves[0], 1), round(waves[1], 1)))
+            found[name] = _merged(sorted(ranges))
+        return found
+
+    def _forces(self) -> Iterator[tuple[str, Floats, Floats]]:
+        return zip(self.outputs, self.forces, self.force_deviations, strict=True)
+
+    def table(self) -> Table:
+        """Return rms values and the standard deviations of their errors by band."""
+        columns = [Column("quantity"), Column("band"), Column("rms", "rms", "mm", ".3f"),
+                   Column("deviation", "standard deviation of the error", "mm", ".3f"),
+                   Column("seen", "share of the variance explained", "", ".3f")]  # fmt: skip
+        rows = []
+        for number, name in enumerate(QUANTITIES):
+            for band, values in self.bands.items():
+                seen = [_share(piece, number, BANDS[band]) for piece in self.pieces]
+                if np.isfinite(seen).any():
+                    rows.append([name.replace("_", " "), band, float(values[number].std()),
+                                 float(np.sqrt(np.mean(self.band_deviations[band][number] ** 2))),
+                                 float(np.nanmin(seen))])  # fmt: skip
+        return Table(columns, rows)
+
+    def forces_table(self) -> Table:
+        """Return largest wheel forces, and the standard deviations of their errors."""
+        columns = [Column("force"), Column("largest", "largest magnitude", "kN", ".2f"),
+                   Column("place", "at s", "m", ".0f"),
+                   Column("rms", "rms about the mean", "kN", ".2f"),
+                   Column("deviation", "standard deviation of the error", "kN", ".2f")]  # fmt: skip
+        rows = []
+        for name, values, rest in zip(
+            self.outputs, self.forces, self.force_deviations, strict=True
+        ):
+            if not name.startswith("lateral"):
+                k = int(np.argmax(np.abs(values)))
+                rows.append([name, abs(float(values[k])), float(self.s[k]), float(values.std()),
+                             float(rest.mean())])  # fmt: skip
+        return Table(columns, rows)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not seen and where flanges touch, in sentences."""
+        said = []
+        for name, ranges in self.unseen().items():
+            words = name.replace("_", " ")
+            if ranges:
+                spans = ", ".join(f"{a:g} to {b:g} m" for a, b in ranges[:8])
+                more = f" and {len(ranges) - 8} further ranges" if len(ranges) > 8 else ""
+                said.append(f"Wavelengths not seen and not filled in, {words}: {spans}{more}.")
+        for wheelset, begin, end in self.flanges[:20]:
+            said.append(
+                f"A flange of wheelset {wheelset} touches from s = {begin:.0f} to {end:.0f} m: the "
+                "alignment there is less certain than its interval says."
+            )
+        if len(self.flanges) > 20:
+            said.append(f"Flanges touch at {len(self.flanges) - 20} further places.")
+        return tuple(said)
+
+    def record(self) -> dict[str, Any]:
+        """Return the summary as plain data, SI."""
+        return {
+            "name": self.name, "vehicle": self.vehicle, "begin": float(self.s[0]),
+            "end": float(self.s[-1]), "bands": self.table().records(),
+            "forces": self.forces_table().records(),
+            "not_seen": {name: [list(a) for a in pairs] for name, pairs in self.unseen().items()},
+            "flanges": [list(place) for place in self.flanges], "remarks": list(self.remarks),
+        }  # fmt: skip
+
+    def recording(self) -> dict[str, Floats]:
+        """Return the columns of a recording that a track of railsim reads [m]."""
+        kept = [q for q in range(len(LETTERS)) if np.any(self.values[q])]
+        return {"s": self.s, **{LETTERS[q]: self.values[q] for q in kept}}
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the recording, a track with it, estimates and forces; return their paths."""
+        path = Path(folder)
+        make_folder(path)
+        recording = self.recording()
+        _csv(path / FILES[0], {"s_m": recording.pop("s"),
+                               **{f"{n}_mm": MILLI * v for n, v in recording.items()}})  # fmt: skip
+        with whole_file(path / FILES[1]) as partial:
+            partial.write_text(self._track(), encoding="utf-8")
+        columns: dict[str, Floats] = {"s_m": self.s}
+        for q, name in enumerate(QUANTITIES):
+            columns[f"{name}_mm"] = MILLI * self.values[q]
+            columns[f"{name}_deviation_mm"] = MILLI * self.deviations[q]
+            for band in BANDS:
+                columns[f"{name}_{band}_mm"] = MILLI * self.bands[band][q]
+                columns[f"{name}_{band}_deviation_mm"] = MILLI * self.band_deviations[band][q]
+        _csv(path / FILES[2], columns)
+        columns = {"s_m": self.s}
+        for name, values, rest in zip(
+            self.outputs, self.forces, self.force_deviations, strict=True
+        ):
+            unit, factor = ("mm", MILLI) if name.startswith("lateral") else ("kN", KILO)
+            columns[f"{name}_{unit}"] = factor * values
+            columns[f"{name}_deviation_{unit}"] = factor * rest
+        _csv(path / FILES[3], columns)
+        return [path / name for name in FILES]
+
+    def _track(self) -> str:
+        """Return a straight track with the recording."""
+        length = float(np.ceil(self.s[-1]))
+        return (
+            f'name = "track of {self.vehicle}"\n\n'
+            f'[[plan]]\ntype = "STR"\nlength = {length:g}\n\n'
+            f'[[cant]]\ntype = "CST"\nlength = {length:g}\ncant = 0.0\n\n'
+            f'[[irregularities]]\ntype = "measured"\nfile = "{FILES[0]}"\n'
+        )
+
+
+def joined(
+    name: str, vehicle: str, pieces: Sequence[Estimate], clearances: Floats, remarks: Sequence[str]
+) -> Irregularity:
+    """Return pieces put together, from one to the next over the length on which both exist."""
+    step = pieces[0].s[1] - pieces[0].s[0]
+    begin, end = pieces[0].s[0], pieces[-1].s[-1]
+    s = begin + step * np.arange(round((end - begin) / step) + 1)
+
+    def together(values: Sequence[Floats]) -> Floats:
+        """Join float64[rows, n] of each piece, or float64[rows]."""
+        found = np.zeros((len(values[0]), len(s)))
+        for number, (piece, own) in enumerate(zip(pieces, values, strict=True)):
+            inside = (s >= piece.s[0] - 1e-6) & (s <= piece.s[-1] + 1e-6)
+            at = s[inside]
+            whole = np.repeat(own[:, None], len(at), axis=1) if own.ndim == 1 else np.array(
+                [np.interp(at, piece.s, row) for row in own]
+            )  # fmt: skip
+            share = np.ones(len(at))
+            if number:
+                before = pieces[number - 1].s[-1]
+                share = np.clip((at - piece.s[0]) / (before - piece.s[0]), 0.0, 1.0)
+            found[:, inside] = (1.0 - share) * found[:, inside] + share * whole
+        return found
+
+    outputs, forces = pieces[0].outputs, together([piece.forces for piece in pieces])
+    touching = []
+    for w, clearance in enumerate(clearances):
+        beyond = np.abs(forces[outputs.index(f"lateral.{w + 1}")]) > clearance
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], beyond.astype(int), [0]])))
+        touching += [
+            (w + 1, float(s[a]), float(s[b - 1]))
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
+        ]
+    return Irregularity(
+        name,
+        vehicle,
+        s,
+        together([piece.values for piece in pieces]),
+        together([piece.deviations for piece in pieces]),
+        {band: together([piece.bands[band] for piece in pieces]) for band in BANDS},
+        {band: together([piece.band_deviations[band] for piece in pieces]) for band in BANDS},
+        outputs,
+        forces,
+        together([piece.force_deviations for piece in pieces]),
+        tuple(pieces),
+        tuple(touching),
+        tuple(dict.fromkeys(remarks)),
+    )
+
+
+def _share(piece: Estimate, number: int, band: tuple[float, float]) -> float:
+    """Share of the assumed variance in a band that the channels explain; nan without any."""
+    k = piece.wave_numbers
+    inside = (k >= 2.0 * np.pi / band[1]) & (k <= 2.0 * np.pi / band[0])
+    power = piece.power[number, inside]
+    total = float(power.sum())
+    return float(np.sum(power * piece.seen[number, inside]) / total) if total else float("nan")
+
+
+def _merged(ranges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return ranges of wavelengths that overlap, or nearly touch, as one."""
+    found: list[tuple[float, float]] = []
+    for low, high in ranges:
+        if found and low <= 1.05 * found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
+        else:
+            found.append((low, high))
+    return found
+
+
+def _csv(path: Path, columns: Mapping[str, Floats]) -> None:
+    with whole_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(columns) + "\n")
+        np.savetxt(file, np.transpose(list(columns.values())), fmt="%.6g", delimiter=",")
