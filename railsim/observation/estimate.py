@@ -221,7 +221,8 @@ class Irregularity:
         """Return a straight track with the recording."""
         length = float(np.ceil(self.s[-1]))
         return (
-            f'name = "track of {self.vehicle}"\n\n'
+            'format = "railsim-track/1"\n'
+            f'name = "Track under {self.vehicle}"\n\n'
             f'[[plan]]\ntype = "STR"\nlength = {length:g}\n\n'
             f'[[cant]]\ntype = "CST"\nlength = {length:g}\ncant = 0.0\n\n'
             f'[[irregularities]]\ntype = "measured"\nfile = "{FILES[0]}"\n'

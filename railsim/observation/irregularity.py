@@ -46,7 +46,9 @@ NOISE = {"sensor_acceleration": 0.05, "sensor_roll_rate": 1e-3}  # m/s2, rad/s, 
 BIAS = {"sensor_acceleration": 0.2, "sensor_roll_rate": 5e-3}
 MODEL = 0.03  # error of the response over its rms: masses, springs, dampers that are not linear
 AROUND_GAP = 8  # steps beside a gap that are left out
-ALIKE, UNLIKE = 0.3, 3.0  # correlation, ratio of rms values: read, and expected from all channels
+ALIKE, UNLIKE = 0.3, 3.0  # correlation, ratio of rms values: read, and said by other channels
+BEYOND = 30.0  # power of what does not agree, over that which noise and model explain
+FEWEST = 3  # channels of which one can be wrong
 FLANGE = 0.7  # rad, contact angle
 SEEN = 0.5  # share of the variance that the channels explain, below which nothing is filled in
 CHANNELS = ("lateral", "vertical", "cross_level", "gauge")  # of a spectrum, as `QUANTITIES`
@@ -270,30 +272,14 @@ class _Smooth:
         bias = {**BIAS, "sensor_acceleration": assumed.bias}
         self.bias = np.array([bias[kind] for kind in kinds])
         self._models: dict[float, tuple[TrackResponse, Noise]] = {}
-        self._alike = np.zeros((3, len(self.used)))
+        self.said: list[str] = []
+        self._wrong: set[int] | None = None
         self.flanges = _flanges(linear, track)
         self._last: tuple[tuple[float, int], Complex] | None = None
 
     def remarks(self) -> list[str]:
         """Remarks on the model, and on channels that read another thing than they should."""
-        said = list(self.linear.remarks)
-        product, read, seen = self._alike
-        with np.errstate(divide="ignore", invalid="ignore"):
-            correlation, ratio = product / np.sqrt(read * seen), np.sqrt(read / seen)
-        for name, c, r in zip(self.channels, correlation, ratio, strict=True):
-            if c < -ALIKE:
-                said.append(
-                    f"{name} has the opposite sign of what the other channels say "
-                    f"(correlation {c:.2f}): 'reverse'?"
-                )
-            elif c > ALIKE and not 1.0 / UNLIKE < r < UNLIKE:
-                said.append(f"{name} is {r:.3g} times what the other channels say: another 'unit'?")
-            elif not c > ALIKE:
-                said.append(
-                    f"{name} agrees with no track that the other channels allow "
-                    f"(correlation {c:.2f}): another point or axis, or a clock that runs apart?"
-                )
-        return said
+        return [*self.linear.remarks, *self.said]
 
     def model(self, speed: float) -> tuple[TrackResponse, Noise]:
         """Linear vehicle and noise of its state at a speed [m/s]."""
@@ -328,19 +314,54 @@ class _Smooth:
         errors[0] += points * self.bias**2
         fields = Fields(points, np.hstack([power, unknown]), H, errors)
         padded = ((0, 0), (0, points - n))
-        mean = fields.mean(np.pad(piece.signals, padded), np.pad(piece.there, padded))
+        if self._wrong is None:
+            self._wrong = self._disagreeing(fields, piece)
+        there = piece.there.copy()
+        there[list(self._wrong)] = False
+        mean = fields.mean(np.pad(piece.signals, padded), np.pad(there, padded))
         covariance = fields.covariance()
-        self._compare(piece, fields.seen(mean)[:, :n])
         return _estimate(piece, response, whole, mean, covariance, power)
 
-    def _compare(self, piece: _Piece, seen: Floats) -> None:
-        """Keep what each channel reads against what it should read on the estimated track."""
-        there = piece.there
-        read = np.where(there, piece.signals - _means(piece.signals, there), 0.0)
-        seen = np.where(there, seen - _means(seen, there), 0.0)
-        self._alike += np.array(
-            [np.sum(read * seen, axis=1), np.sum(read**2, axis=1), np.sum(seen**2, axis=1)]
-        )
+    def _disagreeing(self, fields: Fields, piece: _Piece) -> set[int]:
+        """Channels that read another thing than the others say; a remark on each.
+
+        What the others say of channel c is y_c - (G^-1 y)_c/(G^-1)_cc.  The worst one is left out
+        before the others are looked at again.
+        """
+        n, points = len(piece.grid), fields.points
+        taper = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) * STEP / PERIOD)
+        where = piece.there * taper
+        read = np.pad(piece.signals - _means(piece.signals, piece.there), ((0, 0), (0, points - n)))
+        read[:, :n] *= where
+        spectra, left = np.fft.rfft(read, axis=1), list(range(len(read)))
+        G, wrong = fields.data_covariance(), set()
+        while len(left) > FEWEST and len(wrong) < len(read) // 3:
+            inverse = np.linalg.inv(G[:, left][:, :, left])
+            own = np.einsum("kcc->ck", inverse).real
+            rest = np.einsum("kcd,dk->ck", inverse, spectra[left], optimize=True) / own
+            said = np.fft.irfft(spectra[left] - rest, points, axis=1)
+            beyond = np.mean(np.abs(rest) ** 2 * own, axis=1) / points
+            product = np.sum(read[left] * said, axis=1)
+            sizes = np.linalg.norm(read[left], axis=1), np.linalg.norm(said, axis=1)
+            worst = int(np.argmax(beyond))
+            name, c = self.channels[left[worst]], product[worst] / (sizes[0] * sizes[1])[worst]
+            ratio = (sizes[0] / sizes[1])[worst]
+            if c < -ALIKE:
+                words = (
+                    f"has the opposite sign of what the other channels say ({c:.2f}): 'reverse'?"
+                )
+            elif c > ALIKE and not 1.0 / UNLIKE < ratio < UNLIKE:
+                words = f"is {ratio:.2g} times what the other channels say: another 'unit'?"
+            elif c < ALIKE and beyond[worst] > BEYOND:
+                words = (
+                    f"does not agree with what the other channels say (correlation {c:.2f}): "
+                    "another point or axis, or a clock that runs apart?"
+                )
+            else:
+                break
+            self.said.append(f"{name} {words} It is left out.")
+            wrong.add(left.pop(worst))
+        return wrong
 
     def _response(self, response: TrackResponse, k: Floats, speed: float) -> Complex:
         """H of all outputs, that of a constant left out; the last one is kept."""

@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 
-RESIDUAL = 1e-3  # of the linear equations, over the rms of the errors
+RESIDUAL = 1e-2  # of the linear equations, over the rms of the errors
 MOST_ITERATIONS = 2000
 
 
@@ -96,7 +96,7 @@ class Fields:
 
     def _weights(self, data: Floats, there: Bools, residual: float) -> Floats:
         """Weights of the samples, w of (2), zero where no sample exists."""
-        forth, back = self._data_covariance()
+        forth, back = self.data_covariance(), self._inverse()
 
         def applied(matrix: Complex, values: Floats) -> Floats:
             spectra = np.fft.rfft(values, axis=1)
@@ -125,14 +125,19 @@ class Fields:
             f"the smoother's equations are not solved after {MOST_ITERATIONS} iterations"
         )
 
-    def _data_covariance(self) -> tuple[Complex, Complex]:
-        """G and G^-1, complex128[bin, channel, channel]."""
-        H, P, N = self.response, self.power, self.errors
+    def data_covariance(self) -> Complex:
+        """G of (1), complex128[bin, channel, channel]."""
+        H, channels = self.response, np.arange(self.errors.shape[1])
+        found = np.einsum("kcq,kq,kdq->kcd", H, self.power, H.conj(), optimize=True)
+        found[:, channels, channels] += self.errors
+        return np.asarray(found)
+
+    def _inverse(self) -> Complex:
+        """G^-1, complex128[bin, channel, channel]."""
+        H, N = self.response, self.errors
         channels = np.arange(N.shape[1])
-        forth = np.einsum("kcq,kq,kdq->kcd", H, P, H.conj(), optimize=True)
-        forth[:, channels, channels] += N
         # Woodbury: G^-1 = N^-1 - N^-1 H Cov H* N^-1
         gain = H / N[:, :, None]
         back = -np.einsum("kcp,kpq,kdq->kcd", gain, self.covariance(), gain.conj(), optimize=True)
         back[:, channels, channels] += 1.0 / N
-        return forth, back
+        return np.asarray(back)
