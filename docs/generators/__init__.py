@@ -5,7 +5,7 @@
 
 GENERATORS = {
     "tables": "quantities, curving study, first picture (the default; seconds)",
-    "examples": "gallery of examples; part `pages`: texts only (two minutes)",
+    "examples": "gallery of examples; parts: names; part `pages`: texts only (minutes)",
     "vehicles": "pages of the library; parts: names; part `data`: from the files only (minutes)",
     "stability": "pictures of modes, critical speeds, curving; parts: names (ten minutes)",
     "tracks": "tables and picture of irregularities (a minute)",

@@ -13,6 +13,7 @@ import re
 import runpy
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -78,7 +79,7 @@ def gallery() -> str:
         picture = f"![{question}](../img/examples/{name}.png)"
         items.append(f"## [{question}]({name}.md)\n\n[{picture}]({name}.md)\n")
     return (
-        "# Examples\n\nTen short scripts in reading order; each answers one question. They are in "
+        "# Examples\n\nShort scripts in reading order; each answers one question. They are in "
         "the folder\n`examples/` and run in seconds once railsim has compiled its kernels.\n\n"
         + "\n".join(items)
     )
@@ -93,10 +94,12 @@ def pages() -> dict[Path, str]:
     return made
 
 
-def run() -> None:
-    """Run all scripts: new pictures and outputs."""
+def run(names: Sequence[str]) -> None:
+    """Run the scripts of these names, or all: new pictures and outputs."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for script in SCRIPTS:
+            if names and script.stem not in names:
+                continue
             with contextlib.redirect_stdout(io.StringIO()) as printed:
                 runpy.run_path(str(script))
             shutil.copy(f"{script.stem}.png", IMAGES)
@@ -104,8 +107,8 @@ def run() -> None:
 
 
 def make(words):
-    """Run the examples and write their pages, or only the texts of these."""
+    """Run the examples, or some of them, and write their pages; `pages` writes texts only."""
     if "pages" not in words:
-        run()
+        run(words)
     for path, text in pages().items():
         path.write_text(text, "utf-8")

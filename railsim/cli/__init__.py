@@ -43,6 +43,7 @@ COMMANDS = {
     "plot": "Time histories of a result; a track in plan.",
     "animate": "A vehicle and its contacts moving along the track.",
     "report": "One page of inputs, tables against limits and plots.",
+    "fmu": "A vehicle on its track as a unit of FMI 3.0 for other programs.",
     "export": "A result as CSV, for MATLAB, or as Parquet.",
     "assess": "Running safety and ride comfort of results.",
     "modes": "Eigenfrequencies, damping and mode shapes of a vehicle.",

@@ -220,8 +220,8 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     kinds: dict[tuple[str, str, str], list[tuple[float, Sequence[PointComfort]]]] = {}
     for a in assessments:
         for run, points in a.comfort.items():
-            speed, *where = a.driven[run]
-            kinds.setdefault((a.vehicle, *where), []).append((3.6 * speed, points))
+            speed, track, rails = a.driven[run]
+            kinds.setdefault((a.vehicle, track, rails), []).append((3.6 * speed, points))
     several = [len({key[k] for key in kinds}) > 1 for k in range(3)]  # vehicles, tracks, rails
     for number, (key, runs) in enumerate(kinds.items()):
         words = [word for word, differs in zip(key, several, strict=True) if differs]
@@ -230,17 +230,20 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
         label = unformatted(", ".join(words)) or "middle of the car"
         _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
         for way, line in (("lateral", "-"), ("vertical", "--")):
-            _over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)
+
+            def index_of(point: PointComfort, way: str = way) -> float:
+                return point.sperling[way]
+
+            _over_speed(index, runs, index_of, line, color=colour)
     mean.set(xlabel="speed (km/h)", ylabel="$N_{MV}$", title="Mean comfort, EN 12299")
     index.set(xlabel="speed (km/h)", ylabel="$W_z$", title="Sperling")
     for ax in (mean, index):
         ax.set_ylim(bottom=0.0)
     _classes(mean, assessments)
-    look = {"color": "0.3", "ls": "-"}
     handles = [*mean.get_legend_handles_labels()[0],
                Patch(color="0.3", alpha=0.2, label="all measuring points"),
-               Line2D([], [], label="$W_z$ lateral", **look),
-               Line2D([], [], label="$W_z$ vertical", **look | {"ls": "--"})]  # fmt: skip
+               Line2D([], [], color="0.3", label="$W_z$ lateral"),
+               Line2D([], [], color="0.3", ls="--", label="$W_z$ vertical")]  # fmt: skip
     figure.legend(handles=handles, loc="outside right upper")
     title = list(dict.fromkeys(key[k] for k in (0, 1) for key in kinds))
     figure.suptitle("\n".join(map(unformatted, title[:4])), x=0.012, ha="left")

@@ -165,6 +165,11 @@ class Simulation:
         return "running" if self.running else verdict(self._run)["status"]
 
     @property
+    def status_reason(self) -> str:
+        """Why the run has ended; empty while it goes on."""
+        return "" if self.running else verdict(self._run)["status_reason"]
+
+    @property
     def actuators(self) -> tuple[str, ...]:
         """Names of what takes commands."""
         return self._run.prepared.model.index.actuators
@@ -338,10 +343,7 @@ class Simulation:
     def _ended_because(self) -> str:
         if self._closed is not None:
             return "the run has ended: its result has been taken"
-        facts = verdict(self._run)
-        return f"the run has ended at {self.time:.6g} s: {facts['status_reason']}"
-
-    # commands and what is read
+        return f"the run has ended at {self.time:.6g} s: {self.status_reason}"
 
     def set(self, actuator: str, value: float) -> None:
         """Give a command to an actuator; it stays until the next one.
@@ -472,8 +474,6 @@ class Simulation:
         self._phase, self._missing, self._behind, self._length, self._every, self._goal = grid
         self._run.status, self._run.where = saved.grid[9:]
         self._seen = None
-
-    # the end
 
     def result(self) -> Result:
         """End the run where it is, and return its result."""

@@ -31,6 +31,5 @@ def test_gallery_is_up_to_date():
     assert written == GALLERY.pages(), (
         "python docs/generate.py examples, or examples:pages where texts changed"
     )
-    assert len(GALLERY.SCRIPTS) == 10
     pictures = sorted(GALLERY.IMAGES.glob("*.png"))
     assert [p.stem for p in GALLERY.SCRIPTS] == [p.stem for p in pictures]

@@ -1,0 +1,156 @@
+"""A unit of FMI 3.0 as controller of a run, called by FMPy."""
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from railsim.errors import Fault, InputError, argument_fault, nearest, optional_package
+from railsim.simulation import Simulation
+
+
+class Controller:
+    """A unit for co-simulation that commands the actuators of a run at a fixed period.
+
+    Over a period both run side by side: the unit gets what is read at its beginning, the
+    actuators get at its end what the unit gives, so that a command acts one period late.
+
+    Parameters
+    ----------
+    path : str or Path
+        Unit of FMI 3.0 for co-simulation.
+    inputs : mapping of str to str
+        Inputs of the unit: to each a signal of the vehicle, or a quantity with indices, such as
+        ``sensor_acceleration:0:1``, counted from 0.
+    outputs : mapping of str to str
+        Outputs of the unit: to each an actuator of the vehicle.
+    period : float
+        Step of communication [s].
+    allow_code : bool
+        Units hold native code, which may do whatever the user may: without True none is loaded.
+
+    Raises
+    ------
+    InputError
+        The unit has no such variables, is no unit for co-simulation, or may not be loaded.
+    ImportError
+        FMPy is not installed.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        inputs: Mapping[str, str],
+        outputs: Mapping[str, str],
+        period: float,
+        allow_code: bool = False,
+    ) -> None:
+        name = str(path)
+        if not allow_code:
+            allowed = "allow_code=True, where you trust its source"
+            raise InputError([Fault(name, "", "a unit holds native code", allowed)])
+        if not 0.0 < period < np.inf:
+            raise InputError([argument_fault("period", "", f"found {period} s", "a positive time")])
+        fmpy = optional_package("fmpy", "Controller", "'railsim[fmi]'")
+        slave = optional_package("fmpy.fmi3", "Controller", "'railsim[fmi]'").FMU3Slave
+        try:
+            model = fmpy.read_model_description(name)
+        except Exception as error:
+            raise InputError([Fault(name, "", f"no unit: {error}", "a unit of FMI 3.0")]) from None
+        if model.coSimulation is None or not model.fmiVersion.startswith("3"):
+            allowed = "a unit of FMI 3.0 for co-simulation"
+            raise InputError([Fault(name, "", f"FMI {model.fmiVersion}", allowed)])
+        known = {variable.name: variable for variable in model.modelVariables}
+        self._read = [(_reference(name, known, one), at) for one, at in inputs.items()]
+        self._give = [(_reference(name, known, one), to) for one, to in outputs.items()]
+        self._period = period
+        self._folder = fmpy.extract(name)
+        self._unit = slave(
+            guid=model.guid,
+            unzipDirectory=self._folder,
+            modelIdentifier=model.coSimulation.modelIdentifier,
+            instanceName=Path(name).stem,
+        )
+        self._time: float | None = None
+
+    def run(
+        self, simulation: Simulation, *, until: float | None = None, duration: float | None = None
+    ) -> bool:
+        """Advance a run under this controller; whether it goes on.
+
+        Parameters
+        ----------
+        simulation
+            The run.
+        until, duration : float, optional
+            Arc length [m] to run to, or time [s] to run for; otherwise to its end.
+        """
+        end = np.inf if duration is None else simulation.time + duration
+        if self._time is None:
+            self._unit.instantiate()
+            self._unit.enterInitializationMode(startTime=simulation.time)
+            self._unit.exitInitializationMode()
+            self._time = simulation.time
+        while (
+            simulation.running
+            and simulation.time < end - 1e-9
+            and (until is None or simulation.distance < until)
+        ):
+            self._step(simulation)
+        return simulation.running
+
+    def _step(self, simulation: Simulation) -> None:
+        assert self._time is not None
+        if self._read:
+            values = [_value(simulation, at) for _, at in self._read]
+            self._unit.setFloat64([reference for reference, _ in self._read], values)
+        _, terminate, *_ = self._unit.doStep(self._time, self._period)
+        self._time += self._period
+        simulation.step(self._period)
+        given = self._unit.getFloat64([reference for reference, _ in self._give])
+        for (_, actuator), value in zip(self._give, given, strict=True):
+            simulation.set(actuator, value)
+        if terminate:
+            raise InputError([argument_fault("unit", "", "it ended the simulation", "")])
+
+    def close(self) -> None:
+        """End the unit and remove what was unpacked of it."""
+        if self._time is not None:
+            self._unit.terminate()
+            self._unit.freeInstance()
+            self._time = None
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: object, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _reference(file: str, known: Mapping[str, Any], name: str) -> int:
+    """Return the reference of a unit's variable, a number without dimensions."""
+    if name not in known:
+        raise InputError([Fault(file, name, "no such variable", nearest(name, known))])
+    if known[name].type != "Float64" or known[name].dimensions:
+        raise InputError([Fault(file, name, f"a {known[name].type}", "one Float64")])
+    reference: int = known[name].valueReference
+    return reference
+
+
+def _value(simulation: Simulation, at: str) -> float:
+    """Return a signal, or a member of a quantity."""
+    name, *indices = at.split(":")
+    value = simulation.read(at if at in simulation.readable else name)
+    try:
+        return float(np.asarray(value)[tuple(int(i) for i in indices)])
+    except (IndexError, ValueError, TypeError):
+        shape = np.shape(value)
+        fault = argument_fault("inputs", at, "no such member", f"indices within {shape}")
+        raise InputError([fault]) from None

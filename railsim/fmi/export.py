@@ -1,0 +1,163 @@
+"""Write a vehicle on its track as a unit of FMI 3.0, by PythonFMU3."""
+
+import json
+import keyword
+import re
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, argument_fault, nearest, optional_package
+from railsim.files import check_file, whole_file
+from railsim.fmi.unit import INPUTS, VARIABLES
+from railsim.notation import QUANTITIES, REQUESTED
+from railsim.plot.selection import panels
+from railsim.result import Result, open_run
+from railsim.simulation import Simulation
+from railsim.version import __version__
+
+OUTPUTS = ("Q", "Y", "wheelset_lateral")
+"""Quantities that are output unless others are named."""
+
+WRAPPER = '''"""A vehicle of railsim, called by FMI 3.0; it needs Python with railsim {version}."""
+
+from pythonfmu3 import Fmi3Slave
+
+from railsim.fmi.unit import Unit
+
+
+class {name}(Unit, Fmi3Slave):
+    """The calls are those of `railsim.fmi.unit.Unit`."""
+'''
+
+
+def fmu(
+    vehicle: Vehicle,
+    track: Track,
+    path: str | Path,
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] = OUTPUTS,
+    overwrite: bool = False,
+    **conditions: Any,
+) -> Path:
+    """Write a unit for co-simulation that runs this vehicle on this track.
+
+    Parameters
+    ----------
+    vehicle, track
+        What runs; the unit holds both as they are here, without references to files.
+    path : str or Path
+        File to be written, ending in ``.fmu``.
+    inputs : sequence of str, optional
+        Actuators that the calling program commands; by default all.
+    outputs : sequence of str
+        Signals of the vehicle, and quantities over time with the labels wanted: ``Q``,
+        ``Y:1:left``, ``body_acceleration:carbody:y``.
+    overwrite : bool
+        Whether a file of this name may be replaced.
+    **conditions
+        Speed, settings, start, duration, until and profiles, as in `railsim.simulate`.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        An actuator, signal or quantity does not exist, or the run is no run.
+    ImportError
+        PythonFMU3 is not installed.
+    """
+    wrapper = optional_package("pythonfmu3", "fmu", "'railsim[fmi]'")
+    path = Path(path)
+    check_file(path, overwrite=overwrite, endings=(".fmu",))
+    name = _identifier(path.stem)
+    with tempfile.TemporaryDirectory() as folder:
+        stored, script = Path(folder) / INPUTS, Path(folder) / f"{name}.py"
+        with Simulation(vehicle, track, record=stored, **conditions) as run:
+            actuators, step = run.actuators, run.step_length
+            signals = tuple(n for n in run.readable if n not in (*QUANTITIES, *REQUESTED))
+            run.step()
+        result = open_run(stored)
+        facts = {
+            "railsim": __version__,
+            "description": f"{vehicle.name} on {track.name} at {result.speed:g} m/s; runs in a "
+            f"Python that has railsim {__version__}",
+            "step": step,
+            "duration": conditions.get("duration"),
+            "until": conditions.get("until"),
+            "inputs": _commands(vehicle, actuators, inputs),
+            "outputs": _variables(result, signals, outputs),
+        }
+        variables = Path(folder) / VARIABLES
+        variables.write_text(json.dumps(facts, indent=1), encoding="utf-8")
+        script.write_text(WRAPPER.format(name=name, version=__version__), encoding="utf-8")
+        made = wrapper.FmuBuilder.build_FMU(
+            script,
+            dest=Path(folder) / "made",
+            project_files=[stored, variables],
+            needsExecutionTool=True,
+            canGetAndSetFMUState=True,
+            canSerializeFMUState=True,
+            canHandleVariableCommunicationStepSize=True,
+        )
+        with whole_file(path) as partial:
+            partial.write_bytes(made.read_bytes())
+    return path
+
+
+def _identifier(stem: str) -> str:
+    """Return the name of a class and of a file for the name of a unit."""
+    name = re.sub(r"\W", "_", stem, flags=re.ASCII)
+    return f"unit_{name}" if not name or name[0].isdigit() or keyword.iskeyword(name) else name
+
+
+def _commands(
+    vehicle: Vehicle, actuators: Sequence[str], wanted: Sequence[str] | None
+) -> list[dict[str, Any]]:
+    wanted = actuators if wanted is None else wanted
+    for name in wanted:
+        if name not in actuators:
+            allowed = nearest(name, actuators) if actuators else "the vehicle has none"
+            raise InputError([argument_fault("inputs", "", f"no actuator '{name}'", allowed)])
+    return [
+        {"name": name, "start": 0.0, "unit": "", "description": f"command of actuator {name}"}
+        for name in wanted
+    ]
+
+
+def _variables(
+    result: Result, signals: Sequence[str], wanted: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return name, quantity, place in its array, unit and words of every output."""
+    found: dict[str, dict[str, Any]] = {}
+    for selection in wanted:
+        if selection in signals:
+            words = f"signal {selection}"
+            found[selection] = _variable(selection, selection, [], "", words)
+            continue
+        quantity = selection.partition(":")[0]
+        for panel in panels(result, [selection]):
+            for line in panel.lines:
+                dims = result.quantities[quantity].dims[1:]
+                labels = [line.labels[dim] for dim in dims]
+                at = [
+                    result.coordinates[dim].index(label)
+                    for dim, label in zip(dims, labels, strict=True)
+                ]
+                name = ".".join((quantity, *labels))
+                words = ", ".join((panel.quantity.long_name, *labels))
+                found[name] = _variable(name, quantity, at, panel.quantity.unit, words)
+    if not found:
+        raise InputError([Fault("outputs", "", "found none", "at least one quantity or signal")])
+    return list(found.values())
+
+
+def _variable(name: str, quantity: str, at: list[int], unit: str, words: str) -> dict[str, Any]:
+    return {"name": name, "quantity": quantity, "at": at, "unit": unit, "description": words}

@@ -1,0 +1,216 @@
+"""What a unit does when a program calls it: a `Simulation` behind the calls of FMI 3.0.
+
+Loaded by the wrapper within the unit, in the Python of the program that calls; the unit's folder
+of resources holds `INPUTS` and `VARIABLES`.
+"""
+
+import base64
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from railsim.result import open_run
+from railsim.simulation import Simulation
+from railsim.simulation.advance import SavedState
+from railsim.version import __version__
+
+INPUTS = "inputs.h5"
+"""A result of no length: the vehicle, track, settings and profiles with which the unit runs."""
+VARIABLES = "variables.json"
+DERIVED = {
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+}
+TIME_TOLERANCE = 1e-9  # s; between the time of the program that calls and that of the run
+
+
+class Unit:
+    """Calls of FMI 3.0 for co-simulation, mixed into the class of PythonFMU3.
+
+    Inputs are commands of actuators, which hold over a step of communication; outputs are
+    quantities and signals at its end.  `do_step` asks to terminate where the run has ended, and
+    logs why: at the end of the track, by derailment, by a state that could not be computed.
+    """
+
+    vars: Any
+    resources: Any
+    log: Any
+    register_units: Any
+    register_variable: Any
+
+    def __init__(self, **facts: Any) -> None:
+        super().__init__(**facts)
+        wrapper = self._wrapper = import_module("pythonfmu3")
+        folder = Path(str(self.resources).removeprefix("file://"))
+        self._folder = folder
+        self._facts = json.loads((folder / VARIABLES).read_text(encoding="utf-8"))
+        self.description = self._facts["description"]
+        self.default_experiment = wrapper.DefaultExperiment(
+            start_time=0.0, step_size=self._facts["step"]
+        )
+        self.author, self.version = f"railsim {__version__}", self._facts["railsim"]
+        self._commands = {one["name"]: one["start"] for one in self._facts["inputs"]}
+        self._values = {one["name"]: 0.0 for one in self._facts["outputs"]}
+        self._status = "not begun"
+        self._simulation: Simulation | None = None
+        self._time = 0.0
+        self._register()
+
+    def _register(self) -> None:
+        wrapper = self._wrapper
+        causality, variability = wrapper.Fmi3Causality, wrapper.Fmi3Variability
+        units = {one["unit"] for one in (*self._facts["inputs"], *self._facts["outputs"])}
+        self.register_units([wrapper.unit.Unit(u, **exponents(u)) for u in sorted(units - {""})])
+        time = wrapper.Float64(
+            "time", causality=causality.independent, getter=lambda: self._time,
+            variability=variability.continuous,
+        )  # fmt: skip
+        self.register_variable(time, nested=False)
+        for one in self._facts["inputs"]:
+            variable = wrapper.Float64(
+                one["name"],
+                unit=one["unit"] or None,
+                description=one["description"],
+                causality=causality.input,
+                variability=variability.discrete,
+                start=one["start"],
+                getter=lambda name=one["name"]: self._commands[name],
+                setter=lambda value, name=one["name"]: self._commands.__setitem__(name, value),
+            )
+            self.register_variable(variable, nested=False)
+        for one in self._facts["outputs"]:
+            variable = wrapper.Float64(
+                one["name"],
+                unit=one["unit"] or None,
+                description=one["description"],
+                causality=causality.output,
+                variability=variability.continuous,
+                initial=wrapper.Fmi3Initial.calculated,
+                getter=lambda name=one["name"]: self._values[name],
+            )
+            self.register_variable(variable, nested=False)
+        status = wrapper.String(
+            "status",
+            description="running, or the status of the run that has ended",
+            causality=causality.local,
+            getter=lambda: self._status,
+        )
+        self.register_variable(status, nested=False)
+
+    # calls
+
+    def exit_initialization_mode(self) -> None:
+        """Prepare the run, and evaluate it once: what has to be compiled is compiled here."""
+        if self._facts["railsim"] != __version__:
+            self.log(
+                f"made with railsim {self._facts['railsim']}, run with {__version__}: "
+                "results may differ",
+                self._wrapper.Fmi3Status.warning,
+            )
+        inputs = open_run(self._folder / INPUTS).inputs()
+        inputs |= {"duration": self._facts["duration"], "until": self._facts["until"]}
+        self._simulation = Simulation(**inputs, record=False)
+        self._command()
+        self._look()
+
+    def do_step(self, current_time: float, step_size: float) -> Any:
+        """Advance by a step of communication."""
+        outcome, status = self._wrapper.Fmi3StepResult, self._wrapper.Fmi3Status
+        run = self._run
+        if abs(run.time - current_time) > TIME_TOLERANCE * max(1.0, abs(current_time)):
+            self.log(
+                f"asked for a step at {current_time} s, the run is at {run.time} s", status.error
+            )
+            return outcome(status.error)
+        if not run.running:
+            self.log(f"the run has ended before: {self._status}", status.error)
+            return outcome(status.error)
+        self._command()
+        goes_on = run.step(step_size)
+        self._look()
+        if not goes_on:
+            ended = status.ok if self._status == "complete" else status.warning
+            self.log(f"the run has ended: {self._status}, {run.status_reason}", ended)
+            return outcome(ended, terminateSimulation=True)
+        return outcome()
+
+    def terminate(self) -> None:
+        """End the run."""
+        self._simulation = None
+
+    @property
+    def _run(self) -> Simulation:
+        if self._simulation is None:
+            raise RuntimeError("the unit has not been initialised")
+        return self._simulation
+
+    def _command(self) -> None:
+        for name, value in self._commands.items():
+            self._run.set(name, value)
+
+    def _look(self) -> None:
+        """Read the outputs."""
+        run = self._run
+        self._time, self._status = run.time, run.status
+        if self._status not in ("running", "complete"):
+            return  # the last values that could be computed stay
+        for one in self._facts["outputs"]:
+            value = run.read(one["quantity"])
+            self._values[one["name"]] = float(value[tuple(one["at"])] if one["at"] else value)
+
+    # states
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        state = self._run.state
+        return {
+            "commands": dict(self._commands),
+            "values": dict(self._values),
+            "status": self._status,
+            "time": self._time,
+            "motion": _text(state.motion),
+            "counted": [_text(one) for one in state.counted],
+            "grid": list(state.grid),
+        }
+
+    def _set_fmu_state(self, saved: dict[str, Any]) -> None:
+        self._commands, self._values = dict(saved["commands"]), dict(saved["values"])
+        self._status, self._time = saved["status"], saved["time"]
+        counted = tuple(_array(one) for one in saved["counted"])
+        self._run.state = SavedState(_array(saved["motion"]), counted, tuple(saved["grid"]))
+
+
+def exponents(unit: str) -> dict[str, int]:
+    """Return the exponents of the base units in a unit.
+
+    Examples
+    --------
+    >>> exponents("N m/rad"), exponents("m/s2")
+    ({'kg': 1, 'm': 2, 's': -2, 'rad': -1}, {'m': 1, 's': -2})
+    """
+    found: dict[str, int] = {}
+    for place, part in enumerate(unit.split("/")):
+        for factor in part.split():
+            name, power = (
+                factor.rstrip("0123456789"),
+                factor.lstrip("abcdefghijklmnopqrstuvwxyzNPWJ"),
+            )
+            for base, exponent in DERIVED.get(name, {name: 1} if name else {}).items():
+                times = int(power or 1) * (-1 if place else 1)
+                found[base] = found.get(base, 0) + times * exponent
+    return found
+
+
+def _text(array: Any) -> list[Any]:
+    """Return an array as text that gives it back to the last bit."""
+    array = np.ascontiguousarray(array)
+    return [array.dtype.str, list(array.shape), base64.b64encode(array.tobytes()).decode()]
+
+
+def _array(text: list[Any]) -> Any:
+    kind, shape, content = text
+    return np.frombuffer(base64.b64decode(content), dtype=kind).reshape(shape).copy()

@@ -1,0 +1,189 @@
+"""Units of FMI 3.0: written, run by FMPy in a process of its own, and as controller of a run."""
+
+import json
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import railsim
+from railsim.cli import railsim as program
+from railsim.errors import InputError
+from railsim.fmi import Controller, fmu
+
+pytest.importorskip("pythonfmu3", reason="no PythonFMU3")
+pytest.importorskip("fmpy", reason="no FMPy")
+
+WAY = {"speed": 20.0, "start": 300.0, "until": 330.0}
+OUTPUTS = ["Q:1", "wheelset_lateral:1", "body_acceleration:carbody:y"]
+DAMPER = """
+from pythonfmu3 import Fmi3Slave, Float64, Fmi3Causality, Fmi3StepResult, Fmi3Variability
+
+
+class Damper(Fmi3Slave):
+    def __init__(self, **facts):
+        super().__init__(**facts)
+        self.time, self.velocity, self.force = 0.0, 0.0, 0.0
+        changing = Fmi3Variability.continuous
+        self.register_variable(
+            Float64("time", causality=Fmi3Causality.independent, variability=changing)
+        )
+        self.register_variable(Float64("velocity", causality=Fmi3Causality.input, start=0.0))
+        self.register_variable(Float64("force", causality=Fmi3Causality.output))
+
+    def do_step(self, current_time, step_size):
+        self.force = -2e4 * self.velocity
+        return Fmi3StepResult()
+"""
+CALLER = """
+import json, sys
+from fmpy import extract, read_model_description
+from fmpy.fmi3 import FMU3Slave
+
+file = sys.argv[1]
+model = read_model_description(file)
+unit = FMU3Slave(guid=model.guid, unzipDirectory=extract(file), instanceName="unit",
+                 modelIdentifier=model.coSimulation.modelIdentifier)
+unit.instantiate()
+unit.enterInitializationMode()
+unit.exitInitializationMode()
+outputs = [v for v in model.modelVariables if v.causality == "output"]
+references = [v.valueReference for v in outputs]
+rows, time, done = [[0.0, *unit.getFloat64(references)]], 0.0, False
+while not done:
+    _, done, *_ = unit.doStep(time, 0.02)
+    time += 0.02
+    rows.append([time, *unit.getFloat64(references)])
+    if len(rows) == 11:
+        saved = unit.getFMUState()
+        first = unit.serializeFMUState(saved)
+unit.setFMUState(saved)
+again = unit.serializeFMUState(saved)
+time, repeated = rows[10][0], []
+for row in rows[11:]:
+    unit.doStep(time, 0.02)
+    time += 0.02
+    repeated.append([time, *unit.getFloat64(references)])
+print(json.dumps({"names": [v.name for v in outputs], "rows": rows, "repeated": repeated,
+                  "same": first == again}))
+"""
+
+
+@pytest.fixture(scope="module")
+def active():
+    """A coach with a lateral actuator between car body and front frame."""
+    coach = railsim.load_vehicle("coach_manchester")
+    push = {
+        "kind": "actuator",
+        "bodies": ["carbody", "front.frame"],
+        "points": [[9.5, 0.0, -0.9], [9.5, 0.9, -0.9]],
+    }
+    return coach.replace(elements={**dict(coach.elements), "push": push})
+
+
+@pytest.fixture(scope="module")
+def track():
+    return railsim.load_track("curve_r250")
+
+
+@pytest.fixture(scope="module")
+def unit(active, track, tmp_path_factory):
+    return fmu(active, track, tmp_path_factory.mktemp("unit") / "coach.fmu", outputs=OUTPUTS, **WAY)
+
+
+@pytest.mark.slow
+def test_the_unit_without_commands_is_the_run(unit, active, track):
+    """In a fresh process, steps of 20 ms; states saved and restored to the last bit."""
+    script = unit.with_name("caller.py")
+    script.write_text(CALLER)
+    ran = subprocess.run([sys.executable, script, unit], capture_output=True, text=True, check=True)
+    found = json.loads(ran.stdout.splitlines()[-1])
+    rows = np.array(found["rows"])
+    result = railsim.simulate(active, track, **WAY)
+    at = np.searchsorted(result["time"], rows[:, 0] - 1e-9)
+    body = result.bodies.index("carbody")
+    expected = [
+        result["time"],
+        *result["Q"][:, 0].T,
+        result["wheelset_lateral"][:, 0],
+        result["body_acceleration"][:, body, 1],
+    ]
+    assert found["names"][-1] == "body_acceleration.carbody.y"
+    assert np.allclose(rows, np.transpose(expected)[at], rtol=1e-9, atol=1e-12)
+    assert found["same"]
+    assert found["repeated"] == found["rows"][11:]
+    assert "the run has ended: complete" in ran.stdout + ran.stderr
+
+
+def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
+    with zipfile.ZipFile(unit) as archive:
+        description = archive.read("modelDescription.xml").decode()
+        contents = [archive.read(n) for n in archive.namelist() if n.startswith("resources/")]
+    assert f"Python that has railsim {railsim.__version__}" in description.replace("\n", " ")
+    assert '<BaseUnit kg="1" m="1" s="-2"/>' in description
+    assert not any(str(unit.parent).encode() in content for content in contents)
+
+
+def test_a_unit_as_controller_acts_one_period_late(active, track, tmp_path):
+    from pythonfmu3 import FmuBuilder
+
+    script = tmp_path / "damper.py"
+    script.write_text(DAMPER)
+    damper = FmuBuilder.build_FMU(script, dest=tmp_path)
+    body = railsim.simulate(active, track, speed=20.0, until=0.2).bodies.index("carbody")
+    reading = f"body_velocity:{body}:1"
+    with railsim.Simulation(active, track, **WAY, record=False) as own:
+        commands = []
+        while own.running:
+            commands.append(-2e4 * own.read("body_velocity")[body, 1])
+            own.step(0.01)
+            own.set("push", commands[-1])
+        by_hand = own.read("body_position")
+    with (
+        railsim.Simulation(active, track, **WAY, record=False) as run,
+        Controller(
+            damper, inputs={"velocity": reading}, outputs={"force": "push"}, period=0.01,
+            allow_code=True,
+        ) as controller,
+    ):  # fmt: skip
+        controller.run(run)
+        assert np.array_equal(run.read("body_position"), by_hand)
+    assert max(map(abs, commands)) > 10.0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"inputs": ["pull"]}, "no actuator 'pull'; allowed: push"),
+        ({"outputs": ["R"]}, "no quantity 'R'"),
+        ({"outputs": ["Q:9"]}, "no label '9'"),
+    ],
+)
+def test_wrong_variables_are_input_errors(active, track, tmp_path, change, words):
+    with pytest.raises(InputError, match="no ") as error:
+        fmu(active, track, tmp_path / "coach.fmu", **WAY, **change)
+    assert words in str(error.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_native_code_needs_permission(unit):
+    with pytest.raises(InputError, match="allow_code=True"):
+        Controller(unit, inputs={}, outputs={}, period=0.01)
+
+
+def test_command(tmp_path):
+    out = tmp_path / "coach.fmu"
+    run = [
+        "fmu", "coach_manchester", "curve_r250", "--speed", "72km/h", "--until", "5", "--outputs",
+        "sum_Y:1", "--out", str(out),
+    ]  # fmt: skip
+    answer = CliRunner().invoke(program, run)
+    assert answer.exit_code == 0, answer.output
+    with zipfile.ZipFile(out) as archive:
+        assert b"sum_Y.front.outer.wheelset" in archive.read("modelDescription.xml")
+    again = CliRunner().invoke(program, run)
+    assert isinstance(again.exception, InputError)
+    assert "exists" in str(again.exception)
