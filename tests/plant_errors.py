@@ -31,7 +31,7 @@ SWAPPED = {
     "True": "False", "False": "True", "min": "max", "max": "min", "sin": "cos", "cos": "sin",
 }  # fmt: skip
 FILES_PER_ERROR = 10
-SECONDS_PER_ERROR = 1200
+SECONDS_PER_ERROR = 2400
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,9 @@ def tests_of(path: str) -> list[str]:
         score += 0.5 * (f"railsim.{room}" in text)
         scores[str(file.relative_to(ROOT))] = score - 0.00001 * len(text)
     best = sorted(scores, key=lambda name: -scores[name])
-    return best[:FILES_PER_ERROR]
+    # what runs in the loop is named nowhere: the physics of the whole sees it
+    physics = [name for name in best if "/verification/" in name] if room == "kernels" else []
+    return list(dict.fromkeys([*best[:FILES_PER_ERROR], *physics]))
 
 
 def first_failure(planted: Planted) -> str:
