@@ -9,7 +9,17 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import DOF, PENDING, RATE, SUPPORT_SIZE, support_begin
+from railsim.kernels.support import (
+    BALLAST,
+    DOF,
+    PADS,
+    PENDING,
+    RATE,
+    SUPPORT_SIZE,
+    SUPPORT_STEP,
+    factors,
+    support_begin,
+)
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.time_step import SCHEMES, empty_recorder
@@ -249,3 +259,12 @@ def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_move
     rms = [np.sqrt(np.mean(x**2, axis=(0, 1))) for x in (by_slopes, uncorrected)]
     # of Q next to nothing is left, of Y, where creep slopes are estimates, a quarter
     assert np.all(rms[0] < np.array([0.1, 0.3]) * rms[1])
+
+
+def test_factors_between_two_places_are_interpolated():
+    variation = np.array([[10.0, 1.0, 1.0], [20.0, 3.0, 0.5], [40.0, 2.0, 2.0]])
+    out = np.zeros(SUPPORT_STEP)
+    for s in (0.0, 10.0, 12.5, 20.0, 35.0, 50.0):
+        factors(variation, s, out)
+        assert out[PADS] == pytest.approx(np.interp(s, variation[:, 0], variation[:, 1]))
+        assert out[BALLAST] == pytest.approx(np.interp(s, variation[:, 0], variation[:, 2]))

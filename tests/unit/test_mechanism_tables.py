@@ -1,0 +1,17 @@
+"""Tables of a mechanism's results."""
+
+from railsim.mechanisms.selection import Choice
+from railsim.mechanisms.tables import selection_table
+
+
+def choice(name, fits=False, reasons=("stroke too short",)):
+    return Choice("catalogue", name, fits, reasons, {})
+
+
+def test_neighbours_that_do_not_fit_for_the_same_reason_share_a_row():
+    long = ("too long",)
+    choices = [choice("a"), choice("b"), choice("c", True, ()), choice("d", True, ()),
+               choice("e", reasons=long), choice("f", reasons=long), choice("g", reasons=long)]  # fmt: skip
+    rows = selection_table(choices).records()
+    assert [row["row"] for row in rows] == ["a ... b (2 rows)", "c", "d", "e ... g (3 rows)"]
+    assert [row["fits"] for row in rows] == ["no", "yes", "yes", "no"]
