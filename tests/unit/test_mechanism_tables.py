@@ -10,8 +10,8 @@ def choice(name, fits=False, reasons=("stroke too short",)):
 
 def test_neighbours_that_do_not_fit_for_the_same_reason_share_a_row():
     long = ("too long",)
-    choices = [choice("a"), choice("b"), choice("c", True, ()), choice("d", True, ()),
-               choice("e", reasons=long), choice("f", reasons=long), choice("g", reasons=long)]  # fmt: skip
+    fitting = [choice(name, True, ()) for name in "cd"]
+    choices = [choice("a"), choice("b"), *fitting, *(choice(name, reasons=long) for name in "efg")]
     rows = selection_table(choices).records()
     assert [row["row"] for row in rows] == ["a ... b (2 rows)", "c", "d", "e ... g (3 rows)"]
     assert [row["fits"] for row in rows] == ["no", "yes", "yes", "no"]
