@@ -14,6 +14,7 @@ from railsim.text import unformatted
 
 MOST_RANKED = 25
 FEW = 6  # members of a family that have colours of their own; more get those of a scale
+WIDE = 46  # letters of labels side by side below axes
 LONGEST = 60  # letters of a run's name in a ranking
 
 
@@ -48,7 +49,7 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
     """Quantities over a parameter, a curve for each member of a family.
 
     Where several runs share a point, the curve is their median and a band goes from the smallest to
-    the largest.
+    the largest.  Over categories there are points and bars, which no line joins.
     """
     members = [None] if family is None else family.different
     colours = _colours(len(members))
@@ -66,6 +67,7 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
             axes.set_xlabel(x.words)
             if not x.numeric:
                 axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
+                _turned(axes)
         if family is not None:
             _legend(figure, cells[0], family.words)
     return figure
@@ -87,10 +89,11 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
     at = [different[k] if x.numeric else k for k in order]
     middle = [float(np.median(there[k])) for k in order]
     label = None if member is None else unformatted(_text(member))
-    axes.plot(at, middle, "o-", color=colour, ms=3.5, label=label)
+    line = "-" if x.numeric else ""  # categories have no order
+    axes.plot(at, middle, "o", ls=line, color=colour, ms=3.5, label=label)
     if max(map(len, there.values())) > 1:
         low, high = [min(there[k]) for k in order], [max(there[k]) for k in order]
-        if len(at) > 1:
+        if len(at) > 1 and x.numeric:
             axes.fill_between(at, low, high, color=colour, alpha=0.15, lw=0)
         else:
             axes.vlines(at, low, high, color=colour, alpha=0.4, lw=4)
@@ -113,6 +116,7 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
             axes.set_title(quantity.words)
             axes.set(xlabel=x.words, ylabel=y.words)
             _ticks(axes.set_xticks, columns)
+            _turned(axes)
             _ticks(axes.set_yticks, rows)
     return figure
 
@@ -135,6 +139,14 @@ def _ticks(tell: Any, values: Sequence[Any]) -> None:
     step = -(-len(values) // 8)
     indices = range(0, len(values), step)
     tell(list(indices), [unformatted(_text(values[index])) for index in indices])
+
+
+def _turned(axes: Axes) -> None:
+    """Turn the labels below axes where they would run into each other."""
+    if sum(len(label.get_text()) + 2 for label in axes.get_xticklabels()) > WIDE:
+        axes.tick_params(axis="x", labelrotation=30)
+        for label in axes.get_xticklabels():
+            label.set(ha="right", rotation_mode="anchor")
 
 
 def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure:

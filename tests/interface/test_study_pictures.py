@@ -121,3 +121,20 @@ def test_difference_along_the_track_is_that_of_the_values():
     yaw = base["wheelset_yaw"][:, 0]
     assert abs(value) == pytest.approx(0.1 * np.max(np.abs(yaw)))
     assert np.interp(s, base["distance"], np.abs(yaw)) == pytest.approx(np.max(np.abs(yaw)))
+
+
+def test_categories_are_not_joined_and_their_names_do_not_collide():
+    names = [f"coach_of_a_long_name_{k}" for k in range(6)]
+    x = Column("vehicle", [name for name in names for _ in range(3)])
+    value = Column("largest Y/Q", [0.1 * k for k in range(18)])
+    figure = curves_figure([value], x, None)
+    axes = figure.axes[0]
+    assert all(line.get_linestyle() == "None" for line in axes.lines)
+    assert len(axes.collections) == 1  # bars from the smallest to the largest
+    figure.draw_without_rendering()
+    angles = {label.get_rotation() for label in axes.get_xticklabels()}
+    assert angles == {30.0}
+    ends = [label.get_window_extent().x1 for label in axes.get_xticklabels()]
+    height = axes.get_xticklabels()[0].get_fontsize() * figure.dpi / 72.0
+    # side by side at 30 degrees: further apart than a letter is high over sin 30
+    assert np.diff(ends).min() > 2.0 * height
