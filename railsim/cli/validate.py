@@ -97,6 +97,11 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     from railsim.profiles.used import profile_faults
 
     definition = load_any(file)
+    if definition.KIND == "measurement":
+        from railsim.measurement import load_measurement
+
+        run = load_measurement(file)
+        return definition.KIND, [{"key": "channels", "text": remark} for remark in run.remarks]
     if faults := profile_faults(definition, file):
         raise InputError(faults)
     return definition.KIND, [dict(vars(remark)) for remark in remarks_on(definition)]

@@ -195,7 +195,7 @@ def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):
         ("channels.load.unit=mm", "no unit of Q: N, kN"),
         ("channels.load.column=Q1", "no column 'Q1'"),
         ("channels.box.quantity=sensor_acceleration:axlebox_1_left", "a label for each"),
-        ("channels.box.quantity=time", "two channels of time"),
+        ("channels.box={quantity='Q:1:left'}", "two channels of Q:1:left"),
         ("file=gone.csv", "cannot be read"),
         ("file=m.toml", "the name ends in '.toml'"),
         ("rate=100.0", "either a channel of the quantity 'time' or 'rate'"),
