@@ -152,6 +152,8 @@ class MeasurementFile(FileDefinition):
     """Vehicle file or name of a shipped one, where a command gives no other"""
     track: Text | None = None
     """Track file or name of a shipped one, where a command gives no other"""
+    load: Text | None = None
+    """Load case in which the vehicle ran; by default its design load"""
     speed: Positive | None = None
     """Speed of the run, where no channel has it [m/s]"""
     start: Finite = 0.0

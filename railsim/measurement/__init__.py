@@ -6,6 +6,9 @@
 `clock.py`          equal time steps, gaps, delays
 `position.py`       arc length from mileage, distance or speed
 `data.py`           `Measurement`: channels over time, arc length and speed
+`alignment.py`      shift and stretch of the arc length by curvature or irregularities
+`counterpart.py`    simulated counterparts of the channels
+`likeness.py`       measured against simulated: signs, units, clocks
 ==================  ============================================================================
 """
 

@@ -143,6 +143,10 @@ class Measurement:
         distance = s + shift + stretch * (s - s[0])
         return replace(self, distance=distance, speed=(1.0 + stretch) * self.speed)
 
+    def with_remarks(self, *remarks: str) -> "Measurement":
+        """Return the run with further remarks."""
+        return replace(self, remarks=(*self.remarks, *remarks))
+
     def _table(self) -> Table:
         """Return the table of the channels that a notebook shows."""
         rows: list[list[object]] = []

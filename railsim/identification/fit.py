@@ -1,0 +1,286 @@
+"""`identify`: parameters of a vehicle from measured runs, by least squares.
+
+The weighted residuals r(x) of all runs are minimised (trust region reflective, Branch, Coleman, Li
+1999, SIAM J. Sci. Comput. 21, 1), with J their derivatives: the covariance of the coordinates is
+(J^T J)^-1, times the mean square of the residuals where that is above what the noise explains.  A
+singular value s of J says that the combination of parameters along its vector is known to 1/s.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault
+from railsim.identification.identified import Channel, Identified, Place
+from railsim.identification.parameters import Parameter, parsed
+from railsim.identification.problem import STRETCH, Problem
+from railsim.identification.residuals import FORMS, Form, whiteness
+from railsim.identification.runs import Prepared, model_of, prepared, track_of
+from railsim.identification.variants import Workers, cores
+from railsim.measurement import Measurement, load_measurement
+from railsim.measurement.alignment import shift_of
+from railsim.measurement.likeness import suspicions
+
+Floats = NDArray[np.float64]
+LOSSES = ("linear", "soft_l1", "huber", "cauchy")
+COARSE, FINE = 1e-2, 1e-5  # of the sum of squares; of it and of the coordinates
+FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
+SETTLED = 0.05  # change of a weight
+MOST_STEPS = 30
+REWEIGHTED = 2  # times that the noise is taken from the residuals
+ALONG = 20.0  # m, within which the place of a run is looked for
+SCALE = 5.0  # weight of a residual in units of the noise beyond which a robust loss yields
+
+
+def identify(
+    vehicle: Vehicle | str | Path | None,
+    measured: Measurement | str | Path | Sequence[Measurement | str | Path],
+    parameters: Sequence[str | Parameter],
+    *,
+    track: Track | None = None,
+    band: tuple[float, float] = (0.5, 30.0),
+    form: str = "history",
+    loss: str = "linear",
+    place: bool = True,
+    workers: int | None = None,
+    folder: str | Path | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Identified:
+    """Identify parameters of a vehicle from measured runs.
+
+    Parameters
+    ----------
+    vehicle : Vehicle, str or Path, or None
+        Where the search starts; None: the vehicle that the measurement names.
+    measured : Measurement, str, Path or several
+        Runs, each on the track and in the load that its file names.
+    parameters : sequence of str or Parameter
+        ``KEY[+KEY...][:LOW:HIGH[:SPREAD]]``: factors of the values; see
+        `railsim.identification.parameters`.
+    track : Track, optional
+        Instead of the tracks that the measurements name.
+    band : (float, float)
+        Frequencies that are compared [Hz].
+    form : {'history', 'spectra', 'sections'}
+        See `railsim.identification.residuals`.
+    loss : {'linear', 'soft_l1', 'huber', 'cauchy'}
+        Robust losses weigh residuals beyond five times the noise less.
+    place : bool
+        Whether shift and stretch of each run along the track are found too (`history` only).
+    workers : int, optional
+        Processes; by default one for each core.
+    folder : str or Path, optional
+        Where evaluations are kept: an identification that was interrupted goes on from there.
+    progress : callable, optional
+        Called with the number of runs simulated so far.
+
+    Returns
+    -------
+    Identified
+
+    Raises
+    ------
+    InputError
+        Wrong files, channels or parameters; a band that was not sampled.
+    ModelError
+        A variant without equilibrium.
+    """
+    _checked(band, form, loss)
+    files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
+    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
+    if not runs:
+        raise InputError([argument_fault("measured", "", "none", "one measured run at least")])
+    model = model_of(vehicle, runs, track)
+    wanted = parsed(parameters, model.vehicle, model.track)
+    ready = [prepared(run, model, band, track or track_of(run)) for run in runs]
+    ready = [replace(one, run=one.run.with_step_of(model)) for one in ready]
+    place = place and form == "history"
+    kept = None if folder is None else Path(folder)
+    if kept is not None:
+        kept.mkdir(parents=True, exist_ok=True)
+    with Workers(workers or cores()) as pool:
+        problem = Problem(
+            model, wanted, ready, Form(form, band), place, pool, kept, progress or (lambda _: None)
+        )
+        return _solved(problem, loss)
+
+
+def _checked(band: tuple[float, float], form: str, loss: str) -> None:
+    faults = []
+    if not 0.0 < band[0] < band[1] < np.inf:
+        found = f"{band[0]:g} to {band[1]:g} Hz"
+        faults.append(argument_fault("band", "", found, "two frequencies above 0 that rise"))
+    for name, value, allowed in (("form", form, FORMS), ("loss", loss, LOSSES)):
+        if value not in allowed:
+            faults.append(argument_fault(name, "", value, "one of " + ", ".join(allowed)))
+    if faults:
+        raise InputError(faults)
+
+
+def _solved(problem: Problem, loss: str) -> Identified:
+    from scipy.optimize import least_squares
+
+    x = np.zeros(problem.size)
+    if problem.place:
+        x[problem.count :] = _places(problem, x)
+    before = problem.series(x)
+    remarks = _suspicions(problem, x, before, clocks=False)
+    start = x.copy()
+    bounds = np.array([one.bounds for one in problem.parameters]
+                      + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
+    stated = problem.form.kind == "history"
+    known = stated and all(np.isfinite(one.noise).all() for one in problem.runs)
+    _weigh(problem, x, stated=stated)
+    for tolerance in [FINE] if known else [COARSE, *[FINE] * REWEIGHTED]:
+        # about 1, so that the first region of trust has the size of the parameters
+        found = least_squares(
+            lambda z: problem.vector(z - 1.0),
+            1.0 + np.clip(x, bounds[0] + 1e-9, bounds[1] - 1e-9),
+            lambda z: problem.jacobian(z - 1.0),
+            tuple(1.0 + bounds),
+            method="trf",
+            ftol=tolerance,
+            xtol=FINE,
+            gtol=1e-12,
+            loss=loss,
+            f_scale=SCALE,
+            max_nfev=MOST_STEPS,
+        )
+        x = found.x - 1.0
+        if not found.success:
+            remarks.append(f"The search has not settled after {MOST_STEPS} steps.")
+        if known or not _weigh(problem, x, stated=stated):
+            break
+    remarks += _suspicions(problem, x, problem.series(x), clocks=True)
+    remarks += [f"{one.run.name}: {words}" for one in problem.runs
+                for words in one.measurement.remarks]  # fmt: skip
+    return _outcome(problem, start, x, list(dict.fromkeys(remarks)))
+
+
+def _places(problem: Problem, x: Floats) -> Floats:
+    """Return shift and stretch of each run by its most telling channel."""
+    found = []
+    for one, values in zip(problem.runs, problem.series(x), strict=True):
+        shifts = [
+            shift
+            for measured, simulated in zip(one.measured, values, strict=True)
+            if (inside := np.isfinite(simulated)).any()
+            and (shift := shift_of(
+                one.run.at, measured, one.run.at[inside], simulated[inside], most=ALONG
+            )) is not None
+        ]  # fmt: skip
+        best = max(shifts, key=lambda one: one.correlation, default=None)
+        found.append([0.0, 0.0] if best is None else [best.shift, best.stretch / STRETCH])
+    return np.array(found).ravel()
+
+
+def _suspicions(
+    problem: Problem, x: Floats, series: list[Floats], *, clocks: bool
+) -> list[str]:
+    remarks: list[str] = []
+    for one, values in zip(problem.placed(x), series, strict=True):
+        low, high = problem.form.band
+        simulated = {name: row for name, row in zip(one.names, values, strict=True)}
+        measured = {name: row for name, row in zip(one.names, one.measured, strict=True)}
+        cut = {n: _banded(row, one.step, low, high) for n, row in measured.items()}
+        like = {n: _banded(row, one.step, low, high) for n, row in simulated.items()}
+        found = suspicions(cut, like, one.step, clocks=clocks)
+        remarks += [f"{one.run.name}: {words}" for words in found]
+    return remarks
+
+
+def _banded(x: Floats, step: float, low: float, high: float) -> Floats:
+    known = np.isfinite(x)
+    clean = np.where(known, x, 0.0)
+    spectrum = np.fft.rfft(clean)
+    f = np.fft.rfftfreq(len(x), step)
+    spectrum[(f < low) | (f > high)] = 0.0
+    return np.where(known, np.fft.irfft(spectrum, len(x)), np.nan)
+
+
+def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
+    """Set the weights: by the noise that is stated, else by the residuals of each channel.
+
+    Returns
+    -------
+    bool
+        Whether one of them has changed by more than `SETTLED`.
+    """
+    before, problem.weights = problem.weights, []
+    for one, rows in zip(problem.placed(x), problem.residuals(x), strict=True):
+        noise = problem.form.expected(one) if stated else [np.nan] * len(rows)
+        floors = problem.form.features(one, one.measured)
+        own = [
+            level if np.isfinite(level) else max(_rms(row), (0.0 if before else FIRST) * _rms(all_))
+            for row, level, all_ in zip(rows, noise, floors, strict=True)
+        ]
+        problem.weights.append(np.array([1.0 / level if level > 0.0 else 0.0 for level in own]))
+    if not before:
+        return True
+    ratios = [new / np.where(old > 0.0, old, 1.0) for new, old in zip(problem.weights, before)]
+    return bool(np.max(np.abs(np.concatenate(ratios) - 1.0)) > SETTLED)
+
+
+def _rms(x: Floats) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> Identified:
+    count = problem.count
+    vector, jacobian = problem.vector(x), problem.jacobian(x)
+    data = len(vector) - len(problem._before(x))
+    square = float(np.sum(vector[:data] ** 2)) / max(1, data - problem.size)
+    # what the noise that is stated does not explain is taken as noise too
+    inflation = max(1.0, square)
+    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    del left
+    with np.errstate(divide="ignore"):
+        inverse = np.where(singular > 1e-10 * singular[0], 1.0 / singular, 1e6)
+    covariance = inflation * (right.T * inverse**2) @ right
+    channels = []
+    residuals = problem.residuals(x)
+    after = problem.series(x)
+    placed = problem.placed(x)
+    before = problem.series(start)
+    for k, one in enumerate(placed):
+        for j, name in enumerate(one.names):
+            row = residuals[k][j]
+            test = whiteness(row) if problem.form.kind == "history" else (np.nan, np.nan)
+            level = float(np.sqrt(np.mean((problem.weights[k][j] * row) ** 2)))
+            channels.append(
+                Channel(
+                    one.run.name, name, one.run.selections[j], one.step, one.run.at,
+                    one.measured[j], before[k][j], after[k][j], level, *test,
+                )  # fmt: skip
+            )
+    # directions of the parameters alone: the places of the runs are eliminated
+    own = _without_places(jacobian[:data], count)
+    _, values, vectors = np.linalg.svd(own, full_matrices=False)
+    places = [
+        Place(one.run.name, float(shift), STRETCH * float(stretch))
+        for one, (shift, stretch) in zip(
+            problem.runs, np.reshape(x[count:], (-1, 2)) if problem.place else [], strict=False
+        )
+    ]
+    return Identified(
+        problem.model.vehicle, tuple(problem.parameters), x[:count], covariance[:count, :count],
+        values, vectors, tuple(channels), tuple(places), problem.form.kind, problem.form.band,
+        inflation, problem.simulations, tuple(remarks),
+    )  # fmt: skip
+
+
+def _without_places(jacobian: Floats, count: int) -> Floats:
+    """Return the derivatives to the parameters without what the places could explain."""
+    own, places = jacobian[:, :count], jacobian[:, count:]
+    if not places.shape[1]:
+        return own
+    basis, _ = np.linalg.qr(places)
+    return np.asarray(own - basis @ (basis.T @ own))
+
+
+__all__ = ["Prepared", "identify"]

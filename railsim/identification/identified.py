@@ -1,0 +1,335 @@
+"""What an identification has found: values, how well they are known, and the residuals."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from railsim.definitions.base import FrozenDict
+from railsim.definitions.vehicle import Vehicle
+from railsim.files import check_file, whole_file
+from railsim.identification.parameters import TRACK, Parameter, present, scaled
+from railsim.table import Column, Table
+
+Floats = NDArray[np.float64]
+NORMAL = 1.959964  # of a normal distribution: 95 % within
+UNKNOWN = 0.5  # standard deviation of a combination (as a share) from which the data do not tell it
+PART = 0.25  # share of the largest part of a combination that is named
+NOT_WHITE = 0.01  # probability
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A channel before and after.
+
+    Attributes
+    ----------
+    run, name, quantity : str
+    step : float
+        [s]
+    at : float64[time]
+        Arc length [m].
+    measured, before, after : float64[time]
+        Measured, simulated with the file's and with the identified values [SI].
+    level : float
+        rms of the weighted residuals: 1 where they are the noise [1].
+    statistic, probability : float
+        Of white residuals, see `railsim.identification.residuals.whiteness`.
+    """
+
+    run: str
+    name: str
+    quantity: str
+    step: float
+    at: Floats = field(repr=False)
+    measured: Floats = field(repr=False)
+    before: Floats = field(repr=False)
+    after: Floats = field(repr=False)
+    level: float
+    statistic: float
+    probability: float
+
+    @property
+    def is_white(self) -> bool:
+        """Whether the residuals look like white noise."""
+        return not self.probability < NOT_WHITE
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run lies on the track: shift at its first value [m], stretch [1]."""
+
+    run: str
+    shift: float
+    stretch: float
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """Identified parameters.
+
+    Attributes
+    ----------
+    vehicle : Vehicle
+        Where the search started.
+    parameters : tuple of Parameter
+    x : float64[parameter]
+        Coordinates: logarithms of the factors on the file's values (shares of profiles).
+    covariance : float64[parameter, parameter]
+        Of the coordinates [1].
+    singular_values : float64[parameter]
+        Of the derivatives of the weighted residuals; one over the standard deviation of a
+        combination.
+    combinations : float64[combination, parameter]
+        Directions that belong to them.
+    channels : tuple of Channel
+    places : tuple of Place
+    form : str
+    band : (float, float)
+        [Hz]
+    inflation : float
+        Mean square of the weighted residuals, 1 at least: factor on the covariance.
+    simulations : int
+        Runs that were simulated.
+    remarks : tuple of str
+    """
+
+    vehicle: Vehicle
+    parameters: tuple[Parameter, ...]
+    x: Floats
+    covariance: Floats
+    singular_values: Floats
+    combinations: Floats
+    channels: tuple[Channel, ...] = field(repr=False)
+    places: tuple[Place, ...] = ()
+    form: str = "history"
+    band: tuple[float, float] = (0.0, 0.0)
+    inflation: float = 1.0
+    simulations: int = 0
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def factors(self) -> Floats:
+        """Identified value over the file's, or share of a profile, by parameter."""
+        return np.array([p.factor(x) for p, x in zip(self.parameters, self.x, strict=True)])
+
+    @property
+    def deviations(self) -> Floats:
+        """Standard deviations of the coordinates: of a factor as a share of it [1]."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def intervals(self) -> Floats:
+        """Ends of the 95 % intervals of the factors, float64[parameter, 2]."""
+        reach = NORMAL * self.deviations
+        ends = [self.x - reach, self.x + reach]
+        return np.array(
+            [[p.factor(min(a, 700.0)), p.factor(min(b, 700.0))]
+             for p, a, b in zip(self.parameters, *ends, strict=True)]
+        )  # fmt: skip
+
+    @property
+    def correlation(self) -> Floats:
+        """Correlation matrix of the parameters."""
+        scale = np.where(self.deviations > 0.0, self.deviations, 1.0)
+        return np.asarray(self.covariance / np.outer(scale, scale))
+
+    @cached_property
+    def _values(self) -> dict[str, Any]:
+        """Return the identified values by key of the vehicle."""
+        found = {}
+        for parameter, factor in zip(self.parameters, self.factors, strict=True):
+            for key in parameter.keys:
+                if not key.startswith(TRACK):
+                    path, value = present(self.vehicle, key)
+                    found[".".join(path)] = scaled(value, float(factor))
+        return found
+
+    @property
+    def values(self) -> Mapping[str, Any]:
+        """Identified values by the whole keys of the vehicle's file [SI]."""
+        return FrozenDict(self._values)
+
+    @property
+    def fitted(self) -> Vehicle:
+        """The vehicle with the identified values."""
+        return self.vehicle.with_values(self._values) if self._values else self.vehicle
+
+    @property
+    def unidentified(self) -> tuple[str, ...]:
+        """What the data cannot tell apart, a sentence for each combination."""
+        said = []
+        scale = np.sqrt(self.inflation)
+        for value, row in zip(self.singular_values, self.combinations, strict=True):
+            spread = scale / value if value > 0.0 else np.inf
+            if not spread > UNKNOWN:
+                continue
+            row = row * np.sign(row[np.argmax(np.abs(row))])
+            parts = [k for k in np.argsort(-np.abs(row)) if abs(row[k]) > PART * abs(row).max()]
+            known = "infinite" if spread > 1e3 else f"{100 * spread:.0f} %"
+            names = [self.parameters[k].name for k in parts]
+            if len(parts) == 1:
+                said.append(f"The data say nothing about {names[0]} (standard deviation {known}).")
+                continue
+            changes = ", ".join(
+                f"{self.parameters[k].name} by {10 * row[k] / row[parts[0]]:+.1f} %" for k in parts
+            )
+            said.append(
+                f"The data cannot tell apart {', '.join(names[:-1])} and {names[-1]}: a change of "
+                f"{changes} at once leaves the channels as they are (standard deviation of this "
+                f"combination {known})."
+            )
+        return tuple(said)
+
+    def table(self) -> Table:
+        """Return values, standard deviations and intervals by parameter."""
+        rows: list[list[object]] = []
+        for k, (parameter, factor) in enumerate(zip(self.parameters, self.factors, strict=True)):
+            low, high = self.intervals[k]
+            value: object = None
+            if parameter.keys and not parameter.keys[0].startswith(TRACK):
+                now = self._values[".".join(present(self.vehicle, parameter.keys[0])[0])]
+                value = now if not isinstance(now, list) else None
+            share = 100.0 * self.deviations[k] * (1.0 if not parameter.is_share else 1.0)
+            shown = [None if v is None or not np.isfinite(v) else float(v) for v in (low, high)]
+            rows.append([parameter.name, value, float(factor), float(share), *shown])
+        return Table(
+            [
+                Column("parameter"),
+                Column("value", "value (SI)", format=".5g"),
+                Column("factor", "factor on the file", format=".4f"),
+                Column("deviation", "standard deviation (%)", format=".2f"),
+                Column("low", "95 % from", format=".4f"),
+                Column("high", "to", format=".4f"),
+            ],
+            rows,
+        )
+
+    def correlation_table(self) -> Table:
+        """Return the correlation matrix."""
+        names = [parameter.name for parameter in self.parameters]
+        columns = [Column("parameter"), *(Column(name, format=".2f") for name in names)]
+        rows = [[name, *map(float, row)] for name, row in zip(names, self.correlation, strict=True)]
+        return Table(columns, rows)
+
+    def residual_table(self) -> Table:
+        """Return the residuals by channel: rms before and after, level, whiteness."""
+        rows: list[list[object]] = []
+        for one in self.channels:
+            levels = [_share(one.measured, x) for x in (one.before, one.after)]
+            white = "" if not np.isfinite(one.probability) else "yes" if one.is_white else "no"
+            rows.append([one.run, one.name, *levels, one.level, one.probability, white])
+        return Table(
+            [
+                Column("run"),
+                Column("channel"),
+                Column("before", "before (% of rms)", format=".1f"),
+                Column("after", "after (% of rms)", format=".1f"),
+                Column("level", "residual over noise", format=".2f"),
+                Column("probability", "probability of white", format=".2g"),
+                Column("white"),
+            ],
+            rows,
+        )
+
+    def record(self) -> dict[str, Any]:
+        """Return everything but the series as plain values."""
+        return {
+            "vehicle": self.vehicle.name,
+            "parameters": [
+                {
+                    "name": p.name,
+                    "keys": list(p.keys),
+                    "factor": float(f),
+                    "standard_deviation": float(d),
+                    "interval": [float(a), float(b)],
+                }
+                for p, f, d, (a, b) in zip(
+                    self.parameters, self.factors, self.deviations, self.intervals, strict=True
+                )
+            ],
+            "values": dict(self._values),
+            "covariance": self.covariance.tolist(),
+            "correlation": self.correlation.tolist(),
+            "singular_values": self.singular_values.tolist(),
+            "combinations": self.combinations.tolist(),
+            "unidentified": list(self.unidentified),
+            "channels": self.residual_table().records(),
+            "places": [dict(vars(place)) for place in self.places],
+            "form": self.form,
+            "band": list(self.band),
+            "inflation": self.inflation,
+            "simulations": self.simulations,
+            "remarks": list(self.remarks),
+        }
+
+    def save_vehicle(
+        self, path: str | Path, base: str | Path | None = None, *, overwrite: bool = False
+    ) -> Path:
+        """Write a vehicle file with the identified values, the letter [I] beside each.
+
+        Parameters
+        ----------
+        path : str or Path
+        base : str or Path, optional
+            Vehicle that the file extends, a name or a path; without it the file is complete.
+        overwrite : bool
+
+        Raises
+        ------
+        InputError
+            The file exists and may not be overwritten, or cannot be written.
+        """
+        path = Path(path)
+        check_file(path, overwrite=overwrite, endings=[".toml"])
+        with whole_file(path) as partial:
+            partial.write_text(self._file(path, base), encoding="utf-8")
+        return path
+
+    def _file(self, path: Path, base: str | Path | None) -> str:
+        runs = ", ".join(dict.fromkeys(one.run for one in self.channels))
+        head = [f"# Identified from {runs}: [I] identified by least squares, with the standard",
+                "# deviation of the value."]  # fmt: skip
+        if base is None:
+            return "\n".join([*head, self.fitted.to_toml()])
+        known = Path(base)
+        if known.suffix == ".toml":
+            base = os.path.relpath(known.resolve(), path.resolve().parent)
+        lines = [*head, f"extends = {tomli_w.dumps({'x': str(base)})[4:].strip()}", ""]
+        lines.insert(len(head), 'format = "railsim-vehicle/1"')
+        tables: dict[str, list[str]] = {}
+        for parameter, spread in zip(self.parameters, self.deviations, strict=True):
+            for key in parameter.keys:
+                if key.startswith(TRACK):
+                    continue
+                keys, _ = present(self.fitted, key)
+                whole = keys[:-1] if keys[-1] in "xyz" or keys[-1].isdecimal() else keys
+                value = present(self.fitted, ".".join(whole))[1]
+                written = tomli_w.dumps({whole[-1]: value}).strip().replace("\n", " ")
+                mark = f"{written}  # [I] {keys[-1] if keys != whole else ''} +- {100 * spread:.2g} %"
+                tables.setdefault(".".join(whole[:-1]), []).append(" ".join(mark.split()))
+        for table, entries in tables.items():
+            lines += [f"[{table}]" if table else "", *_merged(entries), ""]
+        return "\n".join(lines)
+
+
+def _merged(entries: list[str]) -> list[str]:
+    """Return lines of a table; components of one vector are one line with several marks."""
+    found: dict[str, list[str]] = {}
+    for entry in entries:
+        value, _, mark = entry.partition("# ")
+        found.setdefault(value.strip(), []).append(mark)
+    return [f"{value}  # {'; '.join(marks)}" for value, marks in found.items()]
+
+
+def _share(measured: Floats, simulated: Floats) -> float:
+    known = np.isfinite(measured) & np.isfinite(simulated)
+    scale = float(np.sqrt(np.mean(measured[known] ** 2))) if known.any() else 0.0
+    difference = float(np.sqrt(np.mean((measured - simulated)[known] ** 2))) if known.any() else 0.0
+    return 100.0 * difference / scale if scale else np.nan

@@ -1,0 +1,223 @@
+"""Parameters of a model: numbers of its files, each with a factor, and worn wheel profiles.
+
+A parameter is one number, or several that change together: ``secondary_spring.stiffness.z``,
+``primary_vertical_damper.damper_table`` (its forces), ``track.friction``; short paths as with
+``--set``.  Its coordinate is the logarithm of the factor on what the file says, so that a
+derivative is that to a relative change and a factor stays positive.  ``wheel:S1002:worn.csv`` is
+the share of a second profile in the first one, whose coordinate is the share itself.
+"""
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.paths import descend, full_path, key_path
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, argument_fault
+from railsim.profiles import Profile, load_profile
+
+Floats = NDArray[np.float64]
+TRACK, WHEEL = "track.", "wheel:"
+LOW, HIGH = 0.1, 10.0  # factors that are allowed by default
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in tables.
+    keys : tuple of str
+        Keys of the vehicle, or with ``track.`` before them of the track; changed by one factor.
+    profiles : tuple of str
+        Two wheel profiles instead of keys: the share of the second in the first is sought.
+    low, high : float
+        Bounds of the factor, or of the share.
+    spread : float or None
+        Standard deviation of what is known before, as a share of the value; None: nothing.
+    """
+
+    name: str
+    keys: tuple[str, ...] = ()
+    profiles: tuple[str, ...] = ()
+    low: float = LOW
+    high: float = HIGH
+    spread: float | None = None
+
+    @property
+    def is_share(self) -> bool:
+        """Whether its coordinate is a share of a profile."""
+        return bool(self.profiles)
+
+    @property
+    def start(self) -> float:
+        """Coordinate of the file's value."""
+        return 0.0
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of the coordinate."""
+        return (self.low, self.high) if self.is_share else (math.log(self.low), math.log(self.high))
+
+    def factor(self, x: float) -> float:
+        """Return the factor, or the share, of a coordinate."""
+        return x if self.is_share else math.exp(x)
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is run: a vehicle, a track, and profiles that take precedence."""
+
+    vehicle: Vehicle
+    track: Track
+    profiles: Mapping[str, Profile] | None = None
+
+    def with_track(self, track: Track) -> "Model":
+        """Return the model on another track."""
+        return replace(self, track=track)
+
+    def with_parameters(self, parameters: Sequence[Parameter], x: Floats) -> "Model":
+        """Return the model with the parameters at some coordinates."""
+        values: dict[str, dict[str, Any]] = {"vehicle": {}, "track": {}}
+        profiles = dict(self.profiles or {})
+        for parameter, coordinate in zip(parameters, x, strict=True):
+            if parameter.is_share:
+                first, second = parameter.profiles
+                profiles[first] = blended(first, second, float(coordinate))
+                continue
+            factor = math.exp(float(coordinate))
+            if factor == 1.0:
+                continue
+            for key in parameter.keys:
+                kind, own = _side(key)
+                values[kind][own] = scaled(present(getattr(self, kind), own)[1], factor)
+        return replace(
+            self,
+            vehicle=self.vehicle.with_values(values["vehicle"]) if values["vehicle"] else self.vehicle,
+            track=self.track.with_values(values["track"]) if values["track"] else self.track,
+            profiles=profiles or None,
+        )
+
+
+def _side(key: str) -> tuple[str, str]:
+    return ("track", key.removeprefix(TRACK)) if key.startswith(TRACK) else ("vehicle", key)
+
+
+def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> list[Parameter]:
+    """Return parameters from texts ``KEY[+KEY...][:LOW:HIGH[:SPREAD]]``, checked.
+
+    Raises
+    ------
+    InputError : keys that lead nowhere or hold no number, bounds that do not enclose the value.
+    """
+    found: list[Parameter] = []
+    faults: list[Fault] = []
+    for text in texts:
+        try:
+            one = _parsed(text) if isinstance(text, str) else text
+            for key in one.keys:
+                kind, own = _side(key)
+                path, value = present({"vehicle": vehicle, "track": track}[kind], own)
+                if not _scalable(value):
+                    raise ValueError(f"{'.'.join(path)} is {value!r}"[:100], "a number that is not 0")
+            found.append(one)
+        except (KeyError, ValueError) as error:
+            shown = text if isinstance(text, str) else text.name
+            words = [*map(str, error.args), ""][:2]
+            faults.append(argument_fault("parameters", shown, *words))
+        except InputError as error:
+            faults += error.faults
+    names = [one.name for one in found]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        faults.append(argument_fault("parameters", name, "given twice", "each parameter once"))
+    if not faults and not found:
+        faults.append(argument_fault("parameters", "", "none", "one key at least"))
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _parsed(text: str) -> Parameter:
+    keys, *rest = [text] if text.startswith(WHEEL) else text.split(":")
+    if text.startswith(WHEEL):
+        _, first, second, *rest = [*text.split(":"), ""][: max(3, text.count(":") + 1)]
+        if not first or not second:
+            raise ValueError("two profiles are needed", "wheel:S1002:worn.csv")
+        one = Parameter(f"share of {second} in {first}", (), (first, second), 0.0, 1.0)
+        load_profile(first)
+        load_profile(second)
+    else:
+        names = tuple(part.strip() for part in keys.split("+"))
+        one = Parameter(keys, names)
+    try:
+        numbers = [float(part) for part in rest]
+    except ValueError:
+        raise ValueError(f"'{':'.join(rest)}'", "numbers LOW:HIGH or LOW:HIGH:SPREAD") from None
+    if len(numbers) not in (0, 2, 3):
+        raise ValueError(f"{len(numbers)} numbers", "LOW:HIGH or LOW:HIGH:SPREAD, factors of the value")
+    low, high = numbers[:2] if numbers else (one.low, one.high)
+    inside = 0.0 <= low < high <= 1.0 if one.is_share else 0.0 < low < 1.0 < high
+    spread = numbers[2] if len(numbers) == 3 else None
+    if not inside or (spread is not None and not spread > 0.0):
+        allowed = "shares 0 to 1" if one.is_share else "factors below and above 1, such as 0.5:2"
+        raise ValueError(f"bounds {low:g} to {high:g}", allowed)
+    return replace(one, low=low, high=high, spread=spread)
+
+
+def present(definition: Vehicle | Track, key: str) -> tuple[list[str], Any]:
+    """Return the whole path of a key and what the definition has there."""
+    tables = tomllib.loads(definition.to_toml())
+    path = full_path(tables, key_path(key))
+    parent, last = descend(tables, path)
+    return path, parent[last]
+
+
+def _scalable(value: Any) -> bool:
+    if isinstance(value, list):
+        return bool(value) and all(isinstance(v, int | float | list) for v in value) and any(
+            map(_scalable, value)
+        )
+    return isinstance(value, int | float) and not isinstance(value, bool) and value != 0.0
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """Return a number, a vector or the last column of a table times a factor.
+
+    Examples
+    --------
+    >>> scaled(2.0, 3.0), scaled([1.0, 2.0], 2.0), scaled([[0.1, 5.0], [0.2, 7.0]], 2.0)
+    (6.0, [2.0, 4.0], [[0.1, 10.0], [0.2, 14.0]])
+    """
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return [[*row[:-1], factor * row[-1]] for row in value]
+    if isinstance(value, list):
+        return [factor * member for member in value]
+    return factor * value
+
+
+def blended(first: str, second: str, share: float) -> Profile:
+    """Return a wheel profile with a share of the heights that a second one has over the first.
+
+    The points keep their y; the difference of the heights is taken where both contours are
+    single-valued, from the tip of the flange on.
+    """
+    a, b = load_profile(first), load_profile(second)
+    ya, za = _single_valued(a)
+    yb, zb = _single_valued(b)
+    y = ya[(ya >= yb[0]) & (ya <= yb[-1])]
+    difference = np.interp(y, yb, zb) - np.interp(y, ya, za)
+    return replace(a, z=a.z + share * np.interp(a.y, y, difference))
+
+
+def _single_valued(profile: Profile) -> tuple[Floats, Floats]:
+    falls = np.flatnonzero(np.diff(profile.y) <= 0.0)
+    inner = slice(int(falls[-1]) + 1 if len(falls) else 0, None)
+    return profile.y[inner], profile.z[inner]

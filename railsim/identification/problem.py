@@ -1,0 +1,226 @@
+"""The least-squares problem: residuals and their derivatives at some coordinates.
+
+Each coordinate is that of a parameter, followed by the shift [m] and stretch [1] of each run's
+arc length where its place on the track is sought too.  A derivative is a forward difference of two
+simulated runs; those to the place come from the splines of one.  Evaluations are kept in a folder,
+if one is given, so that an identification that was interrupted goes on where it was.
+"""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import ModelError
+from railsim.files import read_bytes, whole_file
+from railsim.identification.parameters import Model, Parameter
+from railsim.identification.residuals import Form
+from railsim.identification.runs import Prepared
+from railsim.identification.variants import Task, Workers
+
+Floats = NDArray[np.float64]
+STEP = 3e-3  # of a coordinate, for differences: sticking and cells of the contact are not smooth
+STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
+LARGEST_KEPT = 2_000_000_000  # bytes
+
+
+@dataclass(eq=False)
+class Problem:
+    """Residuals of some runs.
+
+    Attributes
+    ----------
+    model : Model
+    parameters : sequence of Parameter
+    runs : sequence of Prepared
+    form : Form
+    place : bool
+        Whether shift and stretch of each run are sought.
+    workers : Workers
+    folder : Path or None
+        Where evaluations are kept.
+    weights : list of Floats
+        For each run and channel: one over the standard deviation of the noise.
+    progress : callable
+        Called with the number of simulated runs.
+    """
+
+    model: Model
+    parameters: Sequence[Parameter]
+    runs: Sequence[Prepared]
+    form: Form
+    place: bool
+    workers: Workers
+    folder: Path | None = None
+    progress: Callable[[int], None] = lambda count: None
+    weights: list[Floats] = field(default_factory=list)
+    simulations: int = 0
+    _inputs: str = ""
+    _last: dict[str, Floats] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        digest = hashlib.sha256()
+        for text in (self.model.vehicle.to_toml(), repr(self.parameters), self.form):
+            digest.update(repr(text).encode())
+        for one in self.runs:
+            parts = (one.run.track.to_toml(), one.run.settings.to_toml(), repr(one.run.load))
+            digest.update(repr((*parts, one.run.speed, one.run.selections)).encode())
+            digest.update(one.run.at.tobytes())
+        self._inputs = digest.hexdigest()
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return len(self.parameters)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return self.count + (2 * len(self.runs) if self.place else 0)
+
+    def placed(self, x: Floats) -> list[Prepared]:
+        """Return the runs at their places on the track."""
+        if not self.place:
+            return list(self.runs)
+        moves = np.reshape(x[self.count :], (-1, 2))
+        return [
+            one.moved(float(shift), STRETCH * float(stretch))
+            for one, (shift, stretch) in zip(self.runs, moves, strict=True)
+        ]
+
+    def series(self, x: Floats) -> list[Floats]:
+        """Return the simulated channels of all runs, float64[channel, time] each."""
+        return self._evaluated([(x, k, False) for k in range(len(self.runs))])
+
+    def residuals(self, x: Floats) -> list[list[Floats]]:
+        """Return measured less simulated, unweighted, for each run and channel."""
+        found = []
+        for one, values in zip(self.placed(x), self.series(x), strict=True):
+            measured = self.form.features(one, np.where(np.isfinite(values), one.measured, np.nan))
+            features = self.form.features(one, values)
+            found.append([m - f for m, f in zip(measured, features, strict=True)])
+        return found
+
+    def vector(self, x: Floats) -> Floats:
+        """Return all weighted residuals, those of what was known before at the end."""
+        rows = [
+            weight * row
+            for run, weights in zip(self.residuals(x), self.weights, strict=True)
+            for row, weight in zip(run, weights, strict=True)
+        ]
+        return np.concatenate([*rows, self._before(x)])
+
+    def _before(self, x: Floats) -> Floats:
+        known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
+        return np.array([-x[k] / (self.parameters[k].spread or 1.0) for k in known])
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Return the derivatives of `vector`, float64[residual, coordinate]."""
+        base = self.series(x)
+        wanted: list[tuple[Floats, int, bool]] = []
+        steps = []
+        for k, parameter in enumerate(self.parameters):
+            # inwards at a bound
+            step = STEP if x[k] + STEP <= parameter.bounds[1] else -STEP
+            moved = x.copy()
+            moved[k] += step
+            steps.append(step)
+            wanted += [(moved, number, False) for number in range(len(self.runs))]
+        if self.place:
+            wanted += [(x, number, True) for number in range(len(self.runs))]
+        series = self._evaluated(wanted)
+        placed = self.placed(x)
+        columns = np.zeros((len(self.vector(x)), self.size))
+        for k, step in enumerate(steps):
+            own = series[k * len(self.runs) : (k + 1) * len(self.runs)]
+            columns[:, k] = self._difference(placed, base, own, step)
+        for number, one in enumerate(placed if self.place else []):
+            slope = series[self.count * len(self.runs) + number]
+            along = one.run.at - one.run.at[0]
+            for j, scale in enumerate((1.0, STRETCH * along)):
+                moved = [b + (1e-6 * scale * slope if i == number else 0.0)
+                         for i, b in enumerate(base)]  # fmt: skip
+                columns[:, self.count + 2 * number + j] = self._difference(
+                    placed, base, moved, 1e-6
+                )
+        known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
+        for row, k in enumerate(known):
+            columns[len(columns) - len(known) + row, k] = -1.0 / (self.parameters[k].spread or 1.0)
+        return columns
+
+    def _difference(
+        self, placed: list[Prepared], base: list[Floats], moved: list[Floats], step: float
+    ) -> Floats:
+        """Derivative of the residuals by a difference of series; zero of what was known before."""
+        rows = []
+        for one, weights, before, after in zip(placed, self.weights, base, moved, strict=True):
+            pairs = zip(
+                weights, self.form.features(one, before), self.form.features(one, after), strict=True
+            )
+            rows += [-weight * (b - a) / step for weight, a, b in pairs]
+        return np.concatenate([*rows, np.zeros(len(self._before(np.zeros(self.size))))])
+
+    def _evaluated(self, wanted: Sequence[tuple[Floats, int, bool]]) -> list[Floats]:
+        """Return series of (coordinates, number of the run, slope or not)."""
+        found: dict[int, Floats] = {}
+        tasks: list[Task] = []
+        missing: list[int] = []
+        for number, (x, k, slope) in enumerate(wanted):
+            kept = self._kept(x, k, slope)
+            if kept is not None:
+                found[number] = kept
+                continue
+            one = self.placed(x)[k]
+            tasks.append((_simulated, (one.run, self.model, self.parameters, x[: self.count], slope)))
+            missing.append(number)
+        for number, outcome in zip(missing, self.workers.run(tasks), strict=True):
+            found[number] = outcome
+            self._keep(*wanted[number], outcome)
+        self.simulations += len(missing)
+        if missing:
+            self.progress(self.simulations)
+        return [found[number] for number in range(len(wanted))]
+
+    def _name(self, x: Floats, k: int, slope: bool) -> str:
+        text = f"{self._inputs} {x.tolist()!r} {k} {slope}"
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+    def _path(self, x: Floats, k: int, slope: bool) -> Path | None:
+        if self.folder is None:
+            return None
+        return self.folder / f"{self._name(x, k, slope)}.bin"
+
+    def _kept(self, x: Floats, k: int, slope: bool) -> Floats | None:
+        known = self._last.get(self._name(x, k, slope))
+        path = self._path(x, k, slope)
+        if known is not None or path is None or not path.is_file():
+            return known
+        shape = self.runs[k].measured.shape
+        data = read_bytes(path, LARGEST_KEPT)
+        if len(data) != 8 * shape[0] * shape[1]:
+            return None
+        return np.frombuffer(data, dtype=np.float64).reshape(shape)
+
+    def _keep(self, x: Floats, k: int, slope: bool, values: Floats) -> None:
+        while len(self._last) >= 3 * (self.count + 2) * len(self.runs):
+            del self._last[next(iter(self._last))]
+        self._last[self._name(x, k, slope)] = values
+        path = self._path(x, k, slope)
+        if path is not None:
+            with whole_file(path) as partial:
+                partial.write_bytes(np.ascontiguousarray(values).tobytes())
+
+
+def _simulated(
+    run: "object", model: Model, parameters: Sequence[Parameter], x: Floats, slope: bool
+) -> Floats:
+    from railsim.identification.runs import Run
+
+    assert isinstance(run, Run)
+    try:
+        return run.simulated(model, parameters, x, slope=slope)
+    except ModelError as error:
+        raise ModelError(f"{run.name}: {error}") from None

@@ -1,0 +1,127 @@
+"""What is fitted: residuals of measured against simulated channels, weighted by their noise.
+
+``history``
+    The difference over time, as its Fourier coefficients in the band: for white noise they are
+    independent, so that no filter colours the residuals and their number is that of the
+    independent values.  Gaps count as no difference; both ends fade by half a cosine.
+``spectra``
+    Logarithms of the rms values in third-octave bands: where the place on the track, or the track
+    itself, is known by its spectrum only.
+``sections``
+    Mean and rms of the channels in sections of 50 m.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.identification.runs import Prepared
+
+Floats = NDArray[np.float64]
+FORMS = ("history", "spectra", "sections")
+FADE = 1.0  # s
+SECTION = 50.0  # m
+THIRD = 2.0 ** (1.0 / 3.0)
+FEWEST = 6  # coefficients of a third-octave band
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """How series become residuals.
+
+    Attributes
+    ----------
+    kind : str
+        One of `FORMS`.
+    band : (float, float)
+        [Hz]
+    """
+
+    kind: str
+    band: tuple[float, float]
+
+    def features(self, prepared: Prepared, values: Floats) -> list[Floats]:
+        """Return what is compared of each channel; `values` is float64[channel, time].
+
+        Where nothing is measured, the values do not count.
+        """
+        known = np.isfinite(prepared.measured) & np.isfinite(values)
+        clean = np.where(known, values, 0.0)
+        if self.kind == "sections":
+            return self._sections(prepared, clean, known)
+        n = values.shape[1]
+        coefficients = np.fft.rfft(clean * _fade(n, prepared.step), axis=1)
+        f = np.fft.rfftfreq(n, prepared.step)
+        # of white noise of standard deviation 1 in the band each part has the variance 1
+        own = (f >= self.band[0]) & (f <= self.band[1])
+        scaled = coefficients[:, own] * np.sqrt(2.0 / n)
+        if self.kind == "history":
+            return [np.concatenate([row.real, row.imag]) for row in scaled]
+        edges = self.band[0] * THIRD ** np.arange(
+            np.log(self.band[1] / self.band[0]) / np.log(THIRD) + 1.0
+        )
+        rows = []
+        for row in scaled:
+            inside = [row[(f[own] >= a) & (f[own] < a * THIRD)] for a in edges]
+            means = [np.mean(np.abs(c) ** 2) for c in inside if len(c) >= FEWEST]
+            rows.append(0.5 * np.log(np.maximum(means, 1e-300)))
+        return rows
+
+    def _sections(self, prepared: Prepared, x: Floats, known: NDArray[np.bool_]) -> list[Floats]:
+        at = prepared.run.at
+        number = ((at - at[0]) / SECTION).astype(int)
+        rows = []
+        for channel, there in zip(x, known, strict=True):
+            count = np.maximum(np.bincount(number, there.astype(float)), 1.0)
+            mean = np.bincount(number, channel) / count
+            square = np.bincount(number, channel**2) / count
+            rows.append(np.concatenate([mean, np.sqrt(np.maximum(square - mean**2, 0.0))]))
+        return rows
+
+    def expected(self, prepared: Prepared) -> Floats:
+        """Return standard deviations of each channel's features by the noise stated, or NaN."""
+        if self.kind != "history":
+            return np.full(len(prepared.noise), np.nan)
+        return prepared.noise * _density(prepared, self.band)
+
+
+def _density(prepared: Prepared, band: tuple[float, float]) -> float:
+    """Standard deviation of white noise over all frequencies for 1 in the band [1]."""
+    return float(np.sqrt(0.5 / prepared.step / (band[1] - band[0])))
+
+
+def _fade(n: int, step: float) -> Floats:
+    edge = min(max(1, round(FADE / step)), n // 4)
+    window = np.ones(n)
+    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
+    window[:edge], window[-edge:] = ramp, ramp[::-1]
+    return window / np.sqrt(np.mean(window**2))
+
+
+def whiteness(residual: Floats) -> tuple[float, float]:
+    """Return statistic and probability of white residuals, by their cumulative periodogram.
+
+    Of Fourier coefficients (real parts, then imaginary parts): the largest distance of the sum of
+    their squares over frequency from a straight line, times the root of their number, has the
+    distribution of Kolmogorov and Smirnov where the residuals are white (Bartlett 1955, An
+    Introduction to Stochastic Processes, section 9.2).
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> whiteness(rng.standard_normal(2000))[1] > 0.05
+    True
+    >>> whiteness(rng.standard_normal(2000) * np.tile(np.linspace(0.5, 1.5, 1000), 2))[1] < 1e-6
+    True
+    """
+    from scipy.stats import kstwobign
+
+    power = np.sum(np.reshape(residual, (2, -1)) ** 2, axis=0)
+    total = float(power.sum())
+    if not total:
+        return 0.0, 1.0
+    summed = np.cumsum(power) / total
+    line = np.arange(1, len(power) + 1) / len(power)
+    statistic = float(np.max(np.abs(summed - line)) * np.sqrt(len(power)))
+    return statistic, float(kstwobign.sf(statistic))

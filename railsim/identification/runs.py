@@ -1,0 +1,264 @@
+"""Measured runs made ready for comparison: simulated alike, evaluated at the same places.
+
+A run is simulated over the same track at the measured speed, low-passed before it is stored so that
+nothing is folded into the band, and evaluated at the arc lengths of the measured values by a
+spline of degree five over five values for the shortest period in the band: its error there is
+2e-4 of the amplitude, and 2e-6 at half the frequency.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.measurement import Channel
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, argument_fault
+from railsim.identification.parameters import Model, Parameter
+from railsim.measurement import Measurement
+from railsim.measurement.counterpart import check_channels, compared, outputs_for, series
+from railsim.result import Result
+from railsim.result.filters import filtered
+from railsim.simulation import simulate
+
+Floats = NDArray[np.float64]
+OVERSAMPLED = 5.0  # simulated values for the shortest period of the band
+MOST_SAMPLED = 25.0  # measured ones; more are low-passed and left out
+STEADY = 0.01  # change of the speed over its mean up to which it is constant
+FORGET = 2.0  # s, after which the start of a run is forgotten
+LEAD = 100.0  # m, that a run begins ahead, as far as the track is there
+SHORTEST = 4.0  # s
+DEGREE = 5  # of the spline
+MARGIN = 0.85  # of the step of the model, for variants that are stiffer
+VARYING_RATE = 1000.0  # 1/s, where the speed varies and nothing is low-passed
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A measured run as it is simulated; small enough to be sent to a worker.
+
+    Attributes
+    ----------
+    name : str
+    track : Track
+    load : str or None
+        Load case of the vehicle.
+    settings : Settings
+    speed, start, until : float
+        [m/s], [m]
+    selections : tuple of str
+        Quantities with labels.
+    amplifiers : tuple of Channel
+        What each channel has been through.
+    at : float64[time]
+        Arc lengths of the measured values [m].
+    """
+
+    name: str
+    track: Track
+    load: str | None
+    settings: Settings
+    speed: float
+    start: float
+    until: float
+    selections: tuple[str, ...]
+    amplifiers: tuple[Channel, ...] = field(repr=False)
+    at: Floats = field(repr=False)
+
+    def simulated(
+        self, model: Model, parameters: Sequence[Parameter], x: Floats, *, slope: bool = False
+    ) -> Floats:
+        """Return the simulated channels at the measured places, float64[channel, time].
+
+        NaN where the run does not get.  With `slope` their derivative to the arc length instead.
+
+        Raises
+        ------
+        ModelError, InputError : as `simulate`; the run does not reach its end.
+        """
+        from scipy.interpolate import make_interp_spline
+
+        own = model.with_track(self.track).with_parameters(parameters, x)
+        if self.load is not None:
+            own = replace(own, vehicle=own.vehicle.with_values({"load": self.load}))
+        try:
+            result = self._result(own, self.settings)
+        except InputError:
+            if self.settings.step is None:
+                raise
+            # a stiffer variant needs a shorter step than the others
+            result = self._result(own, self.settings.replace(step=None))
+        if result.status != "complete":
+            found = f"{result.status}: {result.attributes.get('status_reason', '')}"
+            raise InputError([Fault(self.name, "", found, "parameters with which the run ends")])
+        time, distance = result["time"], result["distance"]
+        rows = np.concatenate([[True], np.diff(distance) > 0.0])
+        rate = 1.0 / float(np.median(np.diff(time)))
+        found = np.empty((len(self.selections), len(self.at)))
+        for k, (name, channel) in enumerate(zip(self.selections, self.amplifiers, strict=True)):
+            values = amplified(series(result, name), rate, channel)
+            spline = make_interp_spline(distance[rows], values[rows], DEGREE)
+            found[k] = spline(self.at, 1 if slope else 0)
+        found[:, (self.at < distance[0]) | (self.at > distance[-1])] = np.nan
+        return found
+
+    def _result(self, model: Model, settings: Settings) -> Result:
+        return simulate(
+            model.vehicle,
+            model.track,
+            speed=self.speed,
+            start=self.start,
+            until=self.until,
+            settings=settings,
+            profiles=model.profiles,
+        )
+
+    def with_step_of(self, model: Model) -> "Run":
+        """Return the run with a fixed step for all variants: that of the model, and a margin."""
+        interval = 1.0 / self.settings.output_rate
+        short = self.settings
+        probe = replace(self, until=self.start + max(1.0, self.speed * 0.1))
+        step = float(probe._result(model.with_track(self.track), short).attributes["step"])
+        count = int(np.ceil(interval / (MARGIN * step) - 1e-9))
+        if self.settings.drive.mode != "constant":
+            return self
+        return replace(self, settings=short.replace(step=interval / count))
+
+
+def amplified(x: Floats, rate: float, channel: Channel) -> Floats:
+    """Return a series as an amplifier with the filters of a channel shows it: with its phase."""
+    from scipy import signal
+
+    stages = [(channel.low_pass, "lowpass"), (channel.high_pass, "highpass")]
+    for corner, kind in stages:
+        if corner is None:
+            continue
+        b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)
+
+        def response(f: Floats, b: Floats = b, a: Floats = a) -> NDArray[np.complex128]:
+            s = 2j * np.pi * f
+            return np.asarray(np.polyval(b, s) / np.polyval(a, s))
+
+        x = filtered(x, rate, response, 6.0 / corner)
+    return x
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A run, and what was measured at the same places.
+
+    Attributes
+    ----------
+    run : Run
+    measured : float64[channel, time]
+        NaN where there is no value.
+    names : tuple of str
+        Channels.
+    noise : float64[channel]
+        Standard deviation of white noise in the band, NaN where it is not known.
+    step : float
+        Time between two values [s].
+    measurement : Measurement
+    """
+
+    run: Run
+    measured: Floats
+    names: tuple[str, ...]
+    noise: Floats
+    step: float
+    measurement: Measurement
+
+    def moved(self, shift: float, stretch: float) -> "Prepared":
+        """Return the run with its place on the track changed."""
+        s = self.run.at
+        at = s + shift + stretch * (s - s[0])
+        return replace(self, run=replace(self.run, at=at))
+
+
+def model_of(
+    vehicle: Vehicle | str | Path | None, measurements: list[Measurement], track: Track | None = None
+) -> Model:
+    """Return what the runs are simulated with: the vehicle given, else that of the first file."""
+    if vehicle is None:
+        vehicle = measurements[0].definition.vehicle
+    if vehicle is None:
+        raise InputError([argument_fault("vehicle", "", "none", "a vehicle file; or the key "
+                                         "'vehicle' of the measurement")])  # fmt: skip
+    if not isinstance(vehicle, Vehicle):
+        vehicle = load_vehicle(vehicle)
+    return Model(vehicle, track or track_of(measurements[0]))
+
+
+def track_of(measurement: Measurement) -> Track:
+    """Return the track that a measurement names."""
+    name = measurement.definition.track
+    if name is None:
+        found, allowed = "no track", "the key 'track' of the measurement, or a track given"
+        raise InputError([Fault(measurement.name, "track", found, allowed)])
+    return load_track(name)
+
+
+def prepared(
+    measurement: Measurement, model: Model, band: tuple[float, float], track: Track | None = None
+) -> Prepared:
+    """Return a measured run ready for comparison in a band of frequencies [Hz].
+
+    Raises
+    ------
+    InputError : channels that the vehicle does not have, a band above what was sampled, a run too
+        short or beyond the track.
+    """
+    track = track or track_of(measurement)
+    check_channels(measurement.name, measurement, model.vehicle)
+    high = band[1]
+    rate = OVERSAMPLED * high
+    if measurement.rate < 2.5 * high:
+        found = f"{measurement.rate:.4g} values per second"
+        allowed = f"{2.5 * high:g} at least for a band up to {high:g} Hz"
+        raise InputError([Fault(measurement.name, "rate", found, allowed)])
+    many = measurement.rate > MOST_SAMPLED * high
+    thinner = measurement.resampled(MOST_SAMPLED * high) if many else measurement
+    speeds = thinner.speed
+    mean = float(np.mean(speeds))
+    steady = float(np.ptp(speeds)) < STEADY * mean
+    start = max(0.0, float(thinner.distance[0]) - LEAD)
+    begin = max(start + FORGET * mean, float(thinner.distance[0]))
+    end = min(track.length, float(thinner.distance[-1]))
+    thinner = thinner.part(begin, end - 1e-9)
+    if len(thinner.time) < SHORTEST * thinner.rate:
+        found = f"{max(0.0, end - begin):.0f} m on the track of {track.length:.0f} m"
+        allowed = f"{SHORTEST * mean:.0f} m at least, {FORGET:g} s after the start of the run"
+        raise InputError([Fault(measurement.name, "distance", found, allowed)])
+    names = tuple(compared(measurement))
+    channels = tuple(measurement.definition.channels[name] for name in names)
+    outputs = outputs_for([channel.quantity for channel in channels])
+    settings = Settings(output_rate=rate, outputs={**outputs, "low_pass": {"frequency": 2.0 * high}})
+    if not steady:
+        rows = [[float(s), float(v)] for s, v in _profile(measurement, mean)]
+        drive = {"mode": "table", "speed_table": rows}
+        settings = Settings(output_rate=VARYING_RATE, outputs=outputs, drive=drive)
+    run = Run(
+        measurement.name, track, measurement.definition.load, settings, mean, start,
+        min(end + 0.05 * mean, track.length), tuple(c.quantity for c in channels), channels,
+        thinner.distance,
+    )  # fmt: skip
+    values = np.stack([thinner[name] for name in names])
+    step = 1.0 / thinner.rate
+    share = np.sqrt(2.0 * (high - band[0]) / measurement.rate)
+    noise = np.array([np.nan if c.noise is None else c.noise * share for c in channels])
+    return Prepared(run, values, names, noise, step, measurement)
+
+
+def _profile(measurement: Measurement, mean: float) -> Floats:
+    """Return rows [s, v] of the measured speed, one for each second."""
+    step = max(1, round(measurement.rate))
+    s, v = measurement.distance, measurement.speed
+    kernel = np.ones(step) / step
+    smooth = np.convolve(np.pad(v, (step // 2, step - 1 - step // 2), mode="edge"), kernel, "valid")
+    rows = np.stack([s, smooth], axis=1)[::step]
+    return rows[np.concatenate([[True], np.diff(rows[:, 0]) > 0.1])]

@@ -1,0 +1,168 @@
+"""Where on the track a run was measured: shift and stretch of its arc length.
+
+Two signals over the arc length are held against each other in windows: the shift of each window is
+the largest cross-correlation, between its grid points by a parabola, and a line through the
+shifts of all windows gives the whole shift and the drift of the mileage.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.track import Track
+from railsim.errors import InputError, argument_fault
+from railsim.measurement.data import Measurement
+from railsim.result.filters import band_passed
+from railsim.track.alignment import Alignment
+from railsim.track.irregularity import displacement
+
+Floats = NDArray[np.float64]
+STEP = 0.1  # m, grid of the comparison
+WINDOW = 250.0  # m
+CLEAR = 0.6  # correlation from which a window counts
+WAVES = (3.0, 40.0)  # m, that an axlebox and the track's level share
+CURVATURES = ("curvature", "yaw_rate")
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How the arc length of a run has to be changed.
+
+    Attributes
+    ----------
+    shift : float
+        At its first value [m].
+    stretch : float
+        Change per metre [1].
+    correlation : float
+        Median over the windows that count [1].
+    windows : int
+        How many count.
+    """
+
+    shift: float
+    stretch: float
+    correlation: float
+    windows: int
+
+
+def shift_of(
+    s: Floats, x: Floats, s_reference: Floats, reference: Floats, *, most: float = 30.0
+) -> Shift | None:
+    """Return by how much the arc lengths of one signal must be changed to match another.
+
+    Parameters
+    ----------
+    s, x : float64[n]
+        Signal over its own arc length [m]; NaN in gaps.
+    s_reference, reference : float64[m]
+        Signal at the right place.
+    most : float
+        Largest shift that is looked for [m].
+
+    Returns
+    -------
+    Shift or None
+        None where no window of the signals is alike.
+    """
+    known = np.isfinite(x)
+    if known.sum() < 10:
+        return None
+    low, high = max(s[0], s_reference[0]), min(s[-1], s_reference[-1])
+    length = min(WINDOW, (high - low) / 2.0)
+    if length < 4.0 * STEP:
+        return None
+    most = min(most, 0.4 * length)
+    grid = np.arange(low, high, STEP)
+    a, b = np.interp(grid, s[known], x[known]), np.interp(grid, s_reference, reference)
+    size, reach = int(length / STEP), int(most / STEP)
+    centres, shifts, clear = [], [], []
+    for begin in range(0, len(grid) - size + 1, max(1, size // 2)):
+        rows = slice(begin, begin + size)
+        found = _lag(a[rows] - a[rows].mean(), b[rows] - b[rows].mean(), reach)
+        if found[1] > CLEAR:
+            centres.append(grid[rows].mean())
+            shifts.append(found[0] * STEP)
+            clear.append(found[1])
+    if not shifts:
+        return None
+    stretch, at_zero = 0.0, float(np.median(shifts))
+    if len(shifts) > 2:
+        x0 = np.array(centres) - s[0]
+        near = np.abs(np.array(shifts) - np.median(shifts)) < max(10 * STEP, 0.01 * np.ptp(x0))
+        stretch, at_zero = np.polyfit(x0[near], np.array(shifts)[near], 1)
+    return Shift(float(at_zero), float(stretch), float(np.median(clear)), len(shifts))
+
+
+def _lag(a: Floats, b: Floats, reach: int) -> tuple[float, float]:
+    """Lag of b behind a in grid points, by which a has to be moved, and the correlation there."""
+    size = 2 * len(a)
+    spectrum = np.fft.rfft(b, size) * np.conj(np.fft.rfft(a, size))
+    product = np.fft.irfft(spectrum, size)
+    lags = np.arange(-reach, reach + 1)
+    scale = float(np.sqrt(np.sum(a**2) * np.sum(b**2))) or 1.0
+    values = product[lags] / scale
+    k = int(np.argmax(values))
+    offset = 0.0
+    if 0 < k < len(values) - 1:
+        left, middle, right = values[k - 1 : k + 2]
+        bend = left - 2.0 * middle + right
+        offset = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+    return float(lags[k] + offset), float(values[k])
+
+
+def aligned(measurement: Measurement, track: Track, *, most: float = 50.0) -> Measurement:
+    """Return a run with its arc length put right by the track.
+
+    By a channel of `curvature` or `yaw_rate` (over the speed) against the plan; otherwise by the
+    vertical acceleration of an axlebox against v^2 d2z/ds2 of the rails' mean level, waves of 3 to
+    40 m.
+
+    Raises
+    ------
+    InputError : no such channel, a track without curves and irregularities, nothing alike.
+    """
+    s = measurement.distance
+    grid = np.arange(s[0] - most, s[-1] + most, STEP)
+    by = next((name for name in CURVATURES if name in measurement), None)
+    if by is not None:
+        x = measurement[by]
+        x = x / np.maximum(measurement.speed, 1.0) if by == "yaw_rate" else x
+        reference, at = Alignment(track).curvature(grid), s
+        words = "curvature"
+    else:
+        box = next(
+            (
+                quantity
+                for quantity in measurement.quantities.values()
+                if quantity.startswith("sensor_acceleration:axlebox_1") and quantity.endswith(":z")
+            ),
+            None,
+        )
+        moved = displacement(track)
+        if box is None or moved is None:
+            raise InputError([argument_fault(
+                "track", "", "nothing to align by",
+                "a channel of curvature, yaw_rate or axlebox_1's vertical acceleration with "
+                "irregularities",
+            )])  # fmt: skip
+        level = moved(grid)[0][[1, 3]].mean(axis=0)
+        reference, at = np.gradient(np.gradient(level, STEP), STEP), s
+        x = measurement[box] / np.maximum(measurement.speed, 1.0) ** 2
+        step = float(np.mean(np.diff(s)))
+        known = np.isfinite(x)
+        x = np.interp(s, s[known], x[known])
+        x = band_passed(x, 1.0 / step, 1.0 / WAVES[1], 1.0 / WAVES[0])
+        reference = band_passed(reference, 1.0 / STEP, 1.0 / WAVES[1], 1.0 / WAVES[0])
+        words = "level of the rails"
+    found = shift_of(at, x, grid, reference, most=most)
+    if found is None:
+        allowed = f"a place known within {most:g} m; the right track; signs and units"
+        raise InputError([argument_fault("track", "", f"the {words} matches nowhere", allowed)])
+    moved_run = measurement.moved(found.shift, found.stretch)
+    remark = (
+        f"Aligned by the {words}: {found.shift:+.2f} m at the beginning, {1e3 * found.stretch:+.2f} "
+        f"m/km (correlation {found.correlation:.2f} in {found.windows} windows)."
+    )
+    return moved_run.with_remarks(remark)

@@ -1,0 +1,93 @@
+"""The simulated counterparts of measured channels: which there are, how a run outputs them."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.flatten import flatten
+from railsim.definitions.measurement import AXES
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, nearest
+from railsim.measurement.data import Measurement
+from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SIDES
+from railsim.result import Result
+from railsim.result.sensors import all_sensors
+
+Floats = NDArray[np.float64]
+READINGS = ("sensor_acceleration", "sensor_roll_rate")
+
+
+def compared(measurement: Measurement) -> dict[str, str]:
+    """Return the channels that a vehicle has a counterpart of: their quantities by names."""
+    return {n: q for n, q in measurement.quantities.items() if q not in AXES}
+
+
+def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> None:
+    """Refuse channels of points, wheelsets, bodies and elements that a vehicle does not have.
+
+    Raises
+    ------
+    InputError : all of them at once.
+    """
+    flat = flatten(vehicle)
+    wheelsets = [body.name for body in flat.of_kind("wheelset")]
+    numbers = [str(number + 1) for number in range(len(wheelsets))]
+    known = {
+        "wheelset": [*wheelsets, *numbers],
+        "side": SIDES,
+        "axis": COMPONENTS[:3],
+        "component": COMPONENTS,
+        "body": [body.name for body in flat.bodies],
+        "sensor": list(all_sensors(vehicle)),
+        "element": [element.name for element in flat.elements],
+    }
+    faults = []
+    for name, selection in compared(measurement).items():
+        base, *labels = selection.split(":")
+        quantity = QUANTITIES.get(base) or REQUESTED[base]
+        for dim, label in zip(quantity.dims[1:], labels, strict=True):
+            if label not in known.get(dim, [label]):
+                found = f"{vehicle.name} has no {dim} '{label}'"
+                key = f"channels.{name}.quantity"
+                faults.append(Fault(file, key, found, nearest(label, known[dim])))
+    if faults:
+        raise InputError(faults)
+
+
+def outputs_for(selections: Iterable[str]) -> dict[str, Any]:
+    """Return the table `outputs` of settings for some quantities with labels."""
+    names = [selection.split(":") for selection in selections]
+    bases = {name[0] for name in names}
+    found: dict[str, Any] = {}
+    for base in sorted(bases & {*REQUESTED}):
+        request = REQUESTED[base].request
+        if request == "elements":
+            found["elements"] = sorted({n[1] for n in names if n[0].startswith("element_")})
+        elif request == "sensors":
+            only = all(b in READINGS for b in bases if b.startswith("sensor_"))
+            found["sensors"] = "readings" if only else True
+        else:
+            found[request] = True
+    usual = sorted(bases & {*QUANTITIES})
+    found["quantities"] = usual or ["distance"]
+    return found
+
+
+def series(result: Result, selection: str) -> Floats:
+    """Return a quantity with labels over time, such as ``Q:1:left``; wheelsets also by number.
+
+    Raises
+    ------
+    KeyError : the result does not have it.
+    """
+    name, *labels = selection.split(":")
+    if name not in result:
+        raise KeyError(f"no quantity '{name}'; {nearest(name, result)}")
+    dims = result.quantities[name].dims[1:]
+    given: dict[str, str | int] = {}
+    for dim, label in zip(dims, labels, strict=True):
+        numbered = dim == "wheelset" and label.isdecimal() and label not in result.wheelsets
+        given[dim] = int(label) - 1 if numbered else label
+    return result.series(name, **given)

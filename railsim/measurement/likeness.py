@@ -1,0 +1,136 @@
+"""Measured against simulated channels: what looks like a wrong sign, a wrong unit, another clock.
+
+Both series lie at the same places and in the same band.  Of each channel: the correlation at the
+best shift in time, the ratio of the rms values, and how the shift changes over the record.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+OPPOSITE = -0.5  # correlation
+UNITS = (("1000", 1e3), ("1/1000", 1e-3), ("9.81 (g)", 9.81), ("1/9.81 (g)", 1 / 9.81))
+NEAR = 1.35  # ratio to such a factor, of signals that are alike
+ALIKE = 0.5
+SURE = 0.8  # correlation from which a shift in time is trusted
+PARTS = 5  # of a record, for the drift
+APART = 2.0  # of a sampling step
+LONGEST = 1.0  # s
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How alike a measured and a simulated channel are.
+
+    Attributes
+    ----------
+    correlation : float
+        At the shift with the largest magnitude [1].
+    ratio : float
+        rms measured over simulated [1].
+    lag : float
+        Time by which the measured one comes later [s].
+    drift : float
+        Change of the lag over the record [s]; nan where it is not clear.
+    """
+
+    correlation: float
+    ratio: float
+    lag: float
+    drift: float
+
+    def remark(self, name: str, step: float) -> str:
+        """Return what looks wrong, empty if nothing does."""
+        if self.correlation < OPPOSITE:
+            return f"{name} has the opposite sign (correlation {self.correlation:.2f}): 'reverse'?"
+        for words, factor in UNITS:
+            if 1.0 / NEAR < self.ratio / factor < NEAR and (
+                self.correlation > ALIKE or max(factor, 1.0 / factor) > 100.0
+            ):
+                return f"{name} is {words} times the simulated one: another 'unit'?"
+        if abs(self.drift) > APART * step:
+            return (
+                f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the "
+                "record."
+            )
+        if self.correlation > SURE and abs(self.lag) > APART * step:
+            return f"{name} comes {1e3 * self.lag:.3g} ms later than simulated: 'delay'?"
+        return ""
+
+
+def likeness(measured: Floats, simulated: Floats, step: float) -> Likeness:
+    """Return how alike two series are.
+
+    Parameters
+    ----------
+    measured, simulated : float64[time]
+        NaN where there is no value.
+    step : float
+        Between two values [s].
+    """
+    known = np.isfinite(measured) & np.isfinite(simulated)
+    a, b = np.where(known, measured, 0.0), np.where(known, simulated, 0.0)
+    energy = float(np.sqrt(np.sum(a**2))), float(np.sqrt(np.sum(b**2)))
+    if known.sum() < 10 or not all(energy):
+        return Likeness(np.nan, np.nan, np.nan, np.nan)
+    correlation, lag = _best(a, b, step)
+    return Likeness(correlation, energy[0] / energy[1], lag, _drift(a, b, step))
+
+
+def _drift(a: Floats, b: Floats, step: float) -> float:
+    """Change of the lag over the record by a line through that of each part; NaN if unclear."""
+    size = len(a) // PARTS
+    found = [_best(a[k * size : (k + 1) * size], b[k * size : (k + 1) * size], step)
+             for k in range(PARTS)]  # fmt: skip
+    if min(correlation for correlation, _ in found) < SURE:
+        return np.nan
+    lags = np.array([lag for _, lag in found])
+    slope, middle = np.polyfit(np.arange(PARTS), lags, 1)
+    off = float(np.max(np.abs(lags - middle - slope * np.arange(PARTS))))
+    drift = float(slope * PARTS)
+    return drift if off < max(step, 0.2 * abs(drift)) else np.nan
+
+
+def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:
+    size = 2 * len(a)
+    product = np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
+    reach = min(int(LONGEST / step), len(a) // 4)
+    lags = np.arange(-reach, reach + 1)
+    scale = float(np.sqrt(np.sum(a**2) * np.sum(b**2))) or 1.0
+    values = product[lags] / scale
+    k = int(np.argmax(np.abs(values)))
+    return float(values[k]), float(lags[k] * step)
+
+
+def suspicions(
+    measured: Mapping[str, Floats],
+    simulated: Mapping[str, Floats],
+    step: float,
+    *,
+    clocks: bool = True,
+) -> list[str]:
+    """Return remarks on all channels; delays that all share are one of the place, not said here.
+
+    Without `clocks` on signs and units only: of a model whose phases are not right yet.
+    """
+    found = {name: likeness(measured[name], simulated[name], step) for name in measured}
+    clear = [one.lag for one in found.values() if one.correlation > SURE]
+    common = float(np.median(clear)) if clear else 0.0
+    drifts = [one.drift for one in found.values() if np.isfinite(one.drift)]
+    drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
+    own = {
+        n: Likeness(
+            o.correlation, o.ratio, clocks * (o.lag - common), clocks * (o.drift - drift)
+        )
+        for n, o in found.items()
+    }
+    said = [one.remark(name, step) for name, one in own.items()]
+    if clocks and abs(drift) > APART * step:
+        said.append(
+            f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "
+            "record: the mileage or the clock drifts."
+        )
+    return [words for words in said if words]
