@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from railsim.definitions.vehicle import Vehicle
     from railsim.description import Description, describe
     from railsim.errors import InputError, ModelError
+    from railsim.identification import Identified, Sensitivity, identify, sensitivity
     from railsim.linear.modes import modes, root_locus
     from railsim.measurement import Measurement, load_measurement
     from railsim.model.statics import StaticLoads, static_loads
@@ -51,12 +52,14 @@ if TYPE_CHECKING:
 _HOMES = {
     "Assessment": "railsim.assessment",
     "Description": "railsim.description",
+    "Identified": "railsim.identification",
     "InputError": "railsim.errors",
     "Measurement": "railsim.measurement",
     "Mechanism": "railsim.definitions.mechanism",
     "ModelError": "railsim.errors",
     "Profile": "railsim.profiles",
     "Result": "railsim.result",
+    "Sensitivity": "railsim.identification",
     "Settings": "railsim.definitions.settings",
     "Simulation": "railsim.simulation",
     "StaticLoads": "railsim.model.statics",
@@ -67,6 +70,7 @@ _HOMES = {
     "critical_speed": "railsim.stability.critical_speed",
     "curving": "railsim.stability.curving",
     "describe": "railsim.description",
+    "identify": "railsim.identification",
     "load_comfort_limits": "railsim.definitions.loading",
     "load_measurement": "railsim.measurement",
     "load_mechanism": "railsim.definitions.loading",
@@ -83,6 +87,7 @@ _HOMES = {
     "optimise": "railsim.studies.optimise",
     "peaks": "railsim.result",
     "root_locus": "railsim.linear.modes",
+    "sensitivity": "railsim.identification",
     "simulate": "railsim.simulation",
     "simulate_together": "railsim.simulation",
     "static_loads": "railsim.model.statics",
@@ -92,12 +97,14 @@ _HOMES = {
 __all__ = [
     "Assessment",
     "Description",
+    "Identified",
     "InputError",
     "Measurement",
     "Mechanism",
     "ModelError",
     "Profile",
     "Result",
+    "Sensitivity",
     "Settings",
     "Simulation",
     "StaticLoads",
@@ -109,6 +116,7 @@ __all__ = [
     "critical_speed",
     "curving",
     "describe",
+    "identify",
     "load_comfort_limits",
     "load_measurement",
     "load_mechanism",
@@ -125,6 +133,7 @@ __all__ = [
     "optimise",
     "peaks",
     "root_locus",
+    "sensitivity",
     "simulate",
     "simulate_together",
     "static_loads",

@@ -430,6 +430,36 @@ class StationaryLimits(FileDefinition):
     """Angle of the floor from horizontal on it [rad]"""
 
 
+class Difference(Sourced):
+    """Limit of the standard deviation of simulated less measured values: constant + factor Q0."""
+
+    constant: Positive
+    """[SI]"""
+    factor: NonNegative = 0.0
+    """Of the static wheel load [1]"""
+
+    def at(self, Q0: float) -> float:
+        """Return the limit for a static wheel load [N]."""
+        return self.constant + self.factor * Q0
+
+
+class ValidationLimits(FileDefinition):
+    """How well a model must match a test."""
+
+    KIND: ClassVar = "limits"
+
+    format: Literal["railsim-validation-limits/1"]
+    """Kind and version of the file"""
+    edition: Text
+    """Edition of the standard"""
+    sections: Count
+    """Least number of sections"""
+    mean: Annotated[Finite, Field(gt=0, le=1)]
+    """Limit of the mean difference over that of the standard deviation"""
+    limits: dict[Text, Difference] = Field(min_length=1)
+    """Limits of the standard deviation by the names of the compared quantities"""
+
+
 class WheelLimits(FileDefinition):
     """Dimensions at which a worn wheel goes out of service."""
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         ComfortLimits,
         RunningLimits,
         StationaryLimits,
+        ValidationLimits,
         WheelLimits,
     )
     from railsim.definitions.mechanism import Mechanism
@@ -52,6 +53,7 @@ _HOMES = {
     "railsim-wear-law/1": ("wear_law", "WearLawFile"),
     "railsim-wheel-limits/1": ("limits", "WheelLimits"),
     "railsim-measurement/1": ("measurement", "MeasurementFile"),
+    "railsim-validation-limits/1": ("limits", "ValidationLimits"),
 }
 
 
@@ -180,6 +182,13 @@ def load_wheel_limits(path: str | Path, overrides: Overrides = ()) -> "WheelLimi
     from railsim.definitions.limits import WheelLimits
 
     return _load(WheelLimits, path, overrides)
+
+
+def load_validation_limits(path: str | Path, overrides: Overrides = ()) -> "ValidationLimits":
+    """Load the limits of a model's validation, or shipped ones by their name; as `load_vehicle`."""
+    from railsim.definitions.limits import ValidationLimits
+
+    return _load(ValidationLimits, path, overrides)
 
 
 def load_wear_law(path: str | Path) -> "WearLawFile":

@@ -12,8 +12,9 @@
 =================  =============================================================================
 """
 
+from railsim.identification.derivatives import Sensitivity, sensitivity
 from railsim.identification.fit import identify
 from railsim.identification.identified import Identified
 from railsim.identification.parameters import Parameter
 
-__all__ = ["Identified", "Parameter", "identify"]
+__all__ = ["Identified", "Parameter", "Sensitivity", "identify", "sensitivity"]

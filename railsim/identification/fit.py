@@ -32,6 +32,7 @@ COARSE, FINE = 1e-2, 1e-5  # of the sum of squares; of it and of the coordinates
 FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
 SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
+PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
 ALONG = 20.0  # m, within which the place of a run is looked for
 SCALE = 5.0  # weight of a residual in units of the noise beyond which a robust loss yields
@@ -123,8 +124,6 @@ def _checked(band: tuple[float, float], form: str, loss: str) -> None:
 
 
 def _solved(problem: Problem, loss: str) -> Identified:
-    from scipy.optimize import least_squares
-
     x = np.zeros(problem.size)
     if problem.place:
         x[problem.count :] = _places(problem, x)
@@ -135,24 +134,12 @@ def _solved(problem: Problem, loss: str) -> Identified:
                       + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
     stated = problem.form.kind == "history"
     known = stated and all(np.isfinite(one.noise).all() for one in problem.runs)
+    if stated:
+        x = _by_a_part(problem, x, bounds, loss)
     _weigh(problem, x, stated=stated)
     for tolerance in [FINE] if known else [COARSE, *[FINE] * REWEIGHTED]:
-        # about 1, so that the first region of trust has the size of the parameters
-        found = least_squares(
-            lambda z: problem.vector(z - 1.0),
-            1.0 + np.clip(x, bounds[0] + 1e-9, bounds[1] - 1e-9),
-            lambda z: problem.jacobian(z - 1.0),
-            tuple(1.0 + bounds),
-            method="trf",
-            ftol=tolerance,
-            xtol=FINE,
-            gtol=1e-12,
-            loss=loss,
-            f_scale=SCALE,
-            max_nfev=MOST_STEPS,
-        )
-        x = found.x - 1.0
-        if not found.success:
+        x, settled = _least(problem, x, bounds, loss, tolerance)
+        if not settled:
             remarks.append(f"The search has not settled after {MOST_STEPS} steps.")
         if known or not _weigh(problem, x, stated=stated):
             break
@@ -160,6 +147,50 @@ def _solved(problem: Problem, loss: str) -> Identified:
     remarks += [f"{one.run.name}: {words}" for one in problem.runs
                 for words in one.measurement.remarks]  # fmt: skip
     return _outcome(problem, start, x, list(dict.fromkeys(remarks)))
+
+
+def _least(
+    problem: Problem, x: Floats, bounds: Floats, loss: str, tolerance: float
+) -> tuple[Floats, bool]:
+    """Return the coordinates with the least sum of squares, and whether the search has settled."""
+    from scipy.optimize import least_squares
+
+    def vector(z: Floats) -> Floats:
+        return problem.vector(z - 1.0)
+
+    def jacobian(z: Floats) -> Floats:
+        return problem.jacobian(z - 1.0)
+
+    # about 1, so that the first region of trust has the size of the parameters
+    found = least_squares(
+        vector,
+        1.0 + np.clip(x, bounds[0] + 1e-9, bounds[1] - 1e-9),
+        jacobian,
+        tuple(1.0 + bounds),
+        method="trf",
+        ftol=tolerance,
+        xtol=FINE,
+        gtol=1e-12,
+        loss=loss,  # type: ignore[arg-type]  # checked
+        f_scale=SCALE,
+        max_nfev=MOST_STEPS,
+    )
+    return np.asarray(found.x) - 1.0, bool(found.success)
+
+
+def _by_a_part(problem: Problem, x: Floats, bounds: Floats, loss: str) -> Floats:
+    """Return coordinates by the beginnings of long runs: near the solution, at a share of the cost.
+
+    Only where all runs are long.
+    """
+    if any(len(one.run.at) * one.step < LONG * PART for one in problem.runs):
+        return x
+    short = problem.shortened(PART)
+    _weigh(short, x, stated=True)
+    found, _ = _least(short, x, bounds, loss, COARSE)
+    problem.simulations = short.simulations
+    # the stretch of a short part says little about the whole
+    return np.concatenate([found[: problem.count], x[problem.count :]])
 
 
 def _places(problem: Problem, x: Floats) -> Floats:
@@ -179,9 +210,7 @@ def _places(problem: Problem, x: Floats) -> Floats:
     return np.array(found).ravel()
 
 
-def _suspicions(
-    problem: Problem, x: Floats, series: list[Floats], *, clocks: bool
-) -> list[str]:
+def _suspicions(problem: Problem, x: Floats, series: list[Floats], *, clocks: bool) -> list[str]:
     remarks: list[str] = []
     for one, values in zip(problem.placed(x), series, strict=True):
         low, high = problem.form.band
@@ -222,7 +251,8 @@ def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
         problem.weights.append(np.array([1.0 / level if level > 0.0 else 0.0 for level in own]))
     if not before:
         return True
-    ratios = [new / np.where(old > 0.0, old, 1.0) for new, old in zip(problem.weights, before)]
+    pairs = zip(problem.weights, before, strict=True)
+    ratios = [new / np.where(old > 0.0, old, 1.0) for new, old in pairs]
     return bool(np.max(np.abs(np.concatenate(ratios) - 1.0)) > SETTLED)
 
 
@@ -252,12 +282,11 @@ def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> 
             row = residuals[k][j]
             test = whiteness(row) if problem.form.kind == "history" else (np.nan, np.nan)
             level = float(np.sqrt(np.mean((problem.weights[k][j] * row) ** 2)))
-            channels.append(
-                Channel(
-                    one.run.name, name, one.run.selections[j], one.step, one.run.at,
-                    one.measured[j], before[k][j], after[k][j], level, *test,
-                )  # fmt: skip
-            )
+            channel = Channel(
+                one.run.name, name, one.run.selections[j], one.step, one.run.at,
+                one.measured[j], before[k][j], after[k][j], level, *test,
+            )  # fmt: skip
+            channels.append(channel)
     # directions of the parameters alone: the places of the runs are eliminated
     own = _without_places(jacobian[:data], count)
     _, values, vectors = np.linalg.svd(own, full_matrices=False)

@@ -196,7 +196,7 @@ class Identified:
             if parameter.keys and not parameter.keys[0].startswith(TRACK):
                 now = self._values[".".join(present(self.vehicle, parameter.keys[0])[0])]
                 value = now if not isinstance(now, list) else None
-            share = 100.0 * self.deviations[k] * (1.0 if not parameter.is_share else 1.0)
+            share = 100.0 * self.deviations[k]
             shown = [None if v is None or not np.isfinite(v) else float(v) for v in (low, high)]
             rows.append([parameter.name, value, float(factor), float(share), *shown])
         return Table(
@@ -312,7 +312,9 @@ class Identified:
                 whole = keys[:-1] if keys[-1] in "xyz" or keys[-1].isdecimal() else keys
                 value = present(self.fitted, ".".join(whole))[1]
                 written = tomli_w.dumps({whole[-1]: value}).strip().replace("\n", " ")
-                mark = f"{written}  # [I] {keys[-1] if keys != whole else ''} +- {100 * spread:.2g} %"
+                mark = (
+                    f"{written}  # [I] {keys[-1] if keys != whole else ''} +- {100 * spread:.2g} %"
+                )
                 tables.setdefault(".".join(whole[:-1]), []).append(" ".join(mark.split()))
         for table, entries in tables.items():
             lines += [f"[{table}]" if table else "", *_merged(entries), ""]

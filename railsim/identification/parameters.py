@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.paths import descend, full_path, key_path
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -101,7 +102,9 @@ class Model:
                 values[kind][own] = scaled(present(getattr(self, kind), own)[1], factor)
         return replace(
             self,
-            vehicle=self.vehicle.with_values(values["vehicle"]) if values["vehicle"] else self.vehicle,
+            vehicle=self.vehicle.with_values(values["vehicle"])
+            if values["vehicle"]
+            else self.vehicle,
             track=self.track.with_values(values["track"]) if values["track"] else self.track,
             profiles=profiles or None,
         )
@@ -127,7 +130,9 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
                 kind, own = _side(key)
                 path, value = present({"vehicle": vehicle, "track": track}[kind], own)
                 if not _scalable(value):
-                    raise ValueError(f"{'.'.join(path)} is {value!r}"[:100], "a number that is not 0")
+                    raise ValueError(
+                        f"{'.'.join(path)} is {value!r}"[:100], "a number that is not 0"
+                    )
             found.append(one)
         except (KeyError, ValueError) as error:
             shown = text if isinstance(text, str) else text.name
@@ -162,7 +167,9 @@ def _parsed(text: str) -> Parameter:
     except ValueError:
         raise ValueError(f"'{':'.join(rest)}'", "numbers LOW:HIGH or LOW:HIGH:SPREAD") from None
     if len(numbers) not in (0, 2, 3):
-        raise ValueError(f"{len(numbers)} numbers", "LOW:HIGH or LOW:HIGH:SPREAD, factors of the value")
+        raise ValueError(
+            f"{len(numbers)} numbers", "LOW:HIGH or LOW:HIGH:SPREAD, factors of the value"
+        )
     low, high = numbers[:2] if numbers else (one.low, one.high)
     inside = 0.0 <= low < high <= 1.0 if one.is_share else 0.0 < low < 1.0 < high
     spread = numbers[2] if len(numbers) == 3 else None
@@ -172,7 +179,7 @@ def _parsed(text: str) -> Parameter:
     return replace(one, low=low, high=high, spread=spread)
 
 
-def present(definition: Vehicle | Track, key: str) -> tuple[list[str], Any]:
+def present(definition: FileDefinition, key: str) -> tuple[list[str], Any]:
     """Return the whole path of a key and what the definition has there."""
     tables = tomllib.loads(definition.to_toml())
     path = full_path(tables, key_path(key))
@@ -182,8 +189,10 @@ def present(definition: Vehicle | Track, key: str) -> tuple[list[str], Any]:
 
 def _scalable(value: Any) -> bool:
     if isinstance(value, list):
-        return bool(value) and all(isinstance(v, int | float | list) for v in value) and any(
-            map(_scalable, value)
+        return (
+            bool(value)
+            and all(isinstance(v, int | float | list) for v in value)
+            and any(map(_scalable, value))
         )
     return isinstance(value, int | float) and not isinstance(value, bool) and value != 0.0
 

@@ -8,7 +8,7 @@ if one is given, so that an identification that was interrupted goes on where it
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +71,19 @@ class Problem:
             digest.update(one.run.at.tobytes())
         self._inputs = digest.hexdigest()
 
+    def shortened(self, duration: float) -> "Problem":
+        """Return the problem of the first seconds of each run."""
+        runs = []
+        for one in self.runs:
+            n = int(duration / one.step)
+            end = float(one.run.at[n]) + 0.2 * one.run.speed
+            run = replace(one.run, at=one.run.at[:n], until=min(one.run.until, end))
+            runs.append(replace(one, run=run, measured=one.measured[:, :n]))
+        return Problem(
+            self.model, self.parameters, runs, self.form, self.place, self.workers, self.folder,
+            self.progress,
+        )  # fmt: skip
+
     @property
     def count(self) -> int:
         """Number of parameters."""
@@ -93,7 +106,35 @@ class Problem:
 
     def series(self, x: Floats) -> list[Floats]:
         """Return the simulated channels of all runs, float64[channel, time] each."""
-        return self._evaluated([(x, k, False) for k in range(len(self.runs))])
+        bases = self._bases(x)
+        return [values[: len(one.names)] for values, one in zip(bases, self.runs, strict=True)]
+
+    def _bases(self, x: Floats) -> list[Floats]:
+        """Return the simulated channels, with their slopes below them where places are sought.
+
+        With several workers the variants for the derivatives are simulated in the same call: of
+        almost every step of the search they are wanted next.
+        """
+        wanted = [(x, k, self.place) for k in range(len(self.runs))]
+        if self.workers.count > 1 and not self._is_known(wanted):
+            wanted += self._variants(x)[0]
+        return self._evaluated(wanted)[: len(self.runs)]
+
+    def _is_known(self, wanted: "Sequence[tuple[Floats, int, bool]]") -> bool:
+        return all(self._kept(*one) is not None for one in wanted)
+
+    def _variants(self, x: Floats) -> tuple[list[tuple[Floats, int, bool]], list[float]]:
+        """Return what is simulated for the derivatives, and the step of each parameter."""
+        wanted: list[tuple[Floats, int, bool]] = []
+        steps = []
+        for k, parameter in enumerate(self.parameters):
+            # inwards at a bound
+            step = STEP if x[k] + STEP <= parameter.bounds[1] else -STEP
+            moved = x.copy()
+            moved[k] += step
+            steps.append(step)
+            wanted += [(moved, number, False) for number in range(len(self.runs))]
+        return wanted, steps
 
     def residuals(self, x: Floats) -> list[list[Floats]]:
         """Return measured less simulated, unweighted, for each run and channel."""
@@ -120,17 +161,7 @@ class Problem:
     def jacobian(self, x: Floats) -> Floats:
         """Return the derivatives of `vector`, float64[residual, coordinate]."""
         base = self.series(x)
-        wanted: list[tuple[Floats, int, bool]] = []
-        steps = []
-        for k, parameter in enumerate(self.parameters):
-            # inwards at a bound
-            step = STEP if x[k] + STEP <= parameter.bounds[1] else -STEP
-            moved = x.copy()
-            moved[k] += step
-            steps.append(step)
-            wanted += [(moved, number, False) for number in range(len(self.runs))]
-        if self.place:
-            wanted += [(x, number, True) for number in range(len(self.runs))]
+        wanted, steps = self._variants(x)
         series = self._evaluated(wanted)
         placed = self.placed(x)
         columns = np.zeros((len(self.vector(x)), self.size))
@@ -138,13 +169,13 @@ class Problem:
             own = series[k * len(self.runs) : (k + 1) * len(self.runs)]
             columns[:, k] = self._difference(placed, base, own, step)
         for number, one in enumerate(placed if self.place else []):
-            slope = series[self.count * len(self.runs) + number]
+            slope = self._bases(x)[number][len(one.names) :]
             along = one.run.at - one.run.at[0]
             for j, scale in enumerate((1.0, STRETCH * along)):
-                moved = [b + (1e-6 * scale * slope if i == number else 0.0)
+                along_track = [b + (1e-6 * scale * slope if i == number else 0.0)
                          for i, b in enumerate(base)]  # fmt: skip
                 columns[:, self.count + 2 * number + j] = self._difference(
-                    placed, base, moved, 1e-6
+                    placed, base, along_track, 1e-6
                 )
         known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
         for row, k in enumerate(known):
@@ -158,7 +189,10 @@ class Problem:
         rows = []
         for one, weights, before, after in zip(placed, self.weights, base, moved, strict=True):
             pairs = zip(
-                weights, self.form.features(one, before), self.form.features(one, after), strict=True
+                weights,
+                self.form.features(one, before),
+                self.form.features(one, after),
+                strict=True,
             )
             rows += [-weight * (b - a) / step for weight, a, b in pairs]
         return np.concatenate([*rows, np.zeros(len(self._before(np.zeros(self.size))))])
@@ -174,7 +208,9 @@ class Problem:
                 found[number] = kept
                 continue
             one = self.placed(x)[k]
-            tasks.append((_simulated, (one.run, self.model, self.parameters, x[: self.count], slope)))
+            tasks.append(
+                (_simulated, (one.run, self.model, self.parameters, x[: self.count], slope))
+            )
             missing.append(number)
         for number, outcome in zip(missing, self.workers.run(tasks), strict=True):
             found[number] = outcome
@@ -198,7 +234,8 @@ class Problem:
         path = self._path(x, k, slope)
         if known is not None or path is None or not path.is_file():
             return known
-        shape = self.runs[k].measured.shape
+        rows, instants = self.runs[k].measured.shape
+        shape = (2 * rows if slope else rows, instants)
         data = read_bytes(path, LARGEST_KEPT)
         if len(data) != 8 * shape[0] * shape[1]:
             return None

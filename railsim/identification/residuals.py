@@ -93,10 +93,11 @@ def _density(prepared: Prepared, band: tuple[float, float]) -> float:
 
 def _fade(n: int, step: float) -> Floats:
     edge = min(max(1, round(FADE / step)), n // 4)
-    window = np.ones(n)
+    window: Floats = np.ones(n)
     ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
     window[:edge], window[-edge:] = ramp, ramp[::-1]
-    return window / np.sqrt(np.mean(window**2))
+    window /= np.sqrt(np.mean(window**2))
+    return window
 
 
 def whiteness(residual: Floats) -> tuple[float, float]:

@@ -21,9 +21,8 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.identification.parameters import Model, Parameter
 from railsim.measurement import Measurement
-from railsim.measurement.counterpart import check_channels, compared, outputs_for, series
+from railsim.measurement.counterpart import amplified, check_channels, compared, outputs_for, series
 from railsim.result import Result
-from railsim.result.filters import filtered
 from railsim.simulation import simulate
 
 Floats = NDArray[np.float64]
@@ -75,7 +74,8 @@ class Run:
     ) -> Floats:
         """Return the simulated channels at the measured places, float64[channel, time].
 
-        NaN where the run does not get.  With `slope` their derivative to the arc length instead.
+        NaN where the run does not get.  With `slope` their derivatives to the arc length below
+        them.
 
         Raises
         ------
@@ -99,13 +99,16 @@ class Run:
         time, distance = result["time"], result["distance"]
         rows = np.concatenate([[True], np.diff(distance) > 0.0])
         rate = 1.0 / float(np.median(np.diff(time)))
-        found = np.empty((len(self.selections), len(self.at)))
+        count = len(self.selections)
+        values = np.empty((2 * count if slope else count, len(self.at)))
         for k, (name, channel) in enumerate(zip(self.selections, self.amplifiers, strict=True)):
-            values = amplified(series(result, name), rate, channel)
-            spline = make_interp_spline(distance[rows], values[rows], DEGREE)
-            found[k] = spline(self.at, 1 if slope else 0)
-        found[:, (self.at < distance[0]) | (self.at > distance[-1])] = np.nan
-        return found
+            x_of = amplified(series(result, name), rate, channel)
+            spline = make_interp_spline(distance[rows], x_of[rows], DEGREE)
+            values[k] = spline(self.at)
+            if slope:
+                values[count + k] = spline(self.at, 1)
+        values[:, (self.at < distance[0]) | (self.at > distance[-1])] = np.nan
+        return values
 
     def _result(self, model: Model, settings: Settings) -> Result:
         return simulate(
@@ -128,24 +131,6 @@ class Run:
         if self.settings.drive.mode != "constant":
             return self
         return replace(self, settings=short.replace(step=interval / count))
-
-
-def amplified(x: Floats, rate: float, channel: Channel) -> Floats:
-    """Return a series as an amplifier with the filters of a channel shows it: with its phase."""
-    from scipy import signal
-
-    stages = [(channel.low_pass, "lowpass"), (channel.high_pass, "highpass")]
-    for corner, kind in stages:
-        if corner is None:
-            continue
-        b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)
-
-        def response(f: Floats, b: Floats = b, a: Floats = a) -> NDArray[np.complex128]:
-            s = 2j * np.pi * f
-            return np.asarray(np.polyval(b, s) / np.polyval(a, s))
-
-        x = filtered(x, rate, response, 6.0 / corner)
-    return x
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +166,9 @@ class Prepared:
 
 
 def model_of(
-    vehicle: Vehicle | str | Path | None, measurements: list[Measurement], track: Track | None = None
+    vehicle: Vehicle | str | Path | None,
+    measurements: list[Measurement],
+    track: Track | None = None,
 ) -> Model:
     """Return what the runs are simulated with: the vehicle given, else that of the first file."""
     if vehicle is None:
@@ -237,11 +224,16 @@ def prepared(
     names = tuple(compared(measurement))
     channels = tuple(measurement.definition.channels[name] for name in names)
     outputs = outputs_for([channel.quantity for channel in channels])
-    settings = Settings(output_rate=rate, outputs={**outputs, "low_pass": {"frequency": 2.0 * high}})
+    low_pass = {"frequency": 2.0 * high}
+    settings = Settings.model_validate(
+        {"output_rate": rate, "outputs": {**outputs, "low_pass": low_pass}}
+    )
     if not steady:
         rows = [[float(s), float(v)] for s, v in _profile(measurement, mean)]
         drive = {"mode": "table", "speed_table": rows}
-        settings = Settings(output_rate=VARYING_RATE, outputs=outputs, drive=drive)
+        settings = Settings.model_validate(
+            {"output_rate": VARYING_RATE, "outputs": outputs, "drive": drive}
+        )
     run = Run(
         measurement.name, track, measurement.definition.load, settings, mean, start,
         min(end + 0.05 * mean, track.length), tuple(c.quantity for c in channels), channels,
@@ -260,5 +252,6 @@ def _profile(measurement: Measurement, mean: float) -> Floats:
     s, v = measurement.distance, measurement.speed
     kernel = np.ones(step) / step
     smooth = np.convolve(np.pad(v, (step // 2, step - 1 - step // 2), mode="edge"), kernel, "valid")
-    rows = np.stack([s, smooth], axis=1)[::step]
-    return rows[np.concatenate([[True], np.diff(rows[:, 0]) > 0.1])]
+    rows: Floats = np.stack([s, smooth], axis=1)[::step]
+    rising: Floats = rows[np.concatenate([[True], np.diff(rows[:, 0]) > 0.1])]
+    return rising

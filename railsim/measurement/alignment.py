@@ -162,7 +162,8 @@ def aligned(measurement: Measurement, track: Track, *, most: float = 50.0) -> Me
         raise InputError([argument_fault("track", "", f"the {words} matches nowhere", allowed)])
     moved_run = measurement.moved(found.shift, found.stretch)
     remark = (
-        f"Aligned by the {words}: {found.shift:+.2f} m at the beginning, {1e3 * found.stretch:+.2f} "
-        f"m/km (correlation {found.correlation:.2f} in {found.windows} windows)."
+        f"Aligned by the {words}: {found.shift:+.2f} m at the beginning, "
+        f"{1e3 * found.stretch:+.2f} m/km (correlation {found.correlation:.2f} in "
+        f"{found.windows} windows)."
     )
     return moved_run.with_remarks(remark)

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.flatten import flatten
-from railsim.definitions.measurement import AXES
+from railsim.definitions.measurement import AXES, Channel
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, nearest
 from railsim.measurement.data import Measurement
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SIDES
 from railsim.result import Result
+from railsim.result.filters import filtered
 from railsim.result.sensors import all_sensors
 
 Floats = NDArray[np.float64]
@@ -91,3 +92,20 @@ def series(result: Result, selection: str) -> Floats:
         numbered = dim == "wheelset" and label.isdecimal() and label not in result.wheelsets
         given[dim] = int(label) - 1 if numbered else label
     return result.series(name, **given)
+
+
+def amplified(x: Floats, rate: float, channel: Channel) -> Floats:
+    """Return a series as an amplifier with the filters of a channel shows it: with its phase."""
+    from scipy import signal
+
+    for corner, kind in ((channel.low_pass, "lowpass"), (channel.high_pass, "highpass")):
+        if corner is None:
+            continue
+        b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)  # type: ignore[call-overload]
+
+        def response(f: Floats, b: Floats = b, a: Floats = a) -> NDArray[np.complex128]:
+            s = 2j * np.pi * f
+            return np.asarray(np.polyval(b, s) / np.polyval(a, s))
+
+        x = filtered(x, rate, response, 6.0 / corner)
+    return x

@@ -52,10 +52,7 @@ class Likeness:
             ):
                 return f"{name} is {words} times the simulated one: another 'unit'?"
         if abs(self.drift) > APART * step:
-            return (
-                f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the "
-                "record."
-            )
+            return f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the record."
         if self.correlation > SURE and abs(self.lag) > APART * step:
             return f"{name} comes {1e3 * self.lag:.3g} ms later than simulated: 'delay'?"
         return ""
@@ -122,9 +119,7 @@ def suspicions(
     drifts = [one.drift for one in found.values() if np.isfinite(one.drift)]
     drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
     own = {
-        n: Likeness(
-            o.correlation, o.ratio, clocks * (o.lag - common), clocks * (o.drift - drift)
-        )
+        n: Likeness(o.correlation, o.ratio, clocks * (o.lag - common), clocks * (o.drift - drift))
         for n, o in found.items()
     }
     said = [one.remark(name, step) for name, one in own.items()]

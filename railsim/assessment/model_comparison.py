@@ -1,0 +1,237 @@
+"""What a comparison of a model with a test has found: values of sections, differences, limits."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assessment.criteria import FORCES, RIDE_BAND, ends, middle
+from railsim.assessment.signals import Band
+from railsim.definitions.limits import ValidationLimits
+from railsim.table import Amount, Column, Table
+
+Floats = NDArray[np.float64]
+PASS, FAIL, INCOMPLETE = "pass", "fail", "incomplete"
+
+
+def _rms(x: Floats, _: int) -> list[float]:
+    return [float(np.sqrt(np.mean(x**2)))]
+
+
+def _outwards(x: Floats, turn: int) -> list[float]:
+    """Percentile to the outside of the curve, both on straight track; values are signed so."""
+    return ends(x, 1 if turn else 0)
+
+
+def _both(x: Floats, _: int) -> list[float]:
+    return ends(x, 0)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A quantity that is compared.
+
+    Attributes
+    ----------
+    base : str
+        ``Q``, ``Y``, ``sum_Y``, ``Y_over_Q`` or ``body``, and ``y`` or ``z`` behind it.
+    band : (float or None, float)
+        Filter [Hz].
+    value : callable
+        Values in a section, outwards positive in curves, to one or two.
+    curves : bool
+        In curves only.
+    """
+
+    name: str
+    words: str
+    unit: str
+    base: str
+    band: Band
+    value: Callable[[Floats, int], list[float]]
+    curves: bool = False
+    window: float = 0.0
+
+    @property
+    def column(self) -> Column:
+        """How its values are shown."""
+        return Column(self.name, self.words, self.unit, ".2f" if self.unit == "kN" else ".3f")
+
+
+QUANTITIES = {one.name: one for one in (
+    Compared("Y_qst", "guiding force, quasi-static", "kN", "Y", FORCES, middle, True),
+    Compared("Q_qst", "wheel load, quasi-static", "kN", "Q", FORCES, middle, True),
+    Compared("Y_over_Q_qst", "Y/Q, quasi-static", "", "Y_over_Q", FORCES, middle, True),
+    Compared("sum_Y_qst", "track shift force, quasi-static", "kN", "sum_Y", FORCES, middle, True),
+    Compared("Y_max", "guiding force", "kN", "Y", FORCES, _outwards),
+    Compared("Q_max", "wheel load", "kN", "Q", FORCES, lambda x, _: ends(x, 1)),
+    Compared("Y_over_Q_max", "Y/Q, 2 m", "", "Y_over_Q", FORCES, _outwards, True, 2.0),
+    Compared("sum_Y_max", "track shift force, 2 m", "kN", "sum_Y", FORCES, _outwards, False, 2.0),
+    Compared("body_y_qst", "body lateral, quasi-static", "m/s2", "bodyy", FORCES, middle, True),
+    Compared("body_y_max", "body lateral, 0.4 to 10 Hz", "m/s2", "bodyy", RIDE_BAND, _both),
+    Compared("body_z_max", "body vertical, 0.4 to 10 Hz", "m/s2", "bodyz", RIDE_BAND, _both),
+    Compared("body_y_rms", "body lateral, rms", "m/s2", "bodyy", RIDE_BAND, _rms),
+    Compared("body_z_rms", "body vertical, rms", "m/s2", "bodyz", RIDE_BAND, _rms),
+)}  # fmt: skip
+"""What is compared, in the order of tables."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A value of a section, measured and simulated [SI]."""
+
+    quantity: str
+    run: str
+    place: str
+    begin: float
+    end: float
+    radius: float
+    measured: float
+    simulated: float
+
+    @property
+    def difference(self) -> float:
+        """Positive where the simulation overestimates the magnitude [SI]."""
+        return (self.simulated - self.measured) * (-1.0 if self.measured < 0.0 else 1.0)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A quantity against its limits [SI]."""
+
+    quantity: Compared
+    pairs: tuple[Pair, ...]
+    limit: float
+    mean_limit: float
+    least: int
+
+    @property
+    def sections(self) -> int:
+        """Sections with a value."""
+        return len({(pair.run, pair.begin) for pair in self.pairs})
+
+    @property
+    def mean(self) -> float:
+        """Mean difference."""
+        return float(np.mean([pair.difference for pair in self.pairs])) if self.pairs else math.nan
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the differences, of a sample."""
+        if len(self.pairs) < 2:
+            return math.nan
+        return float(np.std([pair.difference for pair in self.pairs], ddof=1))
+
+    @property
+    def verdict(self) -> str:
+        """Pass, fail, or incomplete with too few sections."""
+        if self.sections < self.least:
+            return INCOMPLETE
+        met = abs(self.mean) <= self.mean_limit and self.deviation <= self.limit
+        return PASS if met else FAIL
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """A channel measured and simulated over the arc length, low-passed at 20 Hz [SI]."""
+
+    run: str
+    name: str
+    quantity: str
+    s: Floats = field(repr=False)
+    rate: float
+    measured: Floats = field(repr=False)
+    simulated: Floats = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelValidation:
+    """A model against a test.
+
+    Attributes
+    ----------
+    vehicle : str
+    runs : tuple of str
+    comparisons : tuple of Comparison
+        Of the quantities that were measured.
+    overlays : tuple of Overlay
+    limits : ValidationLimits
+    remarks : tuple of str
+    """
+
+    vehicle: str
+    runs: tuple[str, ...]
+    comparisons: tuple[Comparison, ...]
+    overlays: tuple[Overlay, ...] = field(repr=False)
+    limits: ValidationLimits = field(repr=False)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Fail where one quantity fails, pass where all pass."""
+        found = {one.verdict for one in self.comparisons}
+        return FAIL if FAIL in found else PASS if found == {PASS} else INCOMPLETE
+
+    def __getitem__(self, name: str) -> Comparison:
+        """Return the comparison of a quantity, by its name in the limits file."""
+        return next(one for one in self.comparisons if one.quantity.name == name)
+
+    def table(self) -> Table:
+        """Return mean and standard deviation of the differences against their limits."""
+        rows: list[list[object]] = []
+        for one in self.comparisons:
+            c = one.quantity.column
+            amounts = [Amount(v, c) for v in (one.mean, one.mean_limit, one.deviation, one.limit)]
+            rows.append([one.quantity.name, one.quantity.words, c.unit, one.sections,
+                         len(one.pairs), *amounts, one.verdict])  # fmt: skip
+        return Table(
+            [
+                Column("quantity"), Column("words", " "), Column("unit"),
+                Column("sections", format="d"), Column("values", format="d"),
+                Column("mean", format=".2f"), Column("mean_limit", "limit +-", format=".2f"),
+                Column("deviation", "standard deviation", format=".2f"),
+                Column("limit", format=".2f"), Column("verdict"),
+            ],
+            rows,
+        )  # fmt: skip
+
+    def section_table(self) -> Table:
+        """Return all values, measured and simulated [SI]."""
+        rows = [
+            [p.quantity, p.run, p.place, p.begin, p.end, p.measured, p.simulated, p.difference]
+            for one in self.comparisons
+            for p in one.pairs
+        ]
+        words = ("quantity", "run", "place", "begin", "end", "measured", "simulated", "difference")
+        columns = [Column(name, format=".6g" if k > 2 else "") for k, name in enumerate(words)]
+        return Table(columns, rows)
+
+    def record(self) -> dict[str, Any]:
+        """Return the comparison as plain values, SI."""
+        return {
+            "vehicle": self.vehicle,
+            "edition": self.limits.edition,
+            "runs": list(self.runs),
+            "verdict": self.verdict,
+            "quantities": [
+                {
+                    "name": one.quantity.name,
+                    "sections": one.sections,
+                    "values": len(one.pairs),
+                    "mean": one.mean,
+                    "mean_limit": one.mean_limit,
+                    "standard_deviation": one.deviation,
+                    "limit": one.limit,
+                    "verdict": one.verdict,
+                }
+                for one in self.comparisons
+            ],
+            "sections": self.section_table().records(),
+            "remarks": list(self.remarks),
+        }
+
+    def __repr__(self) -> str:
+        return f"{self.vehicle}: {self.verdict}\n{self.table()}"

@@ -1,0 +1,339 @@
+"""Derivatives of runs to parameters, with their accuracy: `sensitivity`.
+
+Differences of simulated runs: forward (p + 1 runs) or central (2 p + 1).  The step is controlled:
+one-sided differences F+ and F- of an output y that is smooth differ by h y''; a share
+r = |F+ - F-| / |F+ + F-| above the tolerance asks for a shorter step, at most a few times.  Where r
+does not fall with the step the output has a kink (flange, stop, lifted wheel, sticking friction),
+and a derivative means nothing: said so.
+
+The accuracy reported of a central difference is the difference to that of the step before, where
+there is one, else r^2 (the next term of a series whose terms fall geometrically), and rounding at
+least; of a forward difference it is r, from one more run with all parameters changed at once.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault
+from railsim.identification.parameters import Model, Parameter, parsed
+from railsim.identification.variants import Workers, cores
+from railsim.measurement.counterpart import outputs_for, series
+from railsim.profiles import Profile
+from railsim.result import Result
+from railsim.simulation import simulate
+from railsim.table import Column, Table
+
+Floats = NDArray[np.float64]
+Output = str | Callable[[Result], Any]
+FIRST = 1e-2  # step of a coordinate
+SHORTER = 8.0
+MOST_TIMES = 2  # that the step is shortened
+TOLERANCE = 1e-2  # r
+KINK = 0.7  # of r at the longer step: r has not fallen
+STATUS = 0.1  # share of one instant's derivative: sides differ there
+
+
+@dataclass(frozen=True, eq=False)
+class Derivative:
+    """Derivative of one output to one parameter.
+
+    Attributes
+    ----------
+    value : ndarray
+        Change of the output [SI] for a relative change of the parameter: d y / d ln p; to the
+        share of a profile d y / d share.
+    error : float
+        Estimated error over the norm of the derivative [1].
+    step : float
+        Of the parameter's coordinate.
+    kinked : float
+        Share of the instants (of the values) at which the derivatives to both sides differ; NaN
+        for forward differences.
+    """
+
+    value: Floats
+    error: float
+    step: float
+    kinked: float = np.nan
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether the output has a derivative, within a tenth."""
+        return bool(self.error < STATUS)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives of some outputs to some parameters.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+    outputs : tuple of str
+    result : Result
+        The run itself.
+    base : dict of str to ndarray
+        Outputs of the run [SI].
+    derivatives : dict of (str, str) to Derivative
+        By output and name of the parameter.
+    runs : int
+        How many were simulated.
+    remarks : tuple of str
+    """
+
+    parameters: tuple[Parameter, ...]
+    outputs: tuple[str, ...]
+    result: Result
+    base: Mapping[str, Floats]
+    derivatives: Mapping[tuple[str, str], Derivative]
+    runs: int
+    remarks: tuple[str, ...] = field(default=())
+
+    def __getitem__(self, key: tuple[str, str]) -> Floats:
+        """Return the derivative of an output to a parameter, ``[output, parameter]``."""
+        return self.derivatives[key].value
+
+    def table(self) -> Table:
+        """Return norms (rms of histories) and accuracies of all derivatives."""
+        rows = []
+        for (output, name), one in self.derivatives.items():
+            base = float(np.sqrt(np.mean(self.base[output] ** 2)))
+            size = float(np.sqrt(np.mean(one.value**2)))
+            smooth = "yes" if one.is_smooth else "no"
+            rows.append([output, name, base, size, one.error, one.step, smooth])
+        return Table(
+            [
+                Column("output"),
+                Column("parameter"),
+                Column("rms", "rms (SI)", format=".4g"),
+                Column("derivative", "rms of dy/dln p", format=".4g"),
+                Column("error", "relative error", format=".1e"),
+                Column("step", format=".1e"),
+                Column("smooth"),
+            ],
+            rows,
+        )
+
+    def __repr__(self) -> str:
+        return str(self.table())
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """What every variant does."""
+
+    model: Model
+    parameters: tuple[Parameter, ...]
+    outputs: tuple[tuple[str, Output], ...]
+    how: Mapping[str, Any]
+
+    def result(self, x: Floats) -> Result:
+        own = self.model.with_parameters(self.parameters, x)
+        return simulate(own.vehicle, own.track, profiles=own.profiles, **self.how)
+
+    def values(self, x: Floats) -> list[Floats]:
+        return self.read(self.result(x))
+
+    def read(self, result: Result) -> list[Floats]:
+        if result.status != "complete":
+            words = f"a variant {result.status}"
+            raise InputError([argument_fault("parameters", "", words, "a run that ends")])
+        return [
+            np.atleast_1d(np.asarray(
+                series(result, one) if isinstance(one, str) else one(result), dtype=np.float64
+            ))
+            for _, one in self.outputs
+        ]  # fmt: skip
+
+
+def sensitivity(
+    vehicle: Vehicle,
+    track: Track,
+    parameters: Sequence[str | Parameter],
+    outputs: Sequence[str] | Mapping[str, Output],
+    *,
+    scheme: str = "central",
+    settings: Settings | None = None,
+    profiles: Mapping[str, Profile] | None = None,
+    workers: int = 1,
+    **run: Any,
+) -> Sensitivity:
+    """Return derivatives of histories and values of a run to parameters.
+
+    Parameters
+    ----------
+    vehicle, track : Vehicle, Track
+    parameters : sequence of str or Parameter
+        Keys, see `railsim.identification.parameters`: ``secondary_spring.stiffness.z``.
+    outputs : sequence of str, or mapping of str to str or callable
+        Quantities with labels (``Q:1:left``); by names also functions of a result that give
+        numbers, such as ``{"peak": lambda r: r["Q"].max()}``.
+    scheme : {'central', 'forward'}
+        2 p + 1 runs, more where the step is shortened; or p + 2 runs.
+    settings : Settings, optional
+        The step is that of the run itself in all variants.
+    profiles : mapping of str to Profile, optional
+        As of `simulate`.
+    workers : int
+        Processes; 0: one for each core.  Functions as outputs need one process.
+    **run
+        Further arguments of `simulate`: `speed`, `start`, `until`, `duration`.
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    InputError
+        Wrong parameters, outputs or settings; a variant that does not reach its end.
+
+    Examples
+    --------
+    >>> import railsim
+    >>> coach = railsim.load_vehicle("coach_manchester")
+    >>> track = railsim.load_track("curve_r250")
+    >>> found = railsim.sensitivity(coach, track, ["bodies.carbody.mass"], ["Q:1:left"],
+    ...     scheme="forward", speed=20.0, until=5.0)
+    >>> 0.0 < found["Q:1:left", "bodies.carbody.mass"][0] < found.base["Q:1:left"][0]
+    True
+    """
+    if scheme not in ("central", "forward"):
+        raise InputError([argument_fault("scheme", "", scheme, "central or forward")])
+    named = dict(outputs) if isinstance(outputs, Mapping) else {one: one for one in outputs}
+    wanted = parsed(parameters, vehicle, track)
+    settings = _settings(settings, named)
+    model = Model(vehicle, track, profiles)
+    job = _Job(model, tuple(wanted), tuple(named.items()), {**run, "settings": settings})
+    zero = np.zeros(len(wanted))
+    result = job.result(zero)
+    if settings.drive.mode == "constant":
+        step = float(result.attributes["step"])
+        job = _Job(model, job.parameters, job.outputs,
+                   {**run, "settings": settings.replace(step=step)})  # fmt: skip
+    try:
+        base = job.read(result)
+    except KeyError as error:
+        raise InputError([argument_fault("outputs", "", str(error.args[0]), "")]) from None
+    count = len(wanted)
+    with Workers(workers or cores()) as pool:
+        if scheme == "forward":
+            found, runs = _forward(job, base, pool), count + 2
+        else:
+            found, runs = _central(job, base, pool)
+    derivatives = {
+        (output, one.name): found[k][j]
+        for k, output in enumerate(named)
+        for j, one in enumerate(wanted)
+    }
+    remarks = [
+        f"{output} has no derivative to {name}: its two sides differ by {100 * one.error:.0f} %"
+        + (f" ({100 * one.kinked:.2g} % of the values)" if np.isfinite(one.kinked) else "")
+        + "; flange, stop, lifted wheel or sticking friction."
+        for (output, name), one in derivatives.items()
+        if not one.is_smooth
+    ]
+    return Sensitivity(
+        tuple(wanted), tuple(named), result,
+        dict(zip(named, base, strict=True)), derivatives, runs, tuple(remarks),
+    )  # fmt: skip
+
+
+def _settings(settings: Settings | None, named: Mapping[str, Output]) -> Settings:
+    """Return settings whose outputs hold what is asked for."""
+    settings = settings or Settings()
+    selections = [one for one in named.values() if isinstance(one, str)]
+    if not selections:
+        return settings
+    try:
+        wanted = outputs_for(selections)
+    except KeyError as error:
+        raise InputError([argument_fault("outputs", "", f"no quantity {error}", "")]) from None
+    outputs = settings.outputs
+    values = {
+        key: value
+        for key, value in wanted.items()
+        if key not in ("quantities", "elements") and not getattr(outputs, key)
+    }
+    if "elements" in wanted:
+        values["elements"] = (*outputs.elements, *wanted["elements"])
+    return settings.replace(outputs={**outputs.model_dump(exclude_none=True), **values})
+
+
+def _values(job: _Job, x: Floats) -> list[Floats]:
+    return job.values(x)
+
+
+def _runs(job: _Job, points: Sequence[Floats], pool: Workers) -> list[list[Floats]]:
+    return pool.run([(_values, (job, x)) for x in points])
+
+
+def _size(x: Floats) -> float:
+    return float(np.linalg.norm(x))
+
+
+def _forward(job: _Job, base: list[Floats], pool: Workers) -> list[list[Derivative]]:
+    count = len(job.parameters)
+    step = FIRST / SHORTER
+    points = [*(step * np.eye(count)), np.full(count, -step)]
+    *moved, together = _runs(job, points, pool)
+    found = []
+    for k, y in enumerate(base):
+        values = [(one[k] - y) / step for one in moved]
+        linear = -step * np.sum(values, axis=0)
+        error = _size(together[k] - y - linear) / max(_size(linear), 1e-300)
+        found.append([Derivative(value, error, step) for value in values])
+    return found
+
+
+def _central(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[Derivative]], int]:
+    count, step, runs = len(job.parameters), FIRST, 1
+    found: list[list[Derivative | None]] = [[None] * count for _ in base]
+    ratios = np.full((len(base), count), np.nan)
+    waiting = list(range(count))
+    for _ in range(1 + MOST_TIMES):
+        points = [sign * step * np.eye(count)[j] for j in waiting for sign in (1.0, -1.0)]
+        moved = _runs(job, points, pool)
+        runs += len(points)
+        again = []
+        for number, j in enumerate(waiting):
+            shorter = False
+            for k, y in enumerate(base):
+                above, below = moved[2 * number][k], moved[2 * number + 1][k]
+                new, ratio = _one(y, above, below, step, found[k][j])
+                if found[k][j] is None or new.error < found[k][j].error:  # type: ignore[union-attr]
+                    found[k][j] = new
+                falls = not ratio > KINK * ratios[k, j]
+                shorter |= ratio > TOLERANCE and falls
+                ratios[k, j] = ratio
+            again += [j] if shorter else []
+        waiting = again
+        step /= SHORTER
+        if not waiting:
+            break
+    return [[one for one in row if one is not None] for row in found], runs
+
+
+def _one(
+    y: Floats, above: Floats, below: Floats, step: float, before: Derivative | None
+) -> tuple[Derivative, float]:
+    """Return a central derivative and the difference of its sides as a share of it."""
+    up, down = (above - y) / step, (y - below) / step
+    value = 0.5 * (up + down)
+    size = max(_size(value), 1e-300)
+    ratio = 0.5 * _size(up - down) / size
+    rounding = 1e-13 * _size(y) / (step * size)
+    error = ratio**2 if before is None else _size(value - before.value) / size
+    error = max(error, rounding)
+    if ratio > STATUS:
+        error = max(error, ratio)
+    scale = max(float(np.max(np.abs(value))), 1e-300)
+    kinked = float(np.mean(np.abs(up - down) > 2.0 * STATUS * scale))
+    return Derivative(value, error, step, kinked), ratio
