@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from railsim.assessment import Assessment, assess
+    from railsim.assessment.model_comparison import ModelValidation
+    from railsim.assessment.model_validation import validate_model
     from railsim.definitions.loading import (
         load_comfort_limits,
         load_mechanism,
@@ -57,6 +59,7 @@ _HOMES = {
     "Measurement": "railsim.measurement",
     "Mechanism": "railsim.definitions.mechanism",
     "ModelError": "railsim.errors",
+    "ModelValidation": "railsim.assessment.model_comparison",
     "Profile": "railsim.profiles",
     "Result": "railsim.result",
     "Sensitivity": "railsim.identification",
@@ -92,6 +95,7 @@ _HOMES = {
     "simulate_together": "railsim.simulation",
     "static_loads": "railsim.model.statics",
     "study": "railsim.studies",
+    "validate_model": "railsim.assessment.model_validation",
 }
 
 __all__ = [
@@ -102,6 +106,7 @@ __all__ = [
     "Measurement",
     "Mechanism",
     "ModelError",
+    "ModelValidation",
     "Profile",
     "Result",
     "Sensitivity",
@@ -138,6 +143,7 @@ __all__ = [
     "simulate_together",
     "static_loads",
     "study",
+    "validate_model",
 ]
 
 

@@ -24,6 +24,7 @@ from railsim.assessment.model_comparison import (
 )
 from railsim.assessment.sections import TestSection, section_length, track_sections
 from railsim.assessment.signals import OUTWARDS, Band, Signal
+from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import RunningLimits, ValidationLimits
 from railsim.definitions.loading import load_running_limits, load_validation_limits
 from railsim.definitions.vehicle_tables import Service
@@ -211,9 +212,10 @@ class _Run:
 
     def _offsets(self) -> dict[str, float]:
         """Arc lengths of the channels' places relative to the reference body [m]."""
-        sensors = all_sensors(self.result.vehicle())
-        first = self.result.part("wheelset_distance", slice(0, 1))[0]
-        ahead = first - self.result["distance"][0]
+        vehicle = self.result.vehicle()
+        sensors, flat = all_sensors(vehicle), flatten(vehicle)
+        origin = {body.name: body.position[0] for body in flat.bodies}[flat.reference]
+        ahead = [body.position[0] - origin for body in flat.of_kind("wheelset")]
         names = list(self.result.wheelsets)
         found = {}
         for name, selection in compared(self.measurement).items():

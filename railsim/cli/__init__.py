@@ -46,6 +46,8 @@ COMMANDS = {
     "fmu": "A vehicle on its track as a unit of FMI 3.0 for other programs.",
     "export": "A result as CSV, for MATLAB, or as Parquet.",
     "assess": "Running safety and ride comfort of results.",
+    "validate-model": "A model against a test: differences of section values and their limits.",
+    "identify": "Parameters of a vehicle from measured runs.",
     "modes": "Eigenfrequencies, damping and mode shapes of a vehicle.",
     "critical-speed": "Linear and non-linear critical speed.",
     "curving": "Steady curving over radius, cant deficiency and friction.",

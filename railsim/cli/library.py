@@ -13,11 +13,12 @@ from railsim.cli.common import json_option, overwrite_option, print_json, show
 PROFILES = "profiles"
 # Letters of source quality beside a number, as the shipped files explain them: read, re-entered,
 # computed, from memory, assumed; a short name of the source may follow, [D G].
-MARK = re.compile(r"\[(D|R|C|M|A|assumed)(?: \w+)?\]")
+MARK = re.compile(r"\[(D|R|C|I|M|A|assumed)(?: \w+)?\]")
 MEANING = {
     "D": "data sheet or printed table",
     "R": "taken from public code that names its source",
     "C": "computed",
+    "I": "identified from measured runs",
     "M": "from memory, unverified",
     "A": "assumed",
 }

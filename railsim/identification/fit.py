@@ -28,7 +28,7 @@ from railsim.measurement.likeness import suspicions
 
 Floats = NDArray[np.float64]
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
-COARSE, FINE = 1e-2, 1e-5  # of the sum of squares; of it and of the coordinates
+COARSE, FINE = 0.1, 3e-5  # of the sum of squares; of it and of the coordinates
 FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
 SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
@@ -134,10 +134,12 @@ def _solved(problem: Problem, loss: str) -> Identified:
                       + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
     stated = problem.form.kind == "history"
     known = stated and all(np.isfinite(one.noise).all() for one in problem.runs)
-    if stated:
-        x = _by_a_part(problem, x, bounds, loss)
     _weigh(problem, x, stated=stated)
-    for tolerance in [FINE] if known else [COARSE, *[FINE] * REWEIGHTED]:
+    near = stated and all(len(one.run.at) * one.step > LONG * PART for one in problem.runs)
+    if near:
+        x = _by_a_part(problem, x, bounds, loss)
+        _weigh(problem, x, stated=stated)
+    for tolerance in [FINE] if known else [*[COARSE][near:], *[FINE] * REWEIGHTED]:
         x, settled = _least(problem, x, bounds, loss, tolerance)
         if not settled:
             remarks.append(f"The search has not settled after {MOST_STEPS} steps.")
@@ -179,12 +181,7 @@ def _least(
 
 
 def _by_a_part(problem: Problem, x: Floats, bounds: Floats, loss: str) -> Floats:
-    """Return coordinates by the beginnings of long runs: near the solution, at a share of the cost.
-
-    Only where all runs are long.
-    """
-    if any(len(one.run.at) * one.step < LONG * PART for one in problem.runs):
-        return x
+    """Return coordinates by the beginnings of the runs: near the solution at a low cost."""
     short = problem.shortened(PART)
     _weigh(short, x, stated=True)
     found, _ = _least(short, x, bounds, loss, COARSE)

@@ -7,6 +7,7 @@ if one is given, so that an identification that was interrupted goes on where it
 """
 
 import hashlib
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -257,7 +258,12 @@ def _simulated(
     from railsim.identification.runs import Run
 
     assert isinstance(run, Run)
+    log = logging.getLogger("railsim")
+    level = log.level
+    log.setLevel(logging.ERROR)  # a variant's remarks are not reported
     try:
         return run.simulated(model, parameters, x, slope=slope)
     except ModelError as error:
         raise ModelError(f"{run.name}: {error}") from None
+    finally:
+        log.setLevel(level)

@@ -34,6 +34,7 @@ LEAD = 100.0  # m, that a run begins ahead, as far as the track is there
 SHORTEST = 4.0  # s
 DEGREE = 5  # of the spline
 MARGIN = 0.85  # of the step of the model, for variants that are stiffer
+ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
 VARYING_RATE = 1000.0  # 1/s, where the speed varies and nothing is low-passed
 
 
@@ -255,3 +256,25 @@ def _profile(measurement: Measurement, mean: float) -> Floats:
     rows: Floats = np.stack([s, smooth], axis=1)[::step]
     rising: Floats = rows[np.concatenate([[True], np.diff(rows[:, 0]) > 0.1])]
     return rising
+
+
+def simulated_run(measurement: Measurement, vehicle: Vehicle | str | Path | None = None) -> Result:
+    """Simulate the run of a measurement, with the outputs that its channels are compared with.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        It names the track, and the vehicle where none is given.
+    vehicle : Vehicle, str or Path, optional
+
+    Raises
+    ------
+    InputError, ModelError : as `simulate`; channels that the vehicle does not have.
+    """
+    model = model_of(vehicle, [measurement])
+    check_channels(measurement.name, measurement, model.vehicle)
+    run = prepared(measurement, model, (0.1, min(ALIKE, 0.4 * measurement.rate))).run
+    own = model.with_track(run.track)
+    if run.load is not None:
+        own = replace(own, vehicle=own.vehicle.with_values({"load": run.load}))
+    return run._result(own, run.settings)

@@ -1,0 +1,119 @@
+"""``railsim validate-model``: simulated against measured runs."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from railsim.cli.common import echo, names_of, output_options, print_json, show
+from railsim.files import RESULTS, check_folder, write_folder
+
+if TYPE_CHECKING:
+    from railsim.measurement import Measurement
+    from railsim.result import Result
+
+FILES = ("model_validation.json", "sections.csv", "report.html", "scatter.png", "overlays.png")
+
+
+@click.command(name="validate-model")
+@click.argument("files", nargs=-1, required=True, metavar="MEASURED.toml ... [RESULT.h5|DIR ...]")
+@click.option(
+    "--vehicle",
+    metavar="F",
+    shell_complete=names_of("vehicle"),
+    help="Vehicle to simulate, where no results are given; default: the measurement's.",
+)
+@click.option(
+    "--limits",
+    metavar="F",
+    default="validation_en14363_t",
+    show_default=True,
+    help="Limits of the differences: a file, or the name of a shipped one.",
+)
+@click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
+@click.option("--out", metavar="DIR", help="Folder for JSON, CSV, pictures and a page.")
+@output_options
+def command(
+    files: tuple[str, ...],
+    vehicle: str | None,
+    limits: str,
+    fail: bool,
+    out: str | None,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compare simulated with measured runs, section by section (EN 14363, Annex T).
+
+    One result for each measured run, in the same order; or a folder of results called as the
+    measurement files; without results the runs are simulated.
+
+    \b
+    Example:
+      railsim validate-model run12.toml run12.h5 --out comparison
+    """  # noqa: D301 - click reads the escape
+    from railsim.assessment.model_validation import validate_model
+    from railsim.cli import DONE, LIMIT_EXCEEDED
+    from railsim.measurement import load_measurement
+
+    folder = Path(out) if out else None
+    if folder:
+        check_folder(folder, FILES, overwrite=overwrite)
+    names = [f for f in files if not (os.path.isdir(f) or Path(f).suffix.lower() in RESULTS)]
+    runs = [load_measurement(name) for name in names]
+    results = _results(names, runs, [f for f in files if f not in names], vehicle)
+    found = validate_model(runs, results, limits=limits)
+    if as_json:
+        print_json(found.record())
+    else:
+        show(f"{found.vehicle} against {', '.join(found.runs)}: {found.verdict}", found.table())
+        for remark in found.remarks if not quiet else ():
+            echo(f"note: {remark}")
+    if folder:
+        import json
+
+        from railsim.cli.common import plain
+        from railsim.report.document import as_png
+        from railsim.report.measured import validation_figures, validation_page
+
+        figures = validation_figures(found)
+        content = (
+            json.dumps(plain(found.record()), indent=2).encode(),
+            found.section_table().csv().encode(),
+            validation_page(found).encode(),
+            as_png(figures["scatter"]),
+            as_png(figures["overlays"]),
+        )
+        for path in write_folder(folder, dict(zip(FILES, content, strict=True)), overwrite=True):
+            if not quiet and not as_json:
+                echo(str(path))
+    return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
+
+
+def _results(
+    names: list[str], runs: "list[Measurement]", files: list[str], vehicle: str | None
+) -> "list[Result]":
+    """Return the results that belong to measured runs; simulated where none are given."""
+    from railsim.errors import Fault, InputError
+    from railsim.result import open_run
+
+    if not files:
+        from railsim.identification.runs import simulated_run
+
+        return [simulated_run(run, vehicle) for run in runs]
+    if vehicle is not None:
+        raise InputError([Fault("--vehicle", "", "given together with results", "leave one out")])
+    if len(files) == 1 and os.path.isdir(files[0]):
+        paths = [Path(files[0]) / f"{Path(name).stem}.h5" for name in names]
+        if len(names) == 1 and not paths[0].is_file():
+            inside = sorted(Path(files[0]).glob("*.h5"))
+            paths = inside if len(inside) == 1 else paths
+        missing = [path for path in paths if not path.is_file()]
+        if missing:
+            raise InputError(
+                Fault(str(path), "", "no such result", "results called as the measurement files")
+                for path in missing
+            )
+        return [open_run(path) for path in paths]
+    return [open_run(Path(file)) for file in files]

@@ -1,0 +1,164 @@
+"""Pictures of a model against a test, and of an identification: overlays, scatter, spectra."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from railsim.assessment.model_comparison import ModelValidation, Overlay
+from railsim.definitions.measurement import quantity_of
+from railsim.identification.identified import Channel, Identified
+
+Floats = NDArray[np.float64]
+WORDS = ("measured", "before", "after")
+MOST = 12  # channels of a picture
+LONGEST = 20_000  # values of a line
+NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
+
+
+def _axes(count: int, across: int, height: float) -> tuple[Figure, list]:  # type: ignore[type-arg]
+    rows = -(-count // across)
+    figure = Figure(figsize=(8.0, 0.6 + height * rows), layout="constrained")
+    grid = figure.subplots(rows, across, squeeze=False).ravel()
+    for spare in grid[count:]:
+        spare.remove()
+    return figure, list(grid[:count])
+
+
+def _shown(quantity: str) -> tuple[float, str]:
+    found = quantity_of(quantity)
+    return (found.scale, found.shown_unit) if found is not None else (1.0, "SI")
+
+
+def scatter(validation: ModelValidation) -> Figure:
+    """Draw simulated over measured section values with the bands of the mean and the deviation."""
+    shown = validation.comparisons
+    figure, grid = _axes(len(shown), 3, 2.5)
+    for axes, one in zip(grid, shown, strict=True):
+        scale = one.quantity.column.scale
+        measured = scale * np.array([pair.measured for pair in one.pairs])
+        simulated = scale * np.array([pair.simulated for pair in one.pairs])
+        ends = np.array(
+            [min(measured.min(), simulated.min()), max(measured.max(), simulated.max())]
+        )
+        ends += np.array([-0.05, 0.05]) * max(np.ptp(ends), 1e-9)
+        axes.plot(ends, ends, color="0.4", linewidth=0.8)
+        for limit, style in ((one.mean_limit, "--"), (2.0 * one.limit, ":")):
+            for sign in (-1.0, 1.0):
+                axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
+        axes.plot(measured, simulated, ".", color="C3" if one.verdict == "fail" else "C0")
+        axes.set_xlim(*ends)
+        axes.set_ylim(*ends)
+        unit = one.quantity.column.unit
+        axes.set_title(f"{one.quantity.name}: {one.verdict}", fontsize="small")
+        axes.set_xlabel(f"measured{f' ({unit})' if unit else ''}", fontsize="small")
+        axes.set_ylabel("simulated", fontsize="small")
+    return figure
+
+
+def differences(validation: ModelValidation) -> Figure:
+    """Draw the distribution of the differences over the limit of their standard deviation."""
+    shown = validation.comparisons
+    figure, grid = _axes(len(shown), 4, 1.8)
+    for axes, one in zip(grid, shown, strict=True):
+        x = np.array([pair.difference for pair in one.pairs]) / one.limit
+        reach = max(1.2, 1.05 * float(np.abs(x).max()))
+        axes.hist(
+            x, bins=np.linspace(-reach, reach, 25), color="C3" if one.verdict == "fail" else "C0"
+        )
+        for limit in (-2 / 3, 2 / 3):
+            axes.axvline(limit, color="0.5", linewidth=0.8, linestyle="--")
+        axes.axvline(one.mean / one.limit, color="k", linewidth=1.0)
+        axes.set_title(one.quantity.name, fontsize="small")
+        axes.set_xlabel("difference / limit", fontsize="small")
+    return figure
+
+
+def overlays(validation: ModelValidation, between: tuple[float, float] | None = None) -> Figure:
+    """Draw measured and simulated channels of the first run over the arc length."""
+    run = validation.overlays[0].run
+    shown = [one for one in validation.overlays if one.run == run][:MOST]
+    figure, grid = _axes(len(shown), 1, 1.3)
+    for axes, one in zip(grid, shown, strict=True):
+        scale, unit = _shown(one.quantity)
+        middle = 0.5 * (one.s[0] + one.s[-1])
+        low, high = between or (middle - NEAR, middle + NEAR)
+        rows = slice(*np.searchsorted(one.s, [low, high]))
+        every = max(1, (rows.stop - rows.start) // LONGEST)
+        at = slice(rows.start, rows.stop, every)
+        axes.plot(one.s[at], scale * one.measured[at], color="k", linewidth=0.7, label="measured")
+        axes.plot(
+            one.s[at], scale * one.simulated[at], color="C1", linewidth=0.7, label="simulated"
+        )
+        axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
+    grid[0].legend(fontsize="small", ncols=2, loc="upper right")
+    grid[-1].set_xlabel("arc length (m)")
+    return figure
+
+
+def spectra(validation: ModelValidation) -> Figure:
+    """Draw power spectral densities of measured and simulated channels of the first run."""
+    run = validation.overlays[0].run
+    shown = [one for one in validation.overlays if one.run == run][:MOST]
+    figure, grid = _axes(len(shown), 3, 1.9)
+    for axes, one in zip(grid, shown, strict=True):
+        for values, colour, words in (
+            (one.measured, "k", "measured"),
+            (one.simulated, "C1", "simulated"),
+        ):
+            f, power = _density(one, values)
+            axes.loglog(f, power, color=colour, linewidth=0.9, label=words)
+        axes.set_title(one.name, fontsize="small")
+        axes.set_xlabel("frequency (Hz)", fontsize="small")
+    grid[0].legend(fontsize="small")
+    return figure
+
+
+def _density(one: Overlay, values: Floats) -> tuple[Floats, Floats]:
+    from scipy.signal import welch
+
+    x = np.where(np.isfinite(values), values, 0.0)
+    f, power = welch(x, one.rate, nperseg=min(len(x), max(256, int(8 * one.rate))))
+    inside = (f > 0.2) & (f < 20.0)
+    return f[inside], np.maximum(power[inside], 1e-12 * power[inside].max())
+
+
+def fits(found: Identified) -> Figure:
+    """Draw the channels of the first run, measured, before and after, over a part of the line."""
+    shown = _first(found.channels)
+    figure, grid = _axes(len(shown), 1, 1.3)
+    for axes, one in zip(grid, shown, strict=True):
+        scale, unit = _shown(one.quantity)
+        middle = len(one.at) // 2
+        rows = slice(middle, middle + int(4.0 / one.step))
+        drawn = (one.measured, one.before, one.after)
+        for values, colour, words in zip(drawn, ("k", "C0", "C1"), WORDS, strict=True):
+            axes.plot(one.at[rows], scale * values[rows], color=colour, linewidth=0.8, label=words)
+        axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
+    grid[0].legend(fontsize="small", ncols=3, loc="upper right")
+    grid[-1].set_xlabel("arc length (m)")
+    return figure
+
+
+def residual_spectra(found: Identified) -> Figure:
+    """Draw the cumulative periodograms of the residuals: a straight line where they are white."""
+    shown = _first(found.channels)
+    figure, grid = _axes(len(shown), 3, 1.9)
+    low, high = found.band
+    for axes, one in zip(grid, shown, strict=True):
+        rest = one.measured - one.after
+        power = np.abs(np.fft.rfft(np.where(np.isfinite(rest), rest, 0.0))) ** 2
+        f = np.fft.rfftfreq(len(rest), one.step)
+        inside = (f >= low) & (f <= high)
+        summed = np.cumsum(power[inside]) / max(float(power[inside].sum()), 1e-300)
+        axes.plot([low, high], [0.0, 1.0], color="0.6", linewidth=0.8)
+        axes.plot(f[inside], summed, color="C0" if one.is_white else "C3")
+        white = "white" if one.is_white else "not white"
+        axes.set_title(f"{one.name}: {white}", fontsize="small")
+        axes.set_xlabel("frequency (Hz)", fontsize="small")
+    return figure
+
+
+def _first(channels: Sequence[Channel]) -> list[Channel]:
+    return [one for one in channels if one.run == channels[0].run][:MOST]

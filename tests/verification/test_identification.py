@@ -1,0 +1,306 @@
+"""Identification on twins: parameters found, intervals that cover, what the data cannot tell."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from rig import test_vehicle
+
+import railsim
+from railsim.cli import railsim as command_line
+from railsim.definitions.vehicle import Vehicle
+from railsim.identification.parameters import Model, parsed, scaled
+from railsim.identification.residuals import whiteness
+
+SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
+PRIMARY, DAMPER = "primary.stiffness.z", "primary.damping.z"
+SECONDARY, MASS = "secondary.stiffness.z", "bodies.body.mass"
+# both rails alike: the wheelset stays in the middle
+WAVES = (
+    '{type="sweep",amplitude=4e-4,wavelengths=[30.0,1.6],begin=5.0,end=190.0},'
+    '{type="sweep",amplitude=3e-4,wavelengths=[1.8,25.0],begin=5.0,end=190.0}'
+)
+TRACK = railsim.load_track("straight", [f"irregularities=[{WAVES}]", "plan.0.length=200.0"])
+
+
+def quarter(**elements):
+    """A wheelset with two masses above it, held stiffly but for the vertical."""
+
+    def joint(one, other, height, stiffness, damping):
+        return {
+            "kind": "bushing", "bodies": [one, other], "point": [0.0, 0.0, height],
+            "stiffness": [5e6, 5e6, stiffness], "damping": [5e4, 5e4, damping],
+            "rotational_stiffness": [5e6] * 3, "rotational_damping": [5e4] * 3,
+        }  # fmt: skip
+
+    def body(mass, height):
+        return {"mass": mass, "inertia": [800.0, 800.0, 800.0], "position": [0.0, 0.0, height]}
+
+    data = test_vehicle("single_wheelset").model_dump(exclude_none=True)
+    wheelset = {**data["wheelsets"]["wheelset"], "profile": "S1002"}
+    return Vehicle.model_validate({
+        **data, "name": "quarter", "wheelsets": {"wheelset": wheelset},
+        "bodies": {"frame": body(1500.0, -0.6), "body": body(8000.0, -1.5)},
+        "elements": {
+            "primary": joint("wheelset", "frame", -0.5, 1.6e6, 2e4),
+            "secondary": joint("frame", "body", -1.0, 6e5, 3e4),
+            **elements,
+        },
+        "sensors": {
+            "on_frame": {"body": "frame", "position": [0.0, 0.0, -0.6]},
+            "on_body": {"body": "body", "position": [0.0, 0.0, -1.5]},
+        },
+    })  # fmt: skip
+
+
+def measured(folder, vehicle, factors=None, *, seed=1, noise=0.02, stated=True, name="run"):
+    """Write a measured run of a vehicle with some parameters off."""
+    factors = factors or {}
+    keys = parsed(factors, vehicle, TRACK) if factors else []
+    true = Model(vehicle, TRACK).with_parameters(keys, np.log(list(factors.values())))
+    low_pass = {"frequency": 60.0}
+    outputs = {"sensors": "readings", "quantities": ["distance"], "low_pass": low_pass}
+    settings = railsim.Settings.model_validate({"output_rate": RATE, "outputs": outputs})
+    run = railsim.simulate(true.vehicle, TRACK, speed=SPEED, until=LENGTH, settings=settings)
+    rng = np.random.default_rng(seed)
+    columns, lines = {"t": run.time, "s": run.distance}, []
+    for channel in ("on_frame", "on_body", "axlebox_1_left"):
+        x = run.series("sensor_acceleration", sensor=channel, axis="z")
+        level = noise * float(np.std(x))
+        columns[channel] = x + level * rng.standard_normal(len(x))
+        own = f", noise = {level}" if stated else ""
+        lines.append(f'{channel} = {{ quantity = "sensor_acceleration:{channel}:z"{own} }}')
+    rows = zip(*columns.values(), strict=True)
+    text = [",".join(columns), *(",".join(f"{value:.12g}" for value in row) for row in rows)]
+    (folder / f"{name}.csv").write_text("\n".join(text))
+    TRACK.save(folder / "track.toml", overwrite=True)
+    (folder / f"{name}.toml").write_text(
+        f'format = "railsim-measurement/1"\nname = "{name}"\nfile = "{name}.csv"\n'
+        f'track = "track.toml"\nspeed = {SPEED}\n[channels]\n'
+        't = { quantity = "time" }\ns = { quantity = "distance" }\n' + "\n".join(lines)
+    )
+    return folder / f"{name}.toml"
+
+
+FACTORS = {PRIMARY: 0.8, DAMPER: 1.25, SECONDARY: 1.2}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("identified")
+    path = measured(folder, quarter(), FACTORS)
+    kept = folder / "kept"
+    first = railsim.identify(
+        quarter(), path, list(FACTORS), band=(0.5, 14.0), workers=1, folder=kept
+    )
+    return first, path, kept
+
+
+def test_parameters_are_found_and_residuals_are_the_noise(found):
+    one, _, _ = found
+    true = np.array(list(FACTORS.values()))
+    assert np.all(np.abs(one.x - np.log(true)) < 3.0 * one.deviations)
+    assert one.factors == pytest.approx(true, rel=0.01)
+    assert np.all((one.intervals[:, 0] < one.factors) & (one.factors < one.intervals[:, 1]))
+    assert [channel.level for channel in one.channels] == pytest.approx([1.0] * 3, abs=0.15)
+    assert all(channel.is_white for channel in one.channels)
+    assert not one.unidentified
+    assert np.diag(one.correlation) == pytest.approx([1.0] * 3)
+    assert one.values["elements.primary.stiffness.z"] == pytest.approx(one.factors[0] * 1.6e6)
+
+
+def test_an_interrupted_identification_goes_on_and_finds_the_same(found):
+    one, path, kept = found
+    assert one.simulations > 5
+    files = sorted(kept.iterdir())
+    files[0].unlink()  # what was not finished
+    again = railsim.identify(
+        quarter(), path, list(FACTORS), band=(0.5, 14.0), workers=1, folder=kept
+    )
+    assert again.simulations == 1
+    assert np.array_equal(again.x, one.x)
+
+
+def test_the_fitted_file_extends_the_original(found, tmp_path):
+    one, _, _ = found
+    (tmp_path / "base.toml").write_text(quarter().to_toml())
+    path = one.save_vehicle(tmp_path / "fitted.toml", tmp_path / "base.toml")
+    text = path.read_text()
+    assert 'extends = "base.toml"' in text
+    assert text.count("# [I]") == 3
+    assert railsim.load_vehicle(path) == one.fitted
+    with pytest.raises(railsim.InputError, match="exists"):
+        one.save_vehicle(path)
+    whole = one.save_vehicle(tmp_path / "whole.toml")
+    assert railsim.load_vehicle(whole) == one.fitted
+
+
+def in_series():
+    """Two springs in series with a small mass between them, beside the secondary's damper."""
+    vehicle = quarter().model_dump(exclude_none=True)
+    spring = vehicle["elements"]["secondary"]
+    own = {"stiffness": [5e6, 5e6, 1.2e6], "damping": [5e4, 5e4, 100.0]}
+    lower = {**spring, **own, "bodies": ["frame", "between"]}
+    upper = {**spring, **own, "bodies": ["between", "body"]}
+    body = {"mass": 4.0, "inertia": [4.0] * 3, "position": [0.0, 0.0, -1.0]}
+    vehicle["bodies"]["between"] = body
+    vehicle["elements"]["secondary"] = {**spring, "stiffness": [5e6, 5e6, 0.0]}
+    vehicle["elements"] |= {"lower": lower, "upper": upper}
+    return Vehicle.model_validate(vehicle)
+
+
+def test_two_springs_in_series_are_named(tmp_path):
+    lower, upper = "lower.stiffness.z", "upper.stiffness.z"
+    path = measured(tmp_path, in_series(), {upper: 0.8})
+    one = railsim.identify(in_series(), path, [lower, upper], band=(0.5, 8.0), workers=1)
+    assert len(one.unidentified) == 1
+    assert "cannot tell apart" in one.unidentified[0]
+    assert lower in one.unidentified[0]
+    assert upper in one.unidentified[0]
+    # what they are together is known: 1/(1/k + 1/0.8 k)
+    together = 1.0 / np.sum(1.0 / (1.2e6 * one.factors))
+    assert together == pytest.approx(1.2e6 * 0.8 / 1.8, rel=0.02)
+
+
+def test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white(tmp_path):
+    damper = {
+        "kind": "spring_damper", "bodies": ["frame", "body"],
+        "points": [[0.0, 0.0, -0.6], [0.0, 0.0, -1.5]], "damping": 4e4, "series_stiffness": 4e5,
+    }  # fmt: skip
+    path = measured(tmp_path, quarter(extra=damper), noise=0.01)
+    one = railsim.identify(quarter(), path, [PRIMARY, SECONDARY], band=(0.5, 14.0), workers=1)
+    assert not all(channel.is_white for channel in one.channels)
+    assert max(channel.level for channel in one.channels) > 2.0
+    assert one.inflation > 4.0
+
+
+def test_whiteness_has_its_own_level():
+    """Of white noise 1 % are refused at 0.01; a trend of the power always."""
+    rng = np.random.default_rng(5)
+    chances = np.array([whiteness(rng.standard_normal(800))[1] for _ in range(1500)])
+    assert 0.002 < np.mean(chances < 0.01) < 0.02
+    assert np.mean(chances < 0.5) == pytest.approx(0.5, abs=0.06)
+
+
+def test_tables_scale_their_forces_only():
+    assert scaled([[0.0, 1.0], [0.5, 3.0]], 2.0) == [[0.0, 2.0], [0.5, 6.0]]
+    one = Model(railsim.load_vehicle("coach_25t"), TRACK)
+    keys = parsed(["primary_vertical_damper.damper_table", "track.friction"], one.vehicle, TRACK)
+    both = one.with_parameters(keys, np.log([0.5, 0.5]))
+    axle = both.vehicle.assemblies["bogie"].assemblies["axle"]
+    assert axle.elements["primary_vertical_damper"].damper_table[1] == (0.3, 1300.0)
+    assert both.track.friction == (0.2, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("keys", "how", "words"),
+    [
+        (["primary.stifness.z"], {}, "primary.stifness.z"),
+        ([PRIMARY], {"band": (30.0, 5.0)}, "two frequencies above 0 that rise"),
+        ([PRIMARY], {"band": (0.5, 90.0)}, "225 at least for a band up to 90 Hz"),
+        ([PRIMARY], {"form": "shapes"}, "history, spectra, sections"),
+        ([PRIMARY + ":2:3"], {}, "factors below and above 1"),
+    ],
+)
+def test_bad_input_is_one_line(found, keys, how, words):
+    with pytest.raises(railsim.InputError) as caught:
+        railsim.identify(quarter(), found[1], keys, workers=1, **how)
+    assert len(caught.value.faults) == 1
+    assert words in str(caught.value)
+
+
+def test_channels_of_another_vehicle_are_refused(found):
+    with pytest.raises(railsim.InputError) as caught:
+        railsim.identify("coach_25t", found[1], ["bodies.carbody.mass"], workers=1)
+    assert "has no sensor 'on_frame'" in str(caught.value)
+
+
+def test_the_command_writes_vehicle_page_and_json(found, tmp_path):
+    _, path, kept = found
+    base = tmp_path / "base.toml"
+    base.write_text(quarter().to_toml())
+    out = tmp_path / "fit"
+    arguments = ["identify", str(base), str(path), "-p", f"{PRIMARY},{DAMPER}", "-p", SECONDARY]
+    out.mkdir()
+    (out / "evaluations").mkdir()
+    for file in kept.iterdir():
+        (out / "evaluations" / file.name).write_bytes(file.read_bytes())
+    more = ["--band", "0.5:14", "--workers", "1", "--out", str(out), "--quiet"]
+    done = CliRunner().invoke(command_line, [*arguments, *more], standalone_mode=False)
+    assert done.exception is None
+    record = json.loads((out / "identified.json").read_text())
+    assert [p["name"] for p in record["parameters"]] == list(FACTORS)
+    assert "Identified" in (out / "identified.toml").read_text()
+    assert "white" in (out / "report.html").read_text()
+    assert not (out / "evaluations").exists()
+
+
+@pytest.mark.further
+def test_intervals_cover_their_share(tmp_path):
+    """95 % intervals of 5 parameters over 40 seeds hold the true value in 90 to 98 %."""
+    keys = {PRIMARY: 0.9, DAMPER: 1.1, SECONDARY: 1.1, "secondary.damping.z": 0.9, MASS: 1.05}
+    inside = []
+    for seed in range(40):
+        path = measured(tmp_path, quarter(), keys, seed=seed, name=f"run{seed}", noise=0.05)
+        one = railsim.identify(quarter(), path, list(keys), band=(0.5, 14.0), workers=1)
+        true = np.array(list(keys.values()))
+        inside.append((one.intervals[:, 0] < true) & (true < one.intervals[:, 1]))
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+@pytest.mark.further
+@pytest.mark.parametrize("form", ["spectra", "sections"])
+def test_spectra_and_sections_find_the_parameters_too(tmp_path, form):
+    path = measured(tmp_path, quarter(), FACTORS)
+    one = railsim.identify(quarter(), path, list(FACTORS), band=(0.5, 14.0), form=form, workers=1)
+    assert one.factors == pytest.approx(list(FACTORS.values()), rel=0.05)
+
+
+@pytest.mark.further
+def test_eight_parameters_of_a_coach(tmp_path):
+    """Off by up to 30 %, 2 % noise, 2 km at 50 m/s: within 3 sigma, the springs within 2 %."""
+    keys = {
+        "coil_spring.stiffness.z": 1.25, "primary_vertical_damper.damper_table": 0.75,
+        "secondary_spring.stiffness.z": 1.2, "secondary_vertical_damper.damper_table": 1.3,
+        "secondary_lateral_damper.damper_table": 0.8, "arm_bush.stiffness.y": 0.8,
+        "bodies.carbody.mass": 1.1, "anti_roll_bar.stiffness": 1.3,
+    }  # fmt: skip
+    track = railsim.load_track("straight", [
+        'irregularities=[{type="random",spectrum="erri_b176_low",seed=7}]', "plan.0.length=2200.0",
+        "cant=[]",
+    ])  # fmt: skip
+    vehicle = railsim.load_vehicle("coach_25t")
+    true = Model(vehicle, track).with_parameters(parsed(keys, vehicle, track),
+                                                 np.log(list(keys.values())))  # fmt: skip
+    outputs = {"low_pass": {"frequency": 150.0}, "sensors": "readings", "quantities": ["distance"]}
+    settings = railsim.Settings.model_validate({"output_rate": 500.0, "outputs": outputs})
+    run = railsim.simulate(true.vehicle, track, speed=50.0, until=2000.0, settings=settings)
+    rng = np.random.default_rng(1)
+    points = [
+        "axlebox_1_left",
+        "axlebox_4_right",
+        "frame_1",
+        "frame_3",
+        "floor_front",
+        "floor_rear",
+    ]
+    channels, lines = {}, []
+    for point in points:
+        for axis in "yz":
+            x = run.series("sensor_acceleration", sensor=point, axis=axis)
+            name = f"{point}_{axis}"
+            channels[name] = x + 0.02 * np.std(x) * rng.standard_normal(len(x))
+            lines.append(f'{name} = {{ quantity = "sensor_acceleration:{point}:{axis}" }}')
+    np.savetxt(tmp_path / "run.csv", np.column_stack([run.time, run.distance, *channels.values()]),
+               delimiter=",", header=",".join(["t", "s", *channels]), comments="")  # fmt: skip
+    (tmp_path / "run.toml").write_text(
+        'format = "railsim-measurement/1"\nname = "run"\nfile = "run.csv"\nspeed = 50.0\n'
+        '[channels]\nt = { quantity = "time" }\ns = { quantity = "distance" }\n' + "\n".join(lines)
+    )
+    one = railsim.identify(
+        vehicle, tmp_path / "run.toml", list(keys), track=track, band=(0.3, 40.0)
+    )
+    error = one.x - np.log(list(keys.values()))
+    assert np.all(np.abs(error) < 3.0 * one.deviations)
+    assert np.all(np.abs(error[:3]) < 0.02)

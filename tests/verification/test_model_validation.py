@@ -1,0 +1,179 @@
+"""A model against a test: the statistics by hand, the synthetic run of examples/measured_run."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import railsim
+from railsim.assessment.model_comparison import QUANTITIES, Comparison, Pair
+from railsim.cli import railsim as command_line
+
+FOLDER = Path(__file__).parents[2] / "examples" / "measured_run"
+sys.path.insert(0, str(FOLDER))
+import make  # noqa: E402
+
+# a table of twelve sections: measured and simulated, kN
+MEASURED = [31.0, 28.5, -30.2, 33.1, 29.9, -27.4, 35.0, 30.5, 32.2, -29.1, 28.8, 31.7]
+SIMULATED = [33.0, 27.5, -33.2, 33.6, 31.9, -26.4, 36.5, 30.0, 35.2, -30.6, 29.8, 32.2]
+
+
+def comparison(measured, simulated, limit=5e3):
+    pairs = tuple(
+        Pair("Y_qst", "run", "wheelset 1 outer", 100.0 * k, 100.0 * k + 100.0, 500.0, m, s)
+        for k, (m, s) in enumerate(zip(measured, simulated, strict=True))
+    )
+    return Comparison(QUANTITIES["Y_qst"], pairs, limit, 2.0 * limit / 3.0, 12)
+
+
+def test_mean_and_deviation_of_twelve_sections_by_hand():
+    """Differences 2, -1, 3, .5, 2, -1, 1.5, -.5, 3, 1.5, 1, .5 kN: sum 12.5, squares 34.25."""
+    found = comparison(1e3 * np.array(MEASURED), 1e3 * np.array(SIMULATED))
+    assert found.mean == pytest.approx(12.5e3 / 12.0, rel=1e-12)
+    by_hand = 1e3 * ((34.25 - 12.5**2 / 12.0) / 11.0) ** 0.5
+    assert found.deviation == pytest.approx(by_hand, rel=1e-12)
+    assert (found.sections, found.verdict) == (12, "pass")
+
+
+def test_mean_and_deviation_decide_each_and_eleven_sections_do_not():
+    measured = 1e3 * np.array(MEASURED)
+    outwards = np.sign(measured)
+    assert comparison(measured, measured + 3.3e3 * outwards).verdict == "pass"
+    assert comparison(measured, measured + 3.4e3 * outwards).verdict == "fail"
+    scatter = 4e3 * np.tile([1.0, -1.0], 6)
+    assert comparison(measured, measured + scatter).verdict == "pass"
+    assert comparison(measured, measured + 1.3 * scatter).verdict == "fail"
+    # both changes of sign mirror the track: nothing changes
+    assert comparison(-measured, -measured - scatter).deviation == pytest.approx(
+        comparison(measured, measured + scatter).deviation
+    )
+    assert comparison(measured[:11], measured[:11]).verdict == "incomplete"
+
+
+def simulated(vehicle, until=None, **outputs):
+    track = railsim.load_track(FOLDER / "track.toml")
+    settings = {"output_rate": 100.0, "outputs": {**make.OUTPUTS, **outputs}}
+    return railsim.simulate(
+        vehicle, track, speed=make.SPEED, until=until,
+        settings=railsim.Settings.model_validate(settings),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return railsim.load_measurement(FOLDER / "run.toml")
+
+
+@pytest.fixture(scope="module")
+def right():
+    return simulated(make.true_vehicle())
+
+
+def scaled(vehicle, group, element, key, factor):
+    """A vehicle with one value of an element times a factor."""
+    home = vehicle.assemblies["bogie"]
+    home = home.assemblies["axle"] if group == "axle" else home
+    value = getattr(home.elements[element], key)
+    rows = np.array(value)
+    if rows.ndim == 2:
+        rows[:, 1] *= factor
+    else:
+        rows = factor * rows
+    return vehicle.with_values({f"{element}.{key}": rows})
+
+
+def undamped(vehicle):
+    for group, element in (("axle", "primary"), ("bogie", "secondary")):
+        vehicle = scaled(vehicle, group, f"{element}_vertical_damper", "damper_table", 1e-3)
+    return vehicle
+
+
+def test_the_right_model_passes_and_its_place_is_found(measured, right):
+    found = railsim.validate_model(measured, right)
+    assert found.verdict == "pass"
+    assert min(one.sections for one in found.comparisons) >= 12
+    assert {one.quantity.name for one in found.comparisons} == set(QUANTITIES)
+    for one in found.comparisons:
+        assert abs(one.mean) < 0.05 * one.limit
+        assert one.deviation < 0.1 * one.limit
+    (moved,) = [remark for remark in found.remarks if "arc length" in remark]
+    shift = float(moved.split("by ")[1].split(" m")[0])
+    assert shift == pytest.approx(-make.SHIFT, abs=0.3)
+
+
+def test_missing_vertical_dampers_fail_in_the_vertical(measured):
+    found = railsim.validate_model(measured, simulated(undamped(make.true_vehicle())))
+    assert found["body_z_rms"].verdict == "fail"
+    lateral = ("Y_qst", "sum_Y_qst", "Q_qst", "body_y_qst")
+    assert {found[name].verdict for name in lateral} == {"pass"}
+
+
+@pytest.mark.further
+def test_load_stiffness_and_small_faults(measured, right):
+    """Laden for empty: wheel loads; secondary springs x 3: the ride; primary + 30 %: seen."""
+    true = make.true_vehicle()
+    laden = railsim.validate_model(measured, simulated(true.with_values({"load": "laden"})))
+    assert laden["Q_qst"].verdict == laden["Q_max"].verdict == "fail"
+    hard = scaled(true, "bogie", "secondary_spring", "stiffness", 3.0)
+    hard = railsim.validate_model(measured, simulated(hard))
+    assert {hard[name].verdict for name in ("body_z_max", "body_z_rms")} == {"fail"}
+    own = railsim.validate_model(measured, right)
+    primary = scaled(true, "axle", "coil_spring", "stiffness", 1.3)
+    primary = railsim.validate_model(measured, simulated(primary))
+    assert primary.verdict == "pass"
+    assert primary["Q_max"].deviation > 2.0 * own["Q_max"].deviation
+    assert abs(primary["Y_qst"].mean) > 5.0 * abs(own["Y_qst"].mean)
+
+
+def test_swapped_signs_wrong_units_and_late_channels_are_said(measured, right):
+    definition = measured.definition
+    channels = dict(measured.channels)
+    channels["frame1y"] = -channels["frame1y"]
+    channels["floor1z"] = 1e3 * channels["floor1z"]
+    channels["frame1z"] = np.roll(channels["frame1z"], 30)
+    spoilt = railsim.Measurement(
+        definition, measured.time, measured.distance, measured.speed, channels
+    )
+    said = "\n".join(railsim.validate_model(spoilt, right).remarks)
+    assert "frame1y has the opposite sign" in said
+    assert "floor1z is 1000 times the simulated one" in said
+    assert "frame1z comes 300 ms later" in said
+    assert "Q1L" not in said
+
+
+def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
+    run = tmp_path / "run.h5"
+    right.to_hdf5(run)
+    arguments = ["validate-model", str(FOLDER / "run.toml"), str(run)]
+    done = CliRunner().invoke(command_line, [*arguments, "--json"], standalone_mode=False)
+    found = json.loads(done.output)
+    assert found["verdict"] == "pass"
+    assert len(found["quantities"]) == len(QUANTITIES)
+    tight = tmp_path / "tight.toml"
+    tight.write_text(
+        'format = "railsim-validation-limits/1"\nedition = "own"\nsections = 12\nmean = 0.5\n'
+        '[limits]\nY_qst = { constant = 1.0, source = "own" }\n'
+    )
+    more = ["--limits", str(tight), "--fail", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(command_line, [*arguments, *more], standalone_mode=False)
+    assert done.return_value == 4
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "does not match the test" in page
+    assert len(list((tmp_path / "out").iterdir())) == 5
+
+
+def test_bad_input_is_one_line(measured, right, tmp_path):
+    manchester = simulated(railsim.load_vehicle("coach_manchester"), 60.0, quantities=["Q"])
+    cases = [
+        (lambda: railsim.validate_model([measured, measured], right), "1 results for 2 measured"),
+        (lambda: railsim.validate_model(measured, manchester), "no quantity 'Y'"),
+        (lambda: railsim.validate_model(measured.part(0.0, 100.0), right), "no section"),
+        (lambda: railsim.validate_model(measured, right, limits="en14363"), "railsim-validation"),
+    ]
+    for call, words in cases:
+        with pytest.raises(railsim.InputError) as caught:
+            call()
+        assert words in str(caught.value)
