@@ -10,6 +10,7 @@ from rig import test_vehicle
 import railsim
 from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle import Vehicle
+from railsim.identification import Identified
 from railsim.identification.parameters import Model, parsed, scaled
 from railsim.identification.residuals import whiteness
 
@@ -150,6 +151,21 @@ def in_series():
     return Vehicle.model_validate(vehicle)
 
 
+def test_a_combination_that_nothing_shows_is_said_in_words():
+    """Two springs in series: k = k1 k2/(k1 + k2), d ln k = (k2 d ln k1 + k1 d ln k2)/(k1 + k2)."""
+    vehicle = in_series()
+    names = ["lower.stiffness.z", "upper.stiffness.z"]
+    parameters = parsed(names, vehicle, TRACK)
+    row = np.array([[1.0, 3.0]]) / 4.0  # k1 = 3 k2
+    _, singular, vectors = np.linalg.svd(np.vstack([1e3 * row, [[1e-9, 0.0]]]))
+    one = Identified(vehicle, tuple(parameters), np.zeros(2), np.eye(2), singular, vectors, ())
+    (words,) = one.unidentified
+    assert "cannot tell apart lower.stiffness.z and upper.stiffness.z" in words
+    assert "lower.stiffness.z by +10.0 %, upper.stiffness.z by -3.3 %" in words
+    assert "infinite" in words
+
+
+@pytest.mark.further
 def test_two_springs_in_series_are_named(tmp_path):
     lower, upper = "lower.stiffness.z", "upper.stiffness.z"
     path = measured(tmp_path, in_series(), {upper: 0.8})
