@@ -139,6 +139,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         atexit.register(gc.freeze)
     # the commands print themselves what the library logs
     logging.getLogger("railsim").addHandler(logging.NullHandler())
+    # without a home matplotlib says at every start where it keeps its fonts instead
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     usable_streams()
     if arguments is None and COMPLETE in os.environ:
         from click.shell_completion import shell_complete

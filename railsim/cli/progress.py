@@ -18,6 +18,7 @@ from railsim.text import counted_remarks
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing
 COMPILING = "preparing: compiling (after an installation; about a minute, kept for later)"
+UNCACHED = "not kept: there is no folder for it, give one by RAILSIM_CACHE_DIR"
 CAUSES = {
     "numba.core.compiler_machinery": COMPILING,  # runs the passes; loading is elsewhere
     "railsim.contact.table": "preparing: the contact table of new profiles (kept for later)",
@@ -45,7 +46,13 @@ def _report_causes(ended: Event) -> None:
         words = _cause()
         if words and words not in _reported:
             _reported.add(words)
-            echo(words, err=True)
+            echo(words if _is_cached() else words.replace("kept for later", UNCACHED), err=True)
+
+
+def _is_cached() -> bool:
+    """Whether what is prepared is kept on the disk."""
+    cache = sys.modules.get("railsim.kernels.cache")
+    return not any("is not used" in notice for notice in getattr(cache, "notices", ()))
 
 
 @contextmanager

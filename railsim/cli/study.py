@@ -362,7 +362,7 @@ def _print_remark(text: str) -> None:
 
 def _print_end(outcome: "Outcome") -> None:
     there = len(outcome.records) - outcome.computed
-    present = f", {there} were there" if there else ""
+    present = f", {there} were there already" if there else ""
     done = outcome.computed - len(outcome.failed)
     echo(f"{done} of {len(outcome.records)} runs computed{present}")
     if outcome.failed:

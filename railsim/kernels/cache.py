@@ -68,7 +68,7 @@ def own_folder(*names: str, base: Path | None = None) -> Path | None:
             folder = folder.resolve()
             reason = _distrust(folder, top.resolve())
     except (OSError, RuntimeError) as error:
-        reason = str(getattr(error, "strerror", None) or error)
+        folder, reason = top, str(getattr(error, "strerror", None) or error)
     if reason:
         notice(
             f"the cache {folder} is not used, each start compiles again: {reason}; choose another "

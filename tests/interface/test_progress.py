@@ -5,6 +5,7 @@ import time
 import pytest
 
 from railsim.cli import progress
+from railsim.kernels import cache
 
 
 @pytest.fixture(autouse=True)
@@ -31,6 +32,14 @@ def test_the_cause_is_named_once(module, words, capsys):
     assert len(said) == 1
     assert said[0].startswith("preparing: ")
     assert words in said[0]
+
+
+def test_what_is_not_kept_is_not_said_to_be(capsys, monkeypatch):
+    monkeypatch.setitem(cache.notices, "the cache /proc/x is not used, each start compiles", None)
+    with progress.progress_bar("run", quiet=False):
+        work("railsim.contact.table")
+    said = capsys.readouterr().err
+    assert "(not kept: there is no folder for it, give one by RAILSIM_CACHE_DIR)" in said
 
 
 def test_nothing_is_said_where_nothing_is_prepared(capsys):
