@@ -37,12 +37,15 @@ FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sect
     help="With wheel forces, or with accelerations only.",
 )  # fmt: skip
 @click.option(
-    "--admissible-speed", type=Speed(), metavar="V", help="Instead of the vehicle's, in m/s."
+    "--admissible-speed",
+    type=Speed(),
+    metavar="V",
+    help="Admissible speed in m/s, instead of the vehicle's.",
 )
 @click.option("--cant-deficiency", type=float, metavar="I", help="Admissible cant deficiency in m.")
 @click.option(
     "--category", type=click.Choice(["passenger", "freight", "locomotive", "multiple_unit"]),
-    help="Instead of the vehicle's.",
+    help="Category, instead of the vehicle's.",
 )  # fmt: skip
 @click.option(
     "--causal", is_flag=True, help="Causal filters, with phase, as in measuring amplifiers."

@@ -57,7 +57,7 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @click.option(
     "--excitation",
     metavar="A,B,...",
-    help="Sizes in m of the disturbances that hunting is sought from; default: 1 to 8 mm.",
+    help="Disturbances from which hunting is sought, in m; default: 1 to 8 mm.",
 )
 @linearisation_options
 @click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     type=Speed(),
     multiple=True,
     metavar="V",
-    help="Speed for the cant deficiency in the curves of a track, m/s; may be given several times.",
+    help="Speed for the cant deficiency in the curves of a track, m/s or with a unit; may be "
+    "given several times.",
 )
 @click.option(
     "--static",

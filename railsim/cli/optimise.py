@@ -59,13 +59,12 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Seek the best compromises of a vehicle's parameters.
+    """Find the parameters of a vehicle that give the best compromises between objectives.
 
     STUDY is a study file with a table [optimise]: variables with bounds, objectives and
-    constraints over any quantity of its summary.  DIR receives the front, what the objectives
-    depend on, a vehicle file of the chosen design, and the study of all runs.  What is done there
-    is not computed again: the command can be repeated after an interruption, or with more
-    evaluations.
+    constraints over any quantity of its summary.  DIR receives the Pareto front, sensitivities,
+    a vehicle file of the chosen design, and the study of all runs.  Finished runs are not repeated:
+    the command can be given again after an interruption, or with more evaluations.
 
     \b
     Example:

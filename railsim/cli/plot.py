@@ -42,7 +42,9 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
     "--between", type=float, nargs=2, metavar="A B", help="Range of the horizontal axis to show."
 )
 @click.option("--against", metavar="KEY", help="Of a study: the parameter of the horizontal axis.")
-@click.option("--family", metavar="KEY", help="Of a study: the parameter that tells curves apart.")
+@click.option(
+    "--family", metavar="KEY", help="Of a study: the parameter with a curve for each value."
+)
 @click.option(
     "--kind",
     type=click.Choice(["curves", "map", "ranking"]),
@@ -65,17 +67,17 @@ def command(
 ) -> None:
     """Draw quantities of a result or of a study, or a track with its curvature and cant.
 
-    Without a QUANTITY: wheel load change, lateral force, derailment quotient, roll, lateral
+    Without a QUANTITY: wheel load change, track shift force, derailment quotient, roll, lateral
     displacement and yaw.  A QUANTITY may select wheels, bodies and components: Y:1:left is the left
     wheel of the leading wheelset, body_acceleration:carbody:y the lateral acceleration of the
-    carbody.
+    car body.
 
-    Of a track with a measured irregularity, `recording` draws it as read and as it acts, with its
-    spectra beside those of ERRI B176.
+    Of a track with a measured irregularity, `recording` draws it as measured and as applied, with
+    its spectra beside those of ERRI B176.
 
     Of a STUDY, its folder or summary.csv: values of its summary such as Y_over_Q_abs or
     sum_abs_Y_mid1 over the parameter of most values, a curve for each value of the next, or as
-    --against, --family and --kind say.
+    set by --against, --family and --kind.
 
     \b
     Example:

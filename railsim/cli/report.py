@@ -41,9 +41,9 @@ def command(
 ) -> None:
     """Write one self-contained page about results or studies.
 
-    What was run, peaks, values against limits, curves to zoom and read off, the spread over what a
-    study varied, published values where there are any, failures and remarks.  The page needs no
-    network; it can be sent and printed.
+    Inputs, peaks, values against limits, curves to zoom, spread over the varied parameters of a
+    study, comparison with published values, failures and remarks.  The page needs no network; it
+    can be sent and printed.
 
     \b
     Example:

@@ -201,7 +201,7 @@ def fatigue(
 @command.command()
 @click.argument("file", metavar="FILE")
 @click.option("--out", metavar="F.toml", help="Vehicle file to write; by default to stdout.")
-@click.option("--load", metavar="NAME", help="Load at which the springs are taken.")
+@click.option("--load", metavar="NAME", help="Load at which the stiffness of the springs is taken.")
 @click.option("--extends", metavar="VEHICLE", help="Vehicle to extend instead of vehicle.extends.")
 @set_option
 @output_options

@@ -44,11 +44,11 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Put a vehicle on twisted track and on cant, and compare wheel loads and floor with limits.
+    """Compare a vehicle on twisted track and on cant with limits.
 
-    Unloading on the twists of EN 14363, 6.1, with dry friction from both directions, guiding force
-    in a level curve of R 150 m over the least load on them, unloading and angle of the floor on a
-    cant equal to the admissible cant deficiency, and the roll coefficient.
+    Wheel unloading on the twists of EN 14363, 6.1, with dry friction from both directions; guiding
+    force in a level curve of R 150 m over the smallest wheel load on these twists; wheel unloading
+    and angle of the floor on a cant equal to the admissible cant deficiency; roll coefficient.
 
     \b
     Example:

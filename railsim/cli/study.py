@@ -101,7 +101,7 @@ def _is_number(text: str) -> bool:
 @click.option(
     "--quantities",
     metavar="FILE.py:FUNCTION",
-    help="Function that is given each result and returns further numbers by their names.",
+    help="Function called with each result; it returns further numbers by name.",
 )
 @click.option("--scenario", metavar="F", help="Scenario instead of tracks and speeds.")
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
@@ -125,9 +125,9 @@ def _is_number(text: str) -> bool:
     default=1,
     metavar="N",
     show_default=True,
-    help="Up to N runs that differ in the vehicle only share a call of the time loop: the same "
-    "results for 15 to 20 % less of its time. Runs with different time steps are computed "
-    "separately.",
+    help="Up to N runs that differ in the vehicle only are computed in one call of the time loop: "
+    "same results, 15 to 20 % less CPU time in the loop. Runs with different time steps are "
+    "computed separately.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
 @click.option("--resume", is_flag=True, help="Continue the study in DIR; compute what has changed.")

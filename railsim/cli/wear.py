@@ -75,9 +75,9 @@ def command(
 
     Each step runs every track once with the wheel profile of the step, averages the wear of all
     wheels and subtracts it from the profile.  With --out finished steps are kept: the same command
-    continues after them, and so does one with a longer distance and --overwrite.  A loop that ends
-    early, at a limit of the wheel, or since a run does or a step wears too much, writes what was
-    done.
+    continues after them, and so does one with a longer distance and --overwrite.  If the
+    loop ends early (the wheel reaches a limit, a run ends early, or a step wears too much), the
+    finished steps are written.
 
     \b
     Example:
@@ -111,7 +111,9 @@ def command(
     metavar="VEHICLE V SHARE", help="A vehicle, its speed in m/s or with a unit, and its share of "
     "the tonnage in any unit; may be repeated.",
 )  # fmt: skip
-@click.option("--tonnage", "distance", required=True, type=float, metavar="MT", help="In Mt.")
+@click.option(
+    "--tonnage", "distance", required=True, type=float, metavar="MT", help="Traffic in Mt."
+)
 @click.option(
     "--step", required=True, type=float, metavar="MT",
     help="Tonnage in Mt between two updates of the rail profiles.",
@@ -130,8 +132,9 @@ def rails(
 ) -> None:
     """Compute the wear of both rails of a track under a mix of traffic, updating their profiles.
 
-    The mean over the track is worn off: let it be of one curvature.  The laws are those of the
-    wheels; the wheels do not wear.  Steps, kept steps and ends are those of `railsim wear`.
+    The mean wear over the track is removed from the profiles, so the track should have one
+    curvature.  The laws are those of wheels; the wheels do not wear.  Steps are kept and continued
+    as by `railsim wear`.
 
     \b
     Example:

@@ -102,7 +102,7 @@ def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
     data = json.loads(capsys.readouterr().out)[0]
     assert data["verdict"] == "incomplete"
     assert data["verdicts"]["ride"]["verdict"] == "fail"
-    assert "body lateral, ride" in data["verdicts"]["ride"]["reasons"][0]
+    assert "lateral body acceleration" in data["verdicts"]["ride"]["reasons"][0]
 
 
 # correction for high friction ---------------------------------------------------------------------
