@@ -55,6 +55,7 @@ COMMANDS = {
     "wear": "Wheel profile over the distance run, with the worn profile run again.",
     "rail-wear": "Rail profiles over the tonnage of a mix of traffic.",
     "irregularity": "The track and wheel forces from accelerations of a vehicle.",
+    "assess-track": "A recorded track judged by vehicles, beside geometry limits.",
     "contact": "Contact geometry of a wheel on a rail, equivalent conicity.",
     "spring": "Trailing-arm suspension: design and verify its coil springs.",
     "mechanism": "Planar linkages: kinematics, forces, optimisation.",

@@ -334,7 +334,8 @@ class _Smooth:
         read = np.pad(piece.signals - _means(piece.signals, piece.there), ((0, 0), (0, points - n)))
         read[:, :n] *= where
         spectra, left = np.fft.rfft(read, axis=1), list(range(len(read)))
-        G, wrong = fields.data_covariance(), set()
+        wrong: set[int] = set()
+        G = fields.data_covariance()
         while len(left) > FEWEST and len(wrong) < len(read) // 3:
             inverse = np.linalg.inv(G[:, left][:, :, left])
             own = np.einsum("kcc->ck", inverse).real

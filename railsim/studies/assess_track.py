@@ -1,0 +1,497 @@
+"""A track judged by vehicles: `assess_track`.
+
+The recording is divided into pieces that overlap by a run-in; each piece is one run of each vehicle
+at each speed, carried out as a study: over all cores, with journal, to be resumed.  Of the signals,
+low-passed at 20 Hz and sum Y as mean over 2 m, as in EN 14363, the largest shares of their limits
+are kept per cell of 25 m; places are where a share exceeds the one asked for.
+
+Beside it stands what the geometry alone says after EN 13848-5: standard deviations of level and
+alignment in D1 over 200 m, and isolated defects.  A section of 200 m that only the vehicles
+complain of is a miss of the geometry, one that only the geometry complains of a false alarm.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from railsim.definitions.excitations.measured import Measured
+from railsim.definitions.excitations.measured_file import embed_measured
+from railsim.definitions.excitations.recording import BANDS, band_passed
+from railsim.definitions.limits import Situation
+from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle_tables import Service
+from railsim.errors import Fault, InputError, argument_fault
+from railsim.files import check_folder, whole_file
+from railsim.result import Result, open_result
+from railsim.studies.carry_out import carry_out
+from railsim.studies.case import Case, short_name
+from railsim.studies.plan import name_faults
+from railsim.studies.points import Point
+from railsim.studies.records import Record
+from railsim.studies.spec import Execution, RunSpec, StudySpec
+from railsim.table import Column, Table
+from railsim.track.irregularity import displacement
+
+Floats = NDArray[np.float64]
+
+PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
+CELL, SECTION, APART = 25.0, 200.0, 25.0  # m
+RATE, LOW_PASS, SLIDING = 100.0, 20.0, 2.0  # 1/s, Hz, m
+STEP, AROUND = 0.25, 15.0  # m
+QUANTITIES = {
+    "Q": "Q", "Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "acceleration of the floor, y",
+    "body_z": "acceleration of the floor, z",
+}  # fmt: skip
+# EN 13848-5: speed up to [km/h]; alert limit (least) of the standard deviations of level and of
+# alignment, intervention limit (least) of isolated defects of both, D1 [mm].  From memory.
+GEOMETRY = (
+    (80.0, 2.3, 1.5, 17.0, 15.0),
+    (120.0, 1.8, 1.2, 13.0, 11.0),
+    (160.0, 1.4, 1.0, 10.0, 8.0),
+    (230.0, 1.2, 0.8, 9.0, 7.0),
+    (300.0, 1.0, 0.7, 8.0, 6.0),
+)
+UNCHECKED = "The limits of EN 13848-5 are from memory, not compared with the printed standard."
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place at which a vehicle exceeds the share of a limit.
+
+    Attributes
+    ----------
+    vehicle : str
+    speed : float
+        [m/s].
+    quantity : str
+        Of `QUANTITIES`.
+    where : str
+        Wheel, wheelset or point.
+    s : float
+        Of that wheelset or point [m].
+    value, limit : float
+        [SI].
+    shape : str
+        The defect there in words.
+    """
+
+    vehicle: str
+    speed: float
+    quantity: str
+    where: str
+    s: float
+    value: float
+    limit: float
+    shape: str
+
+
+@dataclass(frozen=True, eq=False)
+class TrackAssessment:
+    """A track judged by vehicles, and by its geometry.
+
+    Attributes
+    ----------
+    folder : Path
+    share : float
+        Of the limits, from which on a place is listed [1].
+    places : tuple of Place
+        By falling share of the limit.
+    cells : float64[c]
+        Begins of the cells [m].
+    shares : dict of (str, float, str) to float64[c]
+        Largest share of the limit per cell, by vehicle, speed and quantity.
+    sections : Table
+        What vehicles and geometry say of each section of 200 m.
+    flagged : int64[4]
+        Number of sections that both, only vehicles (misses), only the geometry (false alarms) and
+        none complain of.
+    computed : int
+        Runs that were computed by this call.
+    remarks : tuple of str
+    """
+
+    folder: Path
+    share: float
+    places: tuple[Place, ...]
+    cells: Floats
+    shares: dict[tuple[str, float, str], Floats]
+    sections: Table
+    flagged: NDArray[np.int64]
+    computed: int
+    remarks: tuple[str, ...]
+
+    def table(self) -> Table:
+        """Return the places."""
+        columns: list[Column | str] = ["vehicle", Column("speed", unit="km/h", format=".0f"),
+                   Column("s", "at s", "m", ".0f"), "quantity", "location",
+                   Column("value", "value (SI)", "", ".4g"),
+                   Column("share", "of the limit", "", ".2f"),
+                   "shape"]  # fmt: skip
+        rows = [[p.vehicle, p.speed, p.s, QUANTITIES[p.quantity], p.where, p.value,
+                 p.value / p.limit, p.shape] for p in self.places]  # fmt: skip
+        return Table(columns, rows)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Misses and false alarms in words."""
+        both, missed, false, none = self.flagged.tolist()
+        return (
+            f"Of {both + missed + false + none} sections of {SECTION:g} m vehicles and geometry "
+            f"both flag {both}, only the vehicles {missed} (missed by geometry limits), only "
+            f"geometry limits {false} (false alarms).",
+            UNCHECKED,
+            *self.remarks,
+        )
+
+    def record(self) -> dict[str, Any]:
+        """Return the assessment as plain data, SI."""
+        both, missed, false, none = self.flagged.tolist()
+        return {
+            "share": self.share, "places": self.table().records(),
+            "sections": self.sections.records(),
+            "flagged": {"both": both, "missed": missed, "false_alarms": false, "none": none},
+            "remarks": [UNCHECKED, *self.remarks],
+        }  # fmt: skip
+
+    def write(self) -> list[Path]:
+        """Write places and sections as CSV into the folder of the runs."""
+        written = []
+        for name, table in (("places.csv", self.table()), ("sections.csv", self.sections)):
+            with whole_file(self.folder / name) as partial:
+                partial.write_text(table.csv(), encoding="utf-8")
+            written.append(self.folder / name)
+        return written
+
+
+def assess_track(
+    recording: str | Path,
+    vehicles: Sequence[str | Path],
+    speeds: Sequence[float],
+    *,
+    out: str | Path,
+    share: float = 0.8,
+    workers: int | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[float], None] | None = None,
+    on_record: Callable[[Record], None] | None = None,
+) -> TrackAssessment:
+    """Run vehicles over a recorded track and list where they exceed a share of a limit.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Track file with a measured irregularity, or the CSV of one: then straight track.
+    vehicles : sequence of str or Path
+        Files or names; each needs a service table.
+    speeds : sequence of float
+        [m/s].
+    out : str or Path
+        Folder of the runs.
+    share : float
+        Of the limits of EN 14363.
+
+    Others as in `railsim.study`.
+
+    Raises
+    ------
+    InputError
+        All faults of the inputs; no recording in the track.
+    """
+    if not 0.0 < share <= 10.0:
+        raise InputError([argument_fault("share", "", f"found {share:g}", "above 0, up to 10")])
+    folder = Path(out)
+    check_folder(folder)
+    track = recorded(recording)
+    tested = {short_name(name): load_vehicle(name) for name in vehicles}
+    missing = [n for n, v in tested.items() if v.service is None]
+    if missing:
+        allowed = "add [service] with admissible_speed and cant_deficiency"
+        raise InputError([Fault(name, "service", "missing", allowed) for name in missing])
+    begin, end = _extent(track)
+    count = max(1, round((end - begin) / PIECE))
+    edges = np.linspace(begin, end, count + 1)
+    outputs: Any = {
+        "low_pass": {"frequency": LOW_PASS},
+        "quantities": ["Q", "Y", "Y_over_Q", "sum_Y", "wheelset_distance"],
+        "sensors": "readings",
+    }
+    settings = Settings(output_rate=RATE, outputs=outputs)
+    cases: list[Case] = []
+    pieces: dict[str, tuple[float, float, float]] = {}
+    for number, (a, b) in enumerate(pairwise(edges)):
+        part, moved = _part(track, float(a), float(b))
+        for name, vehicle in tested.items():
+            for speed in speeds:
+                label = f"{name}_{speed:g}_{number:04d}"
+                start = max(0.0, float(a) - moved - RUN_IN)
+                cases.append(
+                    Case(label, vehicle, part, settings, float(speed), start,
+                         until=min(float(b) - moved, part.length),
+                         labels={"vehicle": name, "track": part.name, "speed": float(speed)})
+                )  # fmt: skip
+                pieces[label] = (float(a), float(b), moved)
+    spec = StudySpec(
+        vehicles=[str(v) for v in vehicles], tracks=[str(recording)], speeds=list(speeds),
+        single=True, keep="Q,Y,Y_over_Q,sum_Y,wheelset_distance,sensor_acceleration",
+    )  # fmt: skip
+    execution = Execution(workers=workers, resume=resume, overwrite=overwrite, longest_first=True,
+                          progress=progress, on_record=on_record)  # fmt: skip
+    outcome = carry_out(_Cases(cases), spec, folder, execution)
+    remarks = [
+        f"{record['name']}: {record['status']}, {record['status_reason']}"
+        for record in outcome.records
+        if record["status"] != "complete"
+    ]
+    return _judged(track, cases, pieces, folder, share, outcome.computed, remarks)
+
+
+class _Cases:
+    """Loaded cases in the form that `carry_out` takes."""
+
+    def __init__(self, cases: Sequence[Case]) -> None:
+        self._cases = {case.name: case for case in cases}
+        self.points = [
+            Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
+            for c in cases
+        ]
+        if faults := name_faults(self.points):
+            raise InputError(faults)
+
+    def cases(self, points: Sequence[Point]) -> list[Case]:
+        return [self._cases[point.name] for point in points]
+
+
+def recorded(recording: str | Path) -> Track:
+    """Return a track with a recording; of a CSV, on straight track as long as it is.
+
+    Raises
+    ------
+    InputError : no measured irregularity.
+    """
+    if str(recording).lower().endswith(".csv"):
+        irregular = [{"type": "measured", "file": str(Path(recording).resolve())}]
+        data: dict[str, Any] = {"irregularities": irregular}
+        if faults := embed_measured(data):
+            raise InputError(faults)
+        length = float(data["irregularities"][0]["rows"][-1][0])
+        straight = load_track("straight")
+        return straight.replace(
+            name=Path(recording).stem,
+            plan=[{"type": "STR", "length": length}],
+            cant=[{"type": "CST", "length": length, "cant": 0.0}],
+            irregularities=data["irregularities"],
+        )
+    track = load_track(recording)
+    if not any(isinstance(part, Measured) for part in track.irregularities):
+        allowed = "an irregularity of the type 'measured'"
+        raise InputError([Fault(str(recording), "irregularities", "no recording", allowed)])
+    return track
+
+
+def _extent(track: Track) -> tuple[float, float]:
+    """Where a recording begins and ends on its track [m]."""
+    found = [p.extent(track.length) for p in track.irregularities if isinstance(p, Measured)]
+    begin, end = max(0.0, min(a for a, _ in found)), min(track.length, max(b for _, b in found))
+    if end - begin < 2.0 * SECTION:
+        found_words, allowed = f"{end - begin:.0f} m", f"{2.0 * SECTION:g} m at least"
+        raise InputError([Fault(track.name, "irregularities", found_words, allowed)])
+    return begin, end
+
+
+def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
+    """Track with the rows between a and b and around them; by how much it begins later [m].
+
+    Of a straight track the part alone, of others the whole plan.
+    """
+    low, high = a - RUN_IN - BEYOND, b + BEYOND
+    straight = (
+        all(element.type == "STR" for element in track.plan)
+        and not track.vertical
+        and track.gauge_widening is None
+        and all(isinstance(part, Measured) for part in track.irregularities)
+    )
+    moved = max(0.0, low) if straight else 0.0
+    parts: list[Any] = []
+    for part in track.irregularities:
+        if isinstance(part, Measured):
+            rows = [
+                (row[0] + part.shift - moved, *row[1:])
+                for row in part.rows or ()
+                if low <= row[0] + part.shift <= high
+            ]
+            if len(rows) >= 4:
+                parts.append(part.model_copy(update={"rows": tuple(rows), "shift": 0.0}))
+        else:
+            parts.append(part)
+    changes: dict[str, Any] = {"irregularities": [p.model_dump(exclude_none=True) for p in parts]}
+    if straight:
+        length = min(high, track.length) - moved
+        changes["plan"] = [{"type": "STR", "length": length}]
+        changes["cant"] = [{"type": "CST", "length": length, "cant": 0.0}]
+    return track.replace(**changes), moved
+
+
+# what the runs say --------------------------------------------------------------------------------
+
+
+def _judged(
+    track: Track,
+    cases: Sequence[Case],
+    pieces: dict[str, tuple[float, float, float]],
+    folder: Path,
+    share: float,
+    computed: int,
+    remarks: Sequence[str],
+) -> TrackAssessment:
+    begin, end = _extent(track)
+    cells = np.arange(begin, end, CELL)
+    geometry = _Geometry(track, begin, end)
+    shares: dict[tuple[str, float, str], Floats] = {}
+    places: list[Place] = []
+    for case in cases:
+        path = folder / case.file_name
+        if not path.is_file():
+            continue
+        a, b, moved = pieces[case.name]
+        name = str(case.labels["vehicle"])
+        for quantity, where, s, value, limit in _signals(case, open_result(path)):
+            s = s + moved
+            inside = (s >= a) & (s < b)
+            if not inside.any():
+                continue
+            s, part = s[inside], value[inside] / limit
+            row = shares.setdefault((name, case.speed, quantity), np.zeros(len(cells)))
+            np.maximum.at(row, np.minimum(((s - begin) / CELL).astype(int), len(cells) - 1), part)
+            for k in _peaks(s, part, share):
+                places.append(
+                    Place(name, case.speed, quantity, where, float(s[k]), float(part[k] * limit),
+                          limit, geometry.shape(float(s[k])))
+                )  # fmt: skip
+    places = _strongest(places)
+    sections, flagged = geometry.sections(places, max(case.speed for case in cases))
+    return TrackAssessment(
+        folder, share, tuple(places), cells, shares, sections, flagged, computed, tuple(remarks)
+    )
+
+
+def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats, float]]:
+    """Quantity, location, arc length, magnitude and limit of everything that is judged."""
+    laws = load_running_limits("en14363").limits
+    service = case.vehicle.service
+    assert isinstance(service, Service)  # checked before
+
+    def limit(name: str, wheelset: int | None = None, Q0: float = 0.0) -> float:
+        at = Situation(case.vehicle, service, "1", np.inf, wheelset, Q0, laws)
+        return float(laws[name].at(at))
+
+    found = []
+    Q0 = np.asarray(result["Q0"], dtype=float)
+    at = np.asarray(result["wheelset_distance"], dtype=float)
+    rate = len(at) / float(result["time"][-1] - result["time"][0])
+    window = max(1, round(SLIDING / case.speed * rate))
+
+    def mean(x: Floats) -> Floats:
+        return np.asarray(uniform_filter1d(x, window))
+
+    for w in range(at.shape[1]):
+        load, s, number = float(Q0[w].mean()), at[:, w], f"wheelset {w + 1}"
+        for side, word in enumerate(("left", "right")):
+            found.append(("Q", f"{number} {word}", s, result["Q"][:, w, side],
+                          limit("Q", w, load)))  # fmt: skip
+            found.append(("Y_over_Q", f"{number} {word}", s, mean(result["Y_over_Q"][:, w, side]),
+                          limit("Y_over_Q", w, load)))  # fmt: skip
+        found.append(("sum_Y", number, s, np.abs(mean(result["sum_Y"][:, w])),
+                      limit("sum_Y", w, load)))  # fmt: skip
+    for point in ("floor_front", "floor_rear"):
+        for axis in "yz":
+            name = f"body_{axis}"
+            x = result.series("sensor_acceleration", sensor=point, axis=axis)
+            found.append((name, point, result["distance"], np.abs(x), limit(name)))
+    return [(n, p, np.asarray(s, float), np.asarray(v, float), m) for n, p, s, v, m in found]
+
+
+def _peaks(s: Floats, part: Floats, share: float) -> list[int]:
+    """Index of the largest value of each stretch beyond the share."""
+    beyond = np.flatnonzero(part > share)
+    if not len(beyond):
+        return []
+    groups = np.split(beyond, np.flatnonzero(np.diff(s[beyond]) > APART) + 1)
+    return [int(group[np.argmax(part[group])]) for group in groups]
+
+
+def _strongest(places: Sequence[Place]) -> list[Place]:
+    """Of places of one vehicle, speed and quantity that lie together, the one furthest beyond."""
+    kept: list[Place] = []
+    known: dict[tuple[str, float, str], list[float]] = {}
+    for place in sorted(places, key=lambda p: -p.value / p.limit):
+        others = known.setdefault((place.vehicle, place.speed, place.quantity), [])
+        if all(abs(place.s - s) > APART for s in others):
+            others.append(place.s)
+            kept.append(place)
+    return kept
+
+
+class _Geometry:
+    """Alignment, level and cross level in D1 along a recording, and what their limits say."""
+
+    def __init__(self, track: Track, begin: float, end: float) -> None:
+        function = displacement(track)
+        assert function is not None  # it has a recording
+        self.s = np.arange(begin, end, STEP)
+        parts = np.array_split(self.s, max(1, len(self.s) // 50_000))
+        rails = np.concatenate([np.asarray(function(p)[0]) for p in parts], axis=1)
+        self.rails = band_passed(rails, STEP, BANDS["D1"])
+        y_l, z_l, y_r, z_r = self.rails
+        self.kinds = {"level": 0.5 * (z_l + z_r), "alignment": 0.5 * (y_l + y_r),
+                      "cross level": z_r - z_l}  # fmt: skip
+        self.spread = {name: float(np.std(x)) or 1.0 for name, x in self.kinds.items()}
+
+    def shape(self, s: float) -> str:
+        """Words for the defect at a place: quantity, size, length over which it has one sign."""
+        near = np.flatnonzero(np.abs(self.s - s) <= AROUND)
+        sizes = {n: np.max(np.abs(x[near])) / self.spread[n] for n, x in self.kinds.items()}
+        name = max(sizes, key=lambda n: sizes[n])
+        x = self.kinds[name]
+        k = int(near[np.argmax(np.abs(x[near]))])
+        same = np.sign(x) == np.sign(x[k])
+        low, high = k, k
+        while low > 0 and same[low - 1]:
+            low -= 1
+        while high < len(x) - 1 and same[high + 1]:
+            high += 1
+        crossings = np.count_nonzero(np.diff(np.sign(x[near])))
+        repeated = ", repeated" if crossings >= 6 and sizes[name] < 4.0 else ""
+        length = STEP * (high - low + 1)
+        return f"{name} {1e3 * x[k]:+.1f} mm over {length:.1f} m{repeated}"
+
+    def sections(self, places: Sequence[Place], speed: float) -> tuple[Table, NDArray[np.int64]]:
+        """Return the table of sections, and how many each of both flags."""
+        row = next((row for row in GEOMETRY if 3.6 * speed <= row[0] + 1e-3), GEOMETRY[-1])
+        columns: list[Column | str] = [
+                   Column("begin", unit="m", format=".0f"), Column("end", unit="m", format=".0f"),
+                   Column("level", "standard deviation of level D1", "mm", ".2f"),
+                   Column("alignment", "standard deviation of alignment D1", "mm", ".2f"),
+                   Column("level_peak", "largest level D1", "mm", ".1f"),
+                   Column("alignment_peak", "largest alignment D1", "mm", ".1f"),
+                   "geometry", "vehicles"]  # fmt: skip
+        rows, flagged = [], np.zeros(4, dtype=np.int64)
+        for begin in np.arange(self.s[0], self.s[-1] - 0.5 * SECTION, SECTION):
+            there = self.rails[:, (self.s >= begin) & (self.s < begin + SECTION)]
+            deviations, peaks = there.std(axis=1), np.abs(there).max(axis=1)
+            values = [max(deviations[1], deviations[3]), max(deviations[0], deviations[2]),
+                      max(peaks[1], peaks[3]), max(peaks[0], peaks[2])]  # fmt: skip
+            by_geometry = any(1e3 * v > m for v, m in zip(values, row[1:], strict=True))
+            by_vehicles = any(begin <= p.s < begin + SECTION for p in places)
+            flagged[(0 if by_geometry else 1) if by_vehicles else (2 if by_geometry else 3)] += 1
+            words = ["flagged" if one else "" for one in (by_geometry, by_vehicles)]
+            rows.append([float(begin), float(begin + SECTION), *map(float, values), *words])
+        return Table(columns, rows), flagged

@@ -1,0 +1,105 @@
+"""`railsim assess-track`: places, pieces against one run, geometry beside it, resume, bad input."""
+
+import json
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.cli import main
+from railsim.studies import assess_track as module
+from railsim.studies.assess_track import assess_track, recorded
+from railsim.track.irregularity import displacement
+
+LENGTH, SPEED, DEFECT = 1000.0, 40.0, 640.0
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """Little irregularity, and an alignment defect of 16 mm over 12 m."""
+    path = tmp_path_factory.mktemp("recording") / "line.csv"
+    track = railsim.load_track("straight").replace(
+        irregularities=[
+            {
+                "type": "random",
+                "spectrum": "erri_b176_low",
+                "scale": 0.5,
+                "wavelengths": [3.0, 70.0],
+            }
+        ]
+    )
+    s = np.arange(0.0, LENGTH, 0.25)
+    rails = displacement(track)(s)[0]
+    bump = 8e-3 * (1.0 + np.cos(2.0 * np.pi * np.clip((s - DEFECT) / 12.0, -0.5, 0.5)))
+    rails[0] += bump
+    rails[2] += bump
+    head = "s_m,y_left_mm,z_left_mm,y_right_mm,z_right_mm"
+    np.savetxt(path, np.c_[s, 1e3 * rails.T], delimiter=",", header=head, comments="", fmt="%.6g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def judged(recording, tmp_path_factory):
+    out = tmp_path_factory.mktemp("judged") / "runs"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "PIECE", 500.0)
+        found = assess_track(
+            recording, ["coach_manchester"], [SPEED], out=out, share=0.6, workers=1
+        )
+        again = assess_track(
+            recording, ["coach_manchester"], [SPEED], out=out, share=0.6, workers=1, resume=True
+        )
+        return found, again, out
+
+
+def test_the_defect_is_found_and_named(judged):
+    found = judged[0]
+    worst = found.places[0]
+    assert abs(worst.s - DEFECT) < 40.0
+    assert worst.shape.startswith("alignment")
+    assert found.flagged.sum() == 5
+    assert found.flagged[0] >= 1  # both see the defect
+    assert found.flagged[3] >= 2
+
+
+def test_nothing_is_computed_again(judged):
+    found, again, _ = judged
+    assert found.computed == 2
+    assert again.computed == 0
+    assert again.table().records() == found.table().records()
+
+
+def test_pieces_say_what_one_run_says(judged, recording, tmp_path):
+    """Behind a run-in of 200 m nothing is left of where the run began: 2 % of the limits."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "PIECE", 5000.0)
+        whole = assess_track(
+            recording, ["coach_manchester"], [SPEED], out=tmp_path / "one", share=0.6, workers=1
+        )
+    assert whole.computed == 1
+    for name, row in judged[0].shares.items():
+        assert row == pytest.approx(whole.shares[name], abs=0.02)
+
+
+def test_command(judged, recording, capsys, monkeypatch):
+    monkeypatch.setattr(module, "PIECE", 500.0)
+    arguments = ["assess-track", str(recording), "--vehicles", "coach_manchester",
+                 "--speeds", "40", "--out", str(judged[2]), "--share", "0.6",
+                 "--resume", "--quiet", "--json"]  # fmt: skip
+    assert main(arguments) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["places"][0]["shape"].startswith("alignment")
+    assert (judged[2] / "heat_strip.png").is_file()
+    assert "missed" in data["flagged"]
+
+
+def test_wrong_input(recording, tmp_path, capsys):
+    start = ["assess-track", str(recording), "--vehicles", "coach_manchester", "--speeds"]
+    end = ["--out", str(tmp_path / "x")]
+    assert main([*start, "fast", *end]) == 2
+    assert main([*start, "40", "--share", "0", *end]) == 2
+    assert "share" in capsys.readouterr().err
+    assert main(["assess-track", "straight", *start[2:], "40", *end]) == 2
+    assert "no recording" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+    assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
