@@ -117,14 +117,18 @@ def seats(
             apart = sign * _unevenness(pair, middle, y, roll) > MEETS
             low, high = np.where(apart, middle, low), np.where(apart, high, middle)
         wider = np.where(within, high, wider)
-        found[:, w] = np.stack([_heights(pair, wider, y, roll).min(axis=0), wider], axis=-1)
+        height = _heights(pair, wider, y, roll).min(axis=0)
+        # a wheelset beside its rails stays at the height of its flanges on the rail tops
+        height[~np.isfinite(height)] = -float(pair[0]["wheel_z"].max())
+        found[:, w] = np.stack([height, wider], axis=-1)
     return found
 
 
 def _unevenness(pair: tuple[Section, ...], wider: Array, y: Array, roll: Array) -> Array:
     """By how much the left wheel would stand lower than the right one [m]."""
     left, right = _heights(pair, wider, y, roll)
-    return np.asarray(left - right)
+    both = np.isfinite(left) & np.isfinite(right)
+    return np.where(both, left, 0.0) - np.where(both, right, 0.0)
 
 
 def _heights(pair: tuple[Section, ...], wider: Array, y: Array, roll: Array) -> Array:

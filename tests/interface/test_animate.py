@@ -124,6 +124,18 @@ def test_arrows_begin_at_the_contact_and_wheels_without_contact_have_none(result
     assert data["words"]["Q"] == "Q (kN): vertical wheel force"  # as in the tables
 
 
+def test_a_wheelset_beside_its_rails_is_drawn_on_its_flanges(result):
+    arrays = {name: result[name] for name in result}
+    arrays["wheelset_lateral"] = np.full_like(arrays["wheelset_lateral"], 0.3)
+    derailed = railsim.Result(
+        arrays, result.quantities, result.coordinates, result.attributes, PROFILES
+    )
+    scene = result_scene(derailed, frames=5)
+    flange = max(section["wheel_z"].max() for section in scene.sections[0])
+    np.testing.assert_allclose(scene.seats[..., 0], -flange)
+    json.dumps(scene_data(scene), allow_nan=False)
+
+
 def test_part_of_a_run(result):
     scene = result_scene(result, between=(340.0, 420.0))
     assert scene.distance[0] >= 340.0
