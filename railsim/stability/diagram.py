@@ -221,7 +221,8 @@ def _threshold(motion: Motion, up: Branch, down: Branch, tell: Progress) -> Bran
             continue
         if lower.amplitude < DROP * upper.amplitude:
             seen = _unstable(motion, speed, lower, upper)
-            line.points.append(seen_at(speed, seen, stable=False))
+            if abs(seen.amplitude - lower.amplitude) > ALIKE * lower.amplitude:  # not left at once
+                line.points.append(seen_at(speed, seen, stable=False))
         tell((number + 1) / THRESHOLDS)
     return line
 
