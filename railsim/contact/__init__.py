@@ -8,6 +8,7 @@ module         job
 `conicity`     equivalent conicity of EN 15302
 `geometry`     rigid contact functions of a wheelset
 `out_of_round` surfaces of wheels that are not round
+`rail_sections` rails whose section changes: parts, blending, contact ahead of the axle
 `table`        the contact table: generator, cache on disk
 `kalker`       creepage coefficients of linear theory
 `creep`        creep force by every law, for scripts and plots

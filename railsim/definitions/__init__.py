@@ -15,6 +15,7 @@ names          which body a name means where it stands
 flatten        assemblies placed and mirrored, names resolved: the vehicle as plain lists
 out_of_round   wheels that are not round
 check_rail     check rails and guard rails
+rail_sections  rails whose section changes along the track
 section_files  lists of sections along a rail or around a wheel, their files
 track_tables, track  track files: plan, cant, vertical profile, rails, friction
 section, rounded_profile  elements of a track as linear functions, and rounded

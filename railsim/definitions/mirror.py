@@ -38,6 +38,7 @@ def mirrored_track(track: Track) -> Track:
             "friction_table": _sides_exchanged(track.friction_table),
             "gauge_widening": _sides_exchanged(track.gauge_widening),
             "irregularities": tuple(part.mirrored() for part in track.irregularities),
+            "sections": tuple(part.mirrored() for part in track.sections),
             "check_rail": tuple(rail.mirrored() for rail in track.check_rail),
         }
     )

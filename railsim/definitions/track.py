@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.layout import curvature_sections, track_faults, track_remarks
+from railsim.definitions.rail_sections import embed_rail_sections
 from railsim.definitions.track_tables import TrackTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable
@@ -19,8 +20,8 @@ class Track(TrackTables, Plottable):
 
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:
-        """Put the rows of measured irregularities into the tables."""
-        return embed_measured(tables)
+        """Put the rows of measured irregularities and sections of rails into the tables."""
+        return embed_measured(tables) + embed_rail_sections(tables)
 
     def contradictions(self) -> list[Fault]:
         """Return where the elements do not fit together."""

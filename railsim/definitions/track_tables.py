@@ -27,6 +27,7 @@ from railsim.definitions.base import (
 from railsim.definitions.check_rail import MOST_CHECK_RAILS, CheckRail
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.rail_sections import MOST_RANGES, RailSections
 from railsim.definitions.support import Support
 
 ArcLength = TypeVar("ArcLength", float, Any)
@@ -239,6 +240,8 @@ class TrackTables(FileDefinition):
 
     irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
     """Displacements of the rails from their ideal positions; they add up"""
+    sections: tuple[RailSections, ...] = Field(default=(), max_length=MOST_RANGES)
+    """Ranges in which the section of a rail changes, such as crossings"""
     check_rail: tuple[CheckRail, ...] = Field(default=(), max_length=MOST_CHECK_RAILS)
     """Check rails and guard rails"""
     support: Support = Support()

@@ -38,8 +38,9 @@
     PATCH_SPEED,
     SLOPE_ALONG,
     SLOPE_ACROSS,
-) = range(34)
-PATCH_ROWS = 34
+    RISE,
+) = range(35)
+PATCH_ROWS = 35
 
 # columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
 # force of check rails and its wear number

@@ -15,6 +15,7 @@ from railsim.kernels.contact_columns import (
     NORMAL_Z,
     PATCH_SPEED,
     PHI,
+    RISE,
     TURN_Y,
     TURN_Z,
     XI_X,
@@ -68,6 +69,7 @@ def creepages(system, work, n, speed, state):
             - w2 * (x + cx)
             + plane[w, SLOPE_Z]
             + roll_slope * (y + cy - plane[w, MIDDLE_Y])
+            - patch[RISE, k]
         )
         cx -= turn_z * cz
         more = w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z])

@@ -140,6 +140,8 @@ class Contact(NamedTuple):
     surface_of : int64[w, 2, 3]  surface of each wheel that is not round, by patch, -1 where round;
                              w = 0 where all wheels are round, see `wheel_surface`
     surface_row : float64[k, SURFACE_ROW];  surface : float64[..., 4];  flat_ahead : float64[...]
+    range_of : int64[k, w, 2];  range_row : float64[k, 2]   ranges of rails' sections, surface of
+                             each wheel on them, else -1
     check : float64[c, CHECK_ROW];  check_flangeway : float64[..., 2];
     check_wheel : float64[w, c, CHECK_WHEEL]   check rails, see `check_rails`
     friction_law : int           address of a law of one's own for it, else 0
@@ -166,6 +168,8 @@ class Contact(NamedTuple):
     surface_row: np.ndarray
     surface: np.ndarray
     flat_ahead: np.ndarray
+    range_of: np.ndarray
+    range_row: np.ndarray
     check: np.ndarray
     check_flangeway: np.ndarray
     check_wheel: np.ndarray

@@ -19,6 +19,7 @@ from railsim.kernels.contact_columns import (
     NORMAL_DAMPING,
     NORMAL_STIFFNESS,
     PENETRATION,
+    RISE,
     W_C_Y,
     W_C_Z,
     W_LIFT,
@@ -99,7 +100,9 @@ from railsim.kernels.wheel_surface import (
     B_CHANGE,
     B_HEIGHT,
     B_LEAD,
+    B_RADIUS,
     B_RATE,
+    B_RISE,
     note_surfaces,
 )
 
@@ -331,6 +334,7 @@ def patch_contact(system, work, w, side, patch, wheel, n):
         add_normal_force(work, contact.body[w], w, side, wheel, p, k, vertical)
         # moment about the axle
         work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_LEAD]
+        work.rail_force[contact.body[w], 0] -= vertical * work.bump[patch, B_RISE]
         cos_g = sqrt(cos_2)
         N = vertical / cos_g
         if N > 0.0:
@@ -346,7 +350,8 @@ def patch_contact(system, work, w, side, patch, wheel, n):
             column[FOOT_X_PER_YAW, n] = per_yaw
             column[FOOT_X, n] = wheel.yaw * per_yaw + work.bump[patch, B_LEAD]
             column[FOOT_Y, n] = wheel.sign * c_y
-            column[FOOT_Z, n] = c_z + work.bump[patch, B_HEIGHT]
+            column[FOOT_Z, n] = c_z + work.bump[patch, B_RADIUS]
+            column[RISE, n] = work.bump[patch, B_RISE]
             column[PENETRATION, n] = p
             column[NORMAL_STIFFNESS, n] = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) / cos_2
             column[NORMAL_DAMPING, n] = contact.damping * fade

@@ -10,6 +10,11 @@ and the patch lies e_phi ahead of the axle: the path of the centre over the angl
 of the wheel's surface, max over psi of r(psi) cos(psi - phi), whose slope is r sin(psi - phi).  The
 normal force has the moment N e_phi about the axle, so that it does no work over a turn.
 
+**Rails whose section varies** have the same tables over the arc length from the begin of their
+range, a turn being its length: e is the height of the section on which the wheel stands over that
+of the first one, and the rail rises by e_s, which turns the normal back and the direction of
+rolling up (`railsim.contact.rail_sections`).
+
 Tables hold e, e_phi, e_y and e_phi_y at the nodes of an even grid, periodic in phi; bicubic between
 them (Hermite), constant beyond the ends in y.
 """
@@ -17,6 +22,7 @@ them (Hermite), constant beyond the ends in y.
 from math import floor, pi
 
 from railsim.kernels import compiled
+from railsim.kernels.contact_table import FLANGE
 from railsim.kernels.rails import ASIDE, ROLL
 from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
 
@@ -25,9 +31,13 @@ from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
 # of the shortest wave all around it, which steps resolve [m]
 FIRST, FIRST_AHEAD, N_PHI, N_Y, Y0, DY, FLAT, WAVE = range(8)
 SURFACE_ROW = 8
+# columns of Contact.range_row, of each range of sections: wheelsets' sides are in `range_of`; begin
+# and end [m]
+BEGIN, END = range(2)
 # columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
-# [1], change of the rate over `AHEAD` [m/s]
-B_HEIGHT, B_RATE, B_LEAD, B_ACROSS, B_CHANGE = range(5)
+# [1], change of the rate over `AHEAD` [m/s]; part of e that is the wheel's [m]; rise of the rail
+# [1]
+B_HEIGHT, B_RATE, B_LEAD, B_ACROSS, B_CHANGE, B_RADIUS, B_RISE = range(7)
 BUMP_SIZE = 8
 AT_ONCE = 1e12  # N/s, rate of a force that has its step divided
 
@@ -113,24 +123,60 @@ def note_surfaces(system, work, state, w, side, wheel):
     most = 0.0
     for patch in range(bump.shape[0]):
         table = contact.surface_of[w, side, patch]
+        for k in range(BUMP_SIZE):
+            bump[patch, k] = 0.0
         if table < 0:
-            for k in range(BUMP_SIZE):
-                bump[patch, k] = 0.0
             continue
         shear = contact.shear[contact.table[w, side]]
         y = wheel.y - shear * wheel.roll
         e, lead, across = surface_at(contact, table, phi, y)
         bump[patch, B_HEIGHT] = e
+        bump[patch, B_RADIUS] = e
         bump[patch, B_RATE] = lead * rate
         bump[patch, B_LEAD] = lead
         bump[patch, B_ACROSS] = across
-        bump[patch, B_CHANGE] = 0.0
         most = max(most, e)
         if h > 0.0:
             _, later, _ = surface_at(contact, table, phi + rate * h, y)
             bump[patch, B_CHANGE] = (later - lead) * rate
             if angle_to_flat(contact, table, phi) < rate * h:
                 work.force_rate[w] = AT_ONCE
+    for k in range(contact.range_of.shape[0]):
+        most = max(most, note_sections(system, work, state, w, side, wheel, k))
+    return most
+
+
+@compiled(python=False)
+def note_sections(system, work, state, w, side, wheel, k):
+    """Add the height of range `k` of a rail's sections to `work.bump`, but not under the flange.
+
+    Returns
+    -------
+    float
+        Largest e of the patches [m].
+    """
+    contact, bump, h = system.contact, work.bump, work.watch[AHEAD]
+    table = contact.range_of[k, w, side]
+    begin, end = contact.range_row[k, BEGIN], contact.range_row[k, END]
+    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[contact.body[w]]]
+    if table < 0 or s < begin or s > end:
+        return 0.0
+    scale, speed = 2.0 * pi / (end - begin), state[SPEED]
+    y = wheel.y - contact.shear[contact.table[w, side]] * wheel.roll
+    e, rise, across = surface_at(contact, table, scale * (s - begin), y)
+    change = 0.0
+    if h > 0.0 and s + speed * h < end:
+        _, later, _ = surface_at(contact, table, scale * (s + speed * h - begin), y)
+        change = scale * (later - rise) * speed
+    rise *= scale
+    most = 0.0
+    for patch in range(FLANGE):
+        bump[patch, B_HEIGHT] += e
+        bump[patch, B_RATE] += rise * speed
+        bump[patch, B_ACROSS] += across
+        bump[patch, B_CHANGE] += change
+        bump[patch, B_RISE] += rise
+        most = max(most, bump[patch, B_HEIGHT])
     return most
 
 
@@ -141,15 +187,24 @@ def foreseen_heights(system, work, state, w, track, first):
     b = contact.body[w]
     n = system.bodies.kind.shape[0]
     phi, _ = wheel_angle(system, state, w)
+    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]]
     rate = -state[6 * n + 6 * b + 4]  # the turn of the track's frame left out
     for side in range(2):
-        table = contact.surface_of[w, side, 0]
-        if table < 0:
-            continue
         sign = 2.0 * side - 1.0
         shear = contact.shear[contact.table[w, side]]
         roll = state[6 * b + 3] - work.plane[w, ROLL]
         y = sign * (state[6 * b + 1] - work.rail[w, side, ASIDE] - shear * roll)
-        e, lead, _ = surface_at(contact, table, phi, y)
-        track[first + side] = e
-        track[first + 2 + side] = lead * rate
+        track[first + side] = track[first + 2 + side] = 0.0
+        table = contact.surface_of[w, side, 0]
+        if table >= 0:
+            e, lead, _ = surface_at(contact, table, phi, y)
+            track[first + side] = e
+            track[first + 2 + side] = lead * rate
+        for k in range(contact.range_of.shape[0]):
+            table = contact.range_of[k, w, side]
+            begin, end = contact.range_row[k, BEGIN], contact.range_row[k, END]
+            if table >= 0 and s >= begin and s <= end:
+                scale = 2.0 * pi / (end - begin)
+                e, rise, _ = surface_at(contact, table, scale * (s - begin), y)
+                track[first + side] += e
+                track[first + 2 + side] += scale * rise * state[SPEED]

@@ -38,7 +38,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
     wheelsets = model.index.wheelsets
     Q0 = run.prepared.balance.Q0
     extremes = run_extremes(run.extremes, Q0)
-    uneven = len(model.wheels.surface_row) > 0
+    uneven = model.wheels.uneven
     found = [
         *run.remarks,
         *run.prepared.remarks,
@@ -53,7 +53,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             run.vibration,
             Q0,
             wheelsets,
-            irregular=bool(model.system.track.has_irregularity),
+            irregular=bool(model.system.track.has_irregularity or len(model.wheels.range_row)),
             uneven=uneven,
             elastic=bool(model.system.support.elastic),
             hunts=swings is not None,

@@ -1,0 +1,333 @@
+"""Rails whose section changes along the track: crossings, blades, noses.
+
+**Parts.**  A section is cut at its grooves into the rails that stand side by side, such as wing and
+nose; the parts of neighbouring sections that overlap are one rail.  A rail begins at the first
+section that has it, so that a nose that appears is a nose and not a ramp.
+
+**Blending.**  Between sections points at equal shares of the flank before the running edge, where
+the contour stands at 60 degrees, are joined, and behind it points at equal shares of the way from
+there to y = 75 mm, by cubics along s whose slopes at the sections are those of parabolas through
+three neighbours: smooth in s; a running edge goes aside as an edge, and a top stays where it is.
+
+**The slope along the rail.**  A wheel rolls over x before and behind its axle; where the rail rises
+it touches ahead.  Its surface is that of circles, lower by x^2/2r ahead of the axle than under it,
+so that the wheel stands on the rail as on one of the section
+
+    z_e(Y; s) = min over x of z(s + x, Y) + r - sqrt(r^2 - x^2),
+
+with the patch x ahead of the axle: dz_e/ds is the rail's slope there, and the normal passes through
+the axle.  For a rolling radius that differs from r by the depth of a flange, 6 %, z_e is too high
+or low by 6 % of x^2/2r, some micrometres.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact.curves import RAIL_SPACING, STEEPEST, RailCurve, WheelCurve, averaged_curvature
+from railsim.definitions.section_files import SectionList
+
+Array = NDArray[np.float64]
+
+DEEP = 8e-3  # m, of a groove between two rails
+TOP = 5e-3  # m below its highest point in which a rail is recognised in the next section
+TURN = np.radians(60.0)  # of the contour at its running edge
+FLANK = 60  # points of the contour before the running edge
+FAR, ABSENT = 0.075, 0.05  # m, lateral position up to which a rail is followed; its z beyond
+ACROSS = 1e-4  # m, distance of the points
+JUMP = 0.01  # m between neighbouring sections
+WINDOW = 0.06  # m ahead of and behind the axle that is searched
+STEP = 1e-3  # m, of the search
+
+
+@dataclass(frozen=True, eq=False)
+class RailPart:
+    """One rail of the sections, as points of equal share over s.
+
+    Attributes
+    ----------
+    positions : ndarray, shape (n,)
+        Arc lengths of its sections [m].
+    contours : ndarray, shape (n, 2, k)
+        y and z of the points [m].
+    """
+
+    positions: Array
+    contours: Array
+
+    @cached_property
+    def _slopes(self) -> Array:
+        h = np.diff(self.positions)[:, None, None]
+        step = np.diff(self.contours, axis=0)
+        secant = np.where(np.abs(step) > JUMP, 0.0, step) / h  # to where a section has ended
+        slopes = np.concatenate([secant[:1], secant, secant[-1:]])[1:]
+        share = h[:-1] / (h[:-1] + h[1:])
+        slopes[1:-1] = (1.0 - share) * secant[:-1] + share * secant[1:]
+        slopes[0] = secant[0]
+        return np.asarray(slopes)
+
+    def contour(self, s: float) -> Array:
+        """Points y, z of its contour at an arc length within its ends [m]."""
+        last = self.positions.size - 2
+        i = int(np.clip(np.searchsorted(self.positions, s, "right") - 1, 0, last))
+        h = self.positions[i + 1] - self.positions[i]
+        u = (s - self.positions[i]) / h
+        rest = 1.0 - u
+        return np.asarray(
+            (1.0 + 2.0 * u) * rest**2 * self.contours[i]
+            + u**2 * (3.0 - 2.0 * u) * self.contours[i + 1]
+            + h * u * rest * (rest * self._slopes[i] - u * self._slopes[i + 1])
+        )
+
+    def height(self, s: float, Y: Array) -> Array:
+        """Height below the rail tops at lateral positions, inf where the rail is not [m]."""
+        if not self.positions[0] <= s <= self.positions[-1]:
+            return np.full(Y.shape, np.inf)
+        y, z = self.contour(s)
+        return np.interp(Y, *_upper(y, z), left=np.inf, right=np.inf)
+
+
+def _upper(y: Array, z: Array) -> tuple[Array, Array]:
+    """The part of a contour that is seen from above, to both sides of its top."""
+    top = int(np.argmin(z))
+    right = y >= np.maximum.accumulate(np.where(np.arange(y.size) >= top, y, -np.inf))
+    left = y <= np.minimum.accumulate(np.where(np.arange(y.size) <= top, y, np.inf)[::-1])[::-1]
+    seen = np.where(np.arange(y.size) >= top, right, left)
+    y, z = y[seen], z[seen]
+    keep = np.append(True, np.diff(y) > 0.0)
+    return y[keep], z[keep]
+
+
+def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
+    """Cut sections into rails and join those that belong together.
+
+    Returns
+    -------
+    tuple of RailPart
+        Rails of two sections at least, in the order of their begins.
+    """
+    chains: list[tuple[list[float], list[Array]]] = []
+    open_chains: list[int] = []
+    for s, points in zip(sections.positions.tolist(), sections.points, strict=True):
+        going_on = []
+        for part in _cut(points):
+            low, high = _top_range(part)
+            best, overlap = -1, 0.0
+            for k in open_chains:
+                before = _top_range(chains[k][1][-1])
+                shared = min(high, before[1]) - max(low, before[0])
+                if k not in going_on and shared > overlap:
+                    best, overlap = k, shared
+            if best < 0:
+                chains.append(([], []))
+                best = len(chains) - 1
+            chains[best][0].append(s)
+            chains[best][1].append(part)
+            going_on.append(best)
+        open_chains = going_on
+    return tuple(
+        RailPart(np.array(positions), np.array([_shares(part) for part in parts]))
+        for positions, parts in chains
+        if len(positions) > 1
+    )
+
+
+def _top_range(part: Array) -> tuple[float, float]:
+    top = part[0][part[1] < part[1].min() + TOP]
+    return float(top.min()), float(top.max())
+
+
+def _cut(points: Array) -> list[Array]:
+    """Cut a contour where a groove lies between two rails."""
+    z = points[1]
+    left = np.minimum.accumulate(z)
+    right = np.minimum.accumulate(z[::-1])[::-1]
+    depth = z - np.maximum(left, right)
+    deepest = int(np.argmax(depth))
+    if depth[deepest] <= DEEP:
+        return [points]
+    return _cut(points[:, : deepest + 1]) + _cut(points[:, deepest:])
+
+
+def _shares(part: Array) -> Array:
+    """Points of a contour at equal shares before its running edge, and from there to `FAR`."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    length = np.append(0.0, np.cumsum(np.hypot(*np.diff(part))))
+    angle = np.arctan2(-np.diff(part[1]), np.diff(part[0]))
+    middle, top = 0.5 * (length[1:] + length[:-1]), length[int(np.argmin(part[1]))]
+    rising = np.flatnonzero((angle > TURN) & (middle < top))
+    edge = length[rising[-1] + 1] if rising.size else 0.0
+    keep = np.append(True, np.diff(length) > 1e-7)
+    spline = Akima1DInterpolator(length[keep], part[:, keep], axis=1)
+    flank = np.asarray(spline(np.linspace(0.0, edge, FLANK, endpoint=False)))
+    y, z = np.asarray(spline(np.arange(edge, length[-1], 0.5 * ACROSS)))
+    places = y[0] + (FAR - y[0]) * np.linspace(0.0, 1.0, round(0.11 / ACROSS))
+    behind = np.interp(places, *_upper(y, z), right=ABSENT)
+    return np.concatenate([flank, [places, behind]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class RolledRail:
+    """The section on which a wheel stands at one position, see the module's text.
+
+    Attributes
+    ----------
+    Y, z, lead : ndarray, shape (n,)
+        Lateral position, height below the rail tops, and how far ahead of the axle [m].
+    """
+
+    Y: Array
+    z: Array
+    lead: Array
+
+
+def rolled_rail(part: RailPart, s: float, radius: float, Y: Array) -> RolledRail:
+    """Return the section of a rail on which a wheel of some radius stands at `s`."""
+    x = STEP * np.arange(-round(WINDOW / STEP), round(WINDOW / STEP) + 1)
+    drop = radius - np.sqrt(radius**2 - x**2)
+    heights = np.array([part.height(s + ahead, Y) for ahead in x]) + drop[:, None]
+    best = np.argmin(heights, axis=0)
+    columns = np.arange(Y.size)
+    inner = np.clip(best, 1, x.size - 2)
+    a, b, c = (heights[inner + k, columns] for k in (-1, 0, 1))
+    known = np.isfinite(a) & np.isfinite(b) & np.isfinite(c) & (best == inner)
+    a, b, c = (np.where(known, value, 0.0) for value in (a, b, c))
+    bend = a - 2.0 * b + c
+    offset = np.where(bend > 0.0, 0.5 * (a - c) / np.where(bend > 0.0, bend, 1.0), 0.0)
+    offset = np.clip(offset, -0.5, 0.5)
+    z = heights[best, columns] - 0.25 * (a - c) * offset
+    return RolledRail(Y, z, x[best] + STEP * offset)
+
+
+def rolled_curve(part: RailPart, s: float, radius: float) -> RailCurve:
+    """Return the section of a rail on which a wheel stands as the contact search takes it.
+
+    In the frame of the right rail in the track whose tops are 750 mm beside its middle where
+    y = 0: positions count from the rail's own y = 0 here.
+    """
+    y, _ = part.contour(float(np.clip(s, part.positions[0], part.positions[-1])))
+    Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * RAIL_SPACING)
+    rolled = rolled_rail(part, s, radius, Y)
+    known = np.isfinite(rolled.z)
+    Y, z = Y[known], rolled.z[known]
+    top = int(np.argmin(z))
+    step = np.abs(np.diff(z)) <= STEEPEST * np.diff(Y)
+    first, last = top, top
+    while first > 0 and step[first - 1]:
+        first -= 1
+    while last < Y.size - 1 and step[last]:
+        last += 1
+    from scipy.interpolate import make_smoothing_spline
+
+    spline = make_smoothing_spline(1e3 * Y[first:last], 1e3 * z[first:last], lam=1e-4)
+    nodes = np.arange(Y[first], Y[last - 1], RAIL_SPACING)
+    slope = spline.derivative()(1e3 * nodes)
+    return RailCurve(
+        Y0=float(nodes[0]),
+        dY=RAIL_SPACING,
+        z=1e-3 * spline(1e3 * nodes),
+        slope=slope,
+        curvature=averaged_curvature(nodes, slope, 1.0),
+    )
+
+
+HEIGHTS = np.linspace(-0.012, 0.012, 97)  # m, lateral positions of the wheel
+SPACING = 2e-3  # m, along the track
+FADE = 0.05  # m at both ends of a range
+FACE = 1.0  # steepest slope of the wheel's tread and flange root
+
+
+def path_heights(
+    parts: tuple[RailPart, ...],
+    wheel: WheelCurve,
+    radius: float,
+    begin: float,
+    end: float,
+    y: Array,
+) -> tuple[Array, Array]:
+    """Heights of the section on which tread and flange root stand above that at `begin`.
+
+    Parameters
+    ----------
+    parts : tuple of RailPart
+        Rails.
+    wheel : WheelCurve
+        Its candidates; flank and tip of the flange are left out.
+    radius : float
+        Nominal rolling radius [m].
+    begin, end : float
+        Range in the arc length of the sections [m].
+    y : ndarray, shape (n_y,)
+        Lateral positions of the nominal rolling circle from y = 0 of the rails [m].
+
+    Returns
+    -------
+    ndarray, shape (n_s,)
+        Arc lengths from `begin` on, `end` left out [m].
+    ndarray, shape (n_s, n_y)
+        Heights, positive upwards; faded to zero within `FADE` of both ends [m].
+    """
+    n = int(np.ceil((end - begin) / SPACING))
+    step = (end - begin) / n
+    reach = int(np.ceil(WINDOW / step))
+    tread = np.abs(wheel.t) < FACE
+    u, drop = wheel.y[tread], wheel.r[tread] - radius
+    touch = np.empty((n + 2 * reach, y.size))
+    first = min(float(part.positions[0]) for part in parts)
+    last = max(float(part.positions[-1]) for part in parts)
+    for i in range(touch.shape[0]):
+        s = min(max(begin + step * (i - reach), first), last)
+        contours = [
+            _upper(*part.contour(s))
+            for part in parts
+            if part.positions[0] <= s <= part.positions[-1]
+        ]
+        for j, aside in enumerate(y):
+            touch[i, j] = min(
+                float((np.interp(u + aside, *line, left=1.0, right=1.0) - drop).min())
+                for line in contours
+            )
+    best = touch[reach : n + reach].copy()
+    for k in range(1, reach + 1):
+        fall = radius - np.sqrt(radius**2 - (k * step) ** 2)
+        for ahead in (k, -k):
+            np.minimum(best, touch[reach + ahead : n + reach + ahead] + fall, out=best)
+    along = np.linspace(begin, end, n, endpoint=False)
+    depth = np.clip(np.minimum(along - begin, end - along) / FADE, 0.0, 1.0)
+    heights = (best[0] - best) * (0.5 - 0.5 * np.cos(np.pi * depth))[:, None]
+    return along, heights
+
+
+def kinematic_height(
+    parts: tuple[RailPart, ...], s: float, wheel: tuple[Array, Array], radius: float, y: float
+) -> tuple[float, float, int]:
+    """Height at which a wheel stands on rails without deforming them.
+
+    Parameters
+    ----------
+    parts : tuple of RailPart
+        Rails.
+    s, y : float
+        Position of the axle, and of the wheel's nominal rolling circle from y = 0 [m].
+    wheel : (ndarray, ndarray)
+        Lateral position from the nominal rolling circle, and radius [m].
+    radius : float
+        Nominal rolling radius [m].
+
+    Returns
+    -------
+    float, float, int
+        Height of the wheel below that on a level rail at the tops [m], contact ahead of the axle
+        [m], and which rail carries it.
+    """
+    best = (np.inf, 0.0, -1)
+    for number, part in enumerate(parts):
+        rolled = rolled_rail(part, s, radius, wheel[0] + y)
+        gap = rolled.z - (wheel[1] - radius)
+        k = int(np.argmin(gap))
+        if gap[k] < best[0]:
+            best = float(gap[k]), float(rolled.lead[k]), number
+    return best

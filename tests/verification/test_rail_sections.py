@@ -1,0 +1,208 @@
+"""Rails whose section changes: kinematic path and shares of wing and nose, runs over a crossing.
+
+The crossing is that of the shipped track; results of the program CONTACT on it stand in
+tests/data/sections (licence beside them).
+"""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from railsim.contact.curves import HALF_WIDTHS, wheel_curve
+from railsim.contact.rail_sections import (
+    HEIGHTS,
+    kinematic_height,
+    path_heights,
+    rail_parts,
+    rolled_curve,
+)
+from railsim.contact.table import _wheel_arrays, ellipse_functions, strip_influence
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.section_files import SectionList, read_sections
+from railsim.errors import InputError
+from railsim.kernels import table_slice as kernel
+from railsim.profiles import load_profile
+from railsim.result.filters import low_passed
+from railsim.simulation import simulate
+
+ROOT = Path(__file__).parents[2]
+LIST = ROOT / "tracks" / "sections" / "crossing_56e1_r245.csv"
+RADIUS, G, NU = 0.46, 82e9, 0.28
+
+
+@pytest.fixture(scope="module")
+def parts():
+    return rail_parts(read_sections(LIST, "rail"))
+
+
+@pytest.fixture(scope="module")
+def wheel():
+    return wheel_curve(load_profile("S1002", "wheel"), RADIUS, 0.75, 1e-4)
+
+
+def test_wing_and_nose_are_two_rails(parts):
+    wing, nose = parts
+    assert wing.positions[0] < -0.9
+    assert wing.positions[-1] == pytest.approx(1.05853)
+    assert nose.positions[0] == pytest.approx(0.11894)
+    assert nose.positions[-1] > 2.2
+    # a nose that appears is a nose and not a ramp
+    Y = np.linspace(-0.03, 0.01, 5)
+    assert np.isinf(nose.height(0.1185, Y)).all()
+    assert nose.height(0.119, Y).min() == pytest.approx(0.0226, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("y", "lowest", "where"),
+    [
+        (-3.0, 0.290, 0.280),
+        (-2.0, 0.169, 0.272),
+        (-1.0, 0.034, 0.263),
+        (0.0, -0.109, 0.252),
+        (0.975, -0.268, 0.239),
+        (2.0, -0.471, 0.2205),
+        (3.0, -0.749, 0.190),
+    ],
+)
+def test_kinematic_path(parts, wheel, y, lowest, where):
+    """Lowest point of a wheel that changes from wing to nose, within 0.015 mm and 3 mm."""
+    s = where + np.arange(-0.006, 0.0065, 0.0015)
+    z = [kinematic_height(parts, at, (wheel.y, wheel.r), RADIUS, 1e-3 * y)[0] for at in s]
+    k = int(np.argmax(z))
+    assert 1e3 * z[k] == pytest.approx(lowest, abs=0.015)
+    assert s[k] == pytest.approx(where, abs=0.003)
+
+
+def test_two_patches_on_wing_and_flank_of_the_nose(parts, wheel):
+    """Wing and nose at s = 160 mm, y = 3.52 mm under 10 kN: loads within 600 N of CONTACT's."""
+    z, (wing, nose) = carried(parts, wheel, 3.52, 0.160)
+    assert wing == pytest.approx(6171.0 * np.cos(0.05), abs=600.0)
+    # its normal force and the vertical part of its friction
+    assert nose == pytest.approx(4790.0 * np.cos(0.764) + 557.3 * np.sin(0.764), abs=600.0)
+    assert z == pytest.approx(-0.9238, abs=0.005)
+
+
+def test_contact_lies_where_the_rail_slopes(parts, wheel):
+    """Behind the axle on the falling wing, ahead of it on the rising nose, as CONTACT finds it."""
+    for part, lead in zip(parts, (-3.20, 4.59), strict=True):
+        _, found, _ = kinematic_height((part,), 0.239, (wheel.y, wheel.r), RADIUS, 0.97e-3)
+        assert 1e3 * found == pytest.approx(lead, abs=0.5)
+
+
+def carried(parts, wheel, y, s=0.239):
+    """Height of the wheel [mm] and loads of wing and nose [N] under 10 kN."""
+    tables = []
+    for part in parts:
+        rail = rolled_curve(part, s, RADIUS)
+        rail = replace(rail, Y0=rail.Y0 + 0.75)
+        fields = np.empty((3, 1, 12))
+        kernel.fill_table_slice(
+            fields,
+            np.array([1e-3 * y]),
+            0.0,
+            0.0,
+            RADIUS,
+            _wheel_arrays(wheel, rail),
+            kernel.Rail(rail.Y0, rail.dY, rail.z, rail.slope, rail.curvature),
+            kernel.Elastic(G / (1.0 - NU), HALF_WIDTHS, 10e3, 0.02, False),
+            ellipse_functions(G, NU),
+            strip_influence(),
+        )
+        tables.append(fields[:, 0])
+
+    def loads(z):
+        approach = [np.maximum(z - table[:, 0], 0.0) for table in tables]
+        return np.array(
+            [
+                (table[:, 1] * e**1.5 + table[:, 2] * e**2).sum()
+                for table, e in zip(tables, approach, strict=True)
+            ]
+        )
+
+    z = brentq(lambda z: loads(z).sum() - 10e3, -2e-3, 0.0, xtol=1e-10)
+    return 1e3 * z, loads(z)
+
+
+def test_wing_and_nose_share_the_load_as_in_contact(parts, wheel):
+    """Equal at y = 0.975 +- 0.02 mm; moved by the difference, each within 300 N, z 0.005 mm."""
+    equal = brentq(lambda y: float(np.diff(carried(parts, wheel, y)[1])[0]), 0.93, 1.02, xtol=1e-3)
+    assert equal == pytest.approx(0.975, abs=0.02)
+    with (ROOT / "tests" / "data" / "sections" / "crossing_s239_dev.csv").open() as lines:
+        rows = [row for row in csv.DictReader(lines) if row["y_mm"] in ("0.95", "0.97", "0.99")]
+    assert len(rows) == 6
+    for row in rows:
+        z, loads = carried(parts, wheel, float(row["y_mm"]) + equal - 0.975)
+        angle, N = float(row["deltcp_rad"]), float(row["Fn_N"])
+        assert loads[int(row["patch"]) - 1] == pytest.approx(N * np.cos(angle), abs=300.0)
+        assert z == pytest.approx(float(row["z_mm"]), abs=0.005)
+
+
+def test_constant_sections_are_plain_rail(wheel):
+    plain = read_sections(LIST, "rail").points[0]
+    sections = SectionList(np.array([0.0, 0.4, 1.0]), (plain,) * 3, np.zeros((3, 0)))
+    _, heights = path_heights(rail_parts(sections), wheel, RADIUS, 0.1, 0.9, HEIGHTS[::12])
+    assert np.abs(heights).max() < 1e-12
+
+
+HOW = {"start": 37.5, "until": 42.0}
+
+
+def test_run_on_constant_sections_is_the_run_on_plain_track():
+    plain = read_sections(LIST, "rail").points[0].tolist()
+    contours = [{"s": s, "y": plain[0], "z": plain[1]} for s in (30.0, 45.0, 60.0)]
+    part = {"rail": "right", "contours": contours, "begin": 40.0, "end": 55.0}
+    track = load_track("crossing_56e1_r245_1in9.25").replace(sections=[], check_rail=[])
+    coach = load_vehicle("coach_manchester")
+    mine = simulate(coach, track.replace(sections=[part]), speed=20.0, **HOW)
+    other = simulate(coach, track, speed=20.0, **HOW)
+    np.testing.assert_allclose(mine["Q"], other["Q"], rtol=1e-9)
+
+
+def test_crossing_in_the_mirror():
+    coach, track = load_vehicle("coach_manchester"), load_track("crossing_56e1_r245_1in9.25")
+    settings = load_settings().with_values({"output_rate": 1000.0})
+    mine = simulate(coach, track, speed=25.0, settings=settings, **HOW)
+    other = simulate(
+        mirrored_vehicle(coach), mirrored_track(track), speed=25.0, settings=settings, **HOW
+    )
+    Q = mine["Q"][:, 0, 1]
+    assert Q.max() > 1.5 * Q[0]
+    np.testing.assert_allclose(mine["Q"], other["Q"][:, :, ::-1], rtol=1e-3, atol=100.0)
+
+
+def test_impact_has_the_size_of_the_formula():
+    """Contact force below 90 Hz on the nose: 0.7 to 1.1 times the P2 formula, dip 18.15 mrad.
+
+    At 10 m/s; the formula takes ramps that go on, and these end 0.1 m behind the lowest point.
+    """
+    speed, force = 10.0, 86.5e3
+    track = load_track("crossing_56e1_r245_1in9.25").replace(
+        support={"preset": "p2"}, check_rail=[], gauge=1.43
+    )
+    settings = load_settings().with_values({"output_rate": 4000.0})
+    coach = load_vehicle("benchmark_vehicle1")
+    run = simulate(coach, track, speed=speed, settings=settings, start=36.0, until=42.0)
+    Q = low_passed(run["Q"][:, 0, 1], 4000.0, 90.0)
+    near = np.abs(run["wheelset_distance"][:, 0] - 50.3) < 0.4
+    assert 0.7 * force < Q[near].max() < 1.1 * force
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"begin": 40.0}, "do not reach"),
+        ({"end": 49.4}, "behind 'begin'"),
+        ({"rail": "both"}, "rail"),
+        ({"file": "none.slcs"}, "file"),
+    ],
+)
+def test_wrong_sections_are_refused(changed, said):
+    track = load_track("crossing_56e1_r245_1in9.25")
+    part = track.sections[0].model_dump(exclude_none=True)
+    with pytest.raises(InputError, match=said):
+        track.replace(sections=[{**part, **changed}])
