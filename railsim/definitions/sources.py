@@ -33,6 +33,7 @@ FOLDERS = {
     "scenario": "scenarios",
     "published": "published",
     "study": "studies",
+    "measurement": "examples/measured_run",
 }
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}

@@ -40,7 +40,7 @@ def load_measurement(
     Parameters
     ----------
     path : str or Path
-        Measurement file.
+        Measurement file, or the name of the shipped one.
     overrides : iterable of str
         Assignments ``key.path=value`` with the file's own keys.
     channels : sequence of str, optional

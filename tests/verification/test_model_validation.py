@@ -64,7 +64,7 @@ def simulated(vehicle, until=None, **outputs):
 
 @pytest.fixture(scope="module")
 def measured():
-    return railsim.load_measurement(FOLDER / "run.toml")
+    return railsim.load_measurement("coach_25t_run")
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def test_swapped_signs_wrong_units_and_late_channels_are_said(measured, right):
 def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
     run = tmp_path / "run.h5"
     right.to_hdf5(run)
-    arguments = ["validate-model", str(FOLDER / "run.toml"), str(run)]
+    arguments = ["validate-model", str(FOLDER / "coach_25t_run.toml"), str(run)]
     done = CliRunner().invoke(command_line, [*arguments, "--json"], standalone_mode=False)
     found = json.loads(done.output)
     assert found["verdict"] == "pass"
