@@ -3,7 +3,8 @@
 The run of `measured_run/` stands for a test: wheel forces of the leading wheelset and accelerations
 of a coach on a line with two curves. The shipped coach is simulated over the same line, and section
 values stand against the limits of EN 14363 Annex T: simulated over measured, with the limit of the
-mean (dashed). The model matches, although one of its springs is 20 % off: the next example finds it.
+mean (dashed). The model matches, although one of its springs is 20 % off: the next
+example finds it.
 """
 
 import railsim
