@@ -1,10 +1,10 @@
 """Which spring is soft?
 
 The same run, and four numbers of the coach that may be off: stiffnesses of the primary and
-secondary springs, both vertical dampers. Least squares over the accelerations between 0.5 and 15 Hz find the
-factor of each on the value of the file, with its 95 % interval: the run was made with 0.80 of the
-primary spring and 0.85 of the secondary damper. Residuals of the floor that are not white come from
-its sensors, which are mounted at an angle. The picture shows the channels before and after.
+secondary springs, both vertical dampers. Least squares over all channels between 0.5 and 15 Hz find
+the factor of each on the value of the file, with its 95 % interval: the run was made with 0.80 of
+the primary spring and 0.85 of the secondary damper. Residuals of the floor that are not white come
+from its sensors, which are mounted at an angle. The picture shows the channels before and after.
 """
 
 import railsim
