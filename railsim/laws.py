@@ -269,7 +269,8 @@ class _Binding:
             if arguments[n].default is not inspect.Parameter.empty
         }
         allowed = (1 + len(states),) if states else self.takes.gives
-        allowed = allowed if self.gives is None else (self.gives,)
+        if self.gives is not None:  # one value may be for all
+            allowed = (self.gives,) if self.gives == 1 else (1, self.gives)
         place = self._places(allowed[-1], states, further)
         if self.law.compiled and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
             address, kept = self._compiled(function, names, place, allowed)
@@ -398,7 +399,7 @@ class _Binding:
                 members = given if isinstance(given, tuple) else (given,)
                 if len(members) not in allowed:
                     raise TypeError(f"it returns {len(members)} values")
-                x[: allowed[-1]] = 0.0
+                x[: allowed[-1]] = members[0] if len(members) == 1 else 0.0
                 x[: len(members)] = members
             except Exception as error:
                 _LOG.error(f"law '{self.name}': {type(error).__name__}: {error}")
@@ -421,7 +422,8 @@ def _entry_text(
     results = ", ".join(f"y{k}" for k in range(number))
     lines.append(f"    {results} = law({given})")
     lines += [f"    x[{k}] = y{k}" for k in range(number)]
-    lines += [f"    x[{k}] = 0.0" for k in range(number, most)]
+    rest = "y0" if number == 1 else "0.0"
+    lines += [f"    x[{k}] = {rest}" for k in range(number, most)]
     return "\n".join(lines) + "\n"
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.assessment.weighting import WB, WC, WD, WK
+from railsim.assessment.weighting import WB, WC, WD, WF, WK
 from railsim.result.filters import Floats, integral, low_passed
 
 BLOCK = 5.0  # s
@@ -190,6 +190,33 @@ EVENT: Mapping[str, tuple[float, float, float]] = {
     "standing": (16.62, 27.01, 37.0),
     "seated": (8.46, 13.05, 21.7),
 }
+
+
+def motion_sickness_dose(a: Floats, rate: float) -> float:
+    """Motion sickness dose value of the vertical acceleration, MSDV_z = sqrt(int a_wf^2 dt).
+
+    Weighted with Wf; the percentage of people who may vomit is about a third of it (ISO 2631-1,
+    annex D).
+
+    Parameters
+    ----------
+    a : float64[time]
+        Vertical acceleration [m/s2].
+    rate : float
+        Samples per second [1/s].
+
+    Returns
+    -------
+    float
+        [m/s1.5].
+
+    Examples
+    --------
+    >>> t = np.arange(0.0, 1000.0, 0.05)
+    >>> round(motion_sickness_dose(np.sin(2.0 * np.pi * 0.2 * t), 20.0) / np.sqrt(500.0), 2)
+    0.99
+    """
+    return float(np.sqrt(np.sum(WF.weighted(a, rate) ** 2) / rate))
 
 
 def p_ct(acceleration: float, jerk: float, roll_rate: float, posture: str) -> float:

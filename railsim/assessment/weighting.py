@@ -96,4 +96,7 @@ WB = Weighting("Wb", 0.4, 100.0, 16.0, 16.0, 0.63, 2.5, 0.8, 4.0, 0.8, 0.4)
 WC = Weighting("Wc", 0.4, 100.0, 8.0, 8.0, 0.63)
 WD = Weighting("Wd", 0.4, 100.0, 2.0, 2.0, 0.63)
 WK = Weighting("Wk", 0.4, 100.0, 12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91, (2.37 / 3.35) ** 2)
+WF = Weighting(
+    "Wf", 0.08, 0.63, 1e6, 0.25, 0.86, 0.0625, 0.8, 0.1, 0.8, (0.0625 / 0.1) ** 2
+)  # motion sickness: ISO 2631-1, annex D
 WEIGHTINGS = {weighting.name: weighting for weighting in (WB, WC, WD, WK)}
