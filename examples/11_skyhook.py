@@ -39,6 +39,7 @@ ends = {"front": 9.5, "rear": -9.5}
 
 
 def active(law, command, inputs, **parameters):
+    """Return the coach with two lateral actuators and a controller for each."""
     actuator = {
         "kind": "actuator",
         "bodies": ["frame", "carbody"],
@@ -100,4 +101,5 @@ with styled():
 rigid = railsim.load_track("straight").replace(support={"preset": "rigid"})
 loop = eigenmodes(closed_loop(vehicles["skyhook"], rigid, 33.0, step=0.001))
 sway = min((e for e in loop.eigenvalues if 1.0 < e.imag < 10.0), key=lambda e: e.imag)
-print(f"sway with skyhook: {abs(sway) / 6.2832:.2f} Hz, damping {-100 * sway.real / abs(sway):.0f} %")
+damping = -100.0 * sway.real / abs(sway)
+print(f"sway with skyhook: {abs(sway) / 6.2832:.2f} Hz, damping {damping:.0f} %")

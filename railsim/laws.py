@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from railsim.definitions.laws import Law
+from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -94,6 +95,26 @@ def is_allowed(source: str) -> bool:
     """Whether a source may be executed."""
     known = os.environ.get(PERMITTED, "").split(",")
     return ALL in known or digest(source) in known
+
+
+def permitted_part(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle without elements whose law is not permitted, to be looked at."""
+    if all(is_allowed(one.source or "") for one in (vehicle.laws or {}).values()):
+        return vehicle
+
+    def stripped(group: dict[str, Any]) -> dict[str, Any]:
+        kept = {n: e for n, e in group.get("elements", {}).items() if e["kind"] != "law"}
+        inner = {n: stripped(a) for n, a in group.get("assemblies", {}).items()}
+        return {**group, "elements": kept, "assemblies": inner}
+
+    tables = stripped(vehicle.model_dump(exclude_none=True))
+    return vehicle.replace(
+        elements=tables["elements"],
+        assemblies=tables["assemblies"],
+        signals=None,
+        controllers=None,
+        laws=None,
+    )
 
 
 def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:

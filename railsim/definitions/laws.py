@@ -125,7 +125,8 @@ class Controller(Definition):
     inputs: dict[Name, Name] = Field(default_factory=dict)
     """Signals by the arguments of the function that take them"""
     outputs: tuple[Text, ...] = Field(min_length=1)
-    """Full names of the actuators, in the order of what the function returns; one value is for all"""
+    """Full names of the actuators, in the order of what the function returns;
+    one value is for all"""
     parameters: dict[Name, Finite] = Field(default_factory=dict)
     """Values of the function's further arguments, by name"""
     memory: Count | None = None

@@ -6,6 +6,7 @@ from typing import Any
 from railsim.definitions.flatten import flatten
 from railsim.definitions.vehicle import Vehicle
 from railsim.description.values import Description, Parts
+from railsim.laws import permitted_part
 from railsim.linear.modes import modes
 from railsim.model.statics import SLOW, static_loads
 from railsim.profiles import Profile
@@ -24,6 +25,7 @@ def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Desc
     cases = loads or (None, *vehicle.loads)
     data: dict[str, Any] = {}
     parts: Parts = []
+    vehicle = permitted_part(vehicle)
     for case in cases:
         loaded = vehicle.replace(load=case)
         found, frequencies = static_loads(loaded), rest_frequencies(loaded)

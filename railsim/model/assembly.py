@@ -133,8 +133,6 @@ def assemble(
     settings: Settings,
     profiles: Mapping[str, Profile] | None = None,
     shared: "SharedTables | None" = None,
-    *,
-    execute: bool = True,
 ) -> Model:
     """Build the arrays of one vehicle on one track.
 
@@ -147,8 +145,6 @@ def assemble(
         that it used).
     shared : SharedTables, optional
         Tables of other models with the same track, settings and profiles; takes those made now.
-    execute : bool
-        Compile laws of one's own, by permission; without, elements with laws are left out.
 
     Returns
     -------
@@ -168,8 +164,8 @@ def assemble(
     if shared.track is None:
         shared.track = track_tables(track)
     contact, tables = _contact(flat, track, settings, book, shared.contact)
-    contact = with_own_laws(contact, settings) if execute else contact
-    system, index = _suspension(flat, (vehicle.laws or {}) if execute else None)
+    contact = with_own_laws(contact, settings)
+    system, index = _suspension(flat, vehicle.laws or {})
     system = system._replace(
         track=shared.track,
         support=support_arrays(track.support),
@@ -179,7 +175,7 @@ def assemble(
     design = None
     if vehicle.load is not None:
         unloaded = vehicle.model_copy(update={"load": None})
-        design = assemble(unloaded, track, settings, profiles, shared, execute=execute)
+        design = assemble(unloaded, track, settings, profiles, shared)
     wheels = uneven_wheels(flat, track, book.used)
     check = check_rails(flat, track, book.used)
     return Model(system, index, flat, tables, book.used, design, wheels, check)

@@ -21,7 +21,7 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.element_outputs import DEFLECTION, FORCE, LINK, MOUNT
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.laws import is_allowed
+from railsim.laws import permitted_part
 from railsim.model.assembly import Model, assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.preloads import nominal_forces
@@ -175,8 +175,8 @@ def static_loads(
     59.9
     """
     track = load_track("straight") if track is None else track
-    execute = all(is_allowed(law.source or "") for law in (vehicle.laws or {}).values())
-    model = assemble(vehicle, track, settings or Settings(), profiles, execute=execute)
+    vehicle = permitted_part(vehicle)
+    model = assemble(vehicle, track, settings or Settings(), profiles)
     balance = equilibrium(model, SLOW)
     model = balance.model
     tensions = np.array(model.system.links.spring[:, 2:])

@@ -36,6 +36,7 @@ def simulate(
     progress: Progress | None = None,
     profiles: Mapping[str, Profile] | None = None,
     resume: Result | Floats | None = None,
+    allow_code: bool = False,
 ) -> Result:
     """Run one vehicle over one track.
 
@@ -63,6 +64,8 @@ def simulate(
         A result of the same vehicle, track and settings (outputs apart) whose end is the beginning
         of this run, or the state itself (``result.groups["state"]["end"]``); either gives speed and
         start.
+    allow_code : bool
+        Execute the laws of one's own that the files name, see `railsim.laws`.
 
     Returns
     -------
@@ -97,6 +100,7 @@ def simulate(
         progress=progress,
         profiles=profiles,
         resume=resume,
+        allow_code=allow_code,
     )
     run.run()
     return run.result()

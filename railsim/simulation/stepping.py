@@ -27,6 +27,7 @@ from railsim.kernels.recording import Recorder
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import ARC_LENGTH, SPEED, TIME, Work
 from railsim.kernels.time_loop import Chunk, time_loop
+from railsim.laws import allowed
 from railsim.model.assembly import SharedTables
 from railsim.model.time_step import divide_strikes
 from railsim.model.uneven_wheels import longest_part
@@ -67,11 +68,12 @@ class Simulation:
         Whether the quantities are kept at the rate of the settings: in memory, or in a file of
         this name.  Without a record the memory stays as it is however long the run, and `result`
         holds the peaks over all steps alone.
+    allow_code : bool
+        Execute the laws of one's own that the files name, see `railsim.laws`.
 
     Raises
     ------
-    InputError, ModelError
-        As `railsim.simulate`.
+    InputError, ModelError : as `railsim.simulate`.
 
     Examples
     --------
@@ -101,6 +103,7 @@ class Simulation:
         progress: Progress | None = None,
         profiles: Mapping[str, Profile] | None = None,
         resume: Result | Floats | None = None,
+        allow_code: bool = False,
     ) -> None:
         check_types([vehicle], track)
         settings = settings or Settings()
@@ -112,9 +115,9 @@ class Simulation:
         self._fraction.next_run()
         self._sink = sink or (MemorySink() if isinstance(record, bool) else Hdf5Sink(record))
         try:
-            run = begin(
-                vehicle, inputs, self._sink, profiles, before, SharedTables(), self._fraction
-            )
+            with allowed(allow_code):
+                how = profiles, before, SharedTables(), self._fraction
+                run = begin(vehicle, inputs, self._sink, *how)
         except BaseException:
             self._sink.abort()
             raise
@@ -187,8 +190,7 @@ class Simulation:
 
         Raises
         ------
-        InputError
-            The run has ended, or `dt` is no positive time.
+        InputError : the run has ended, or `dt` is no positive time.
         """
         if not self.running:
             raise InputError(
@@ -350,9 +352,8 @@ class Simulation:
 
         Raises
         ------
-        InputError
-            There is no such actuator, the value is not finite, or too many commands are on their
-            way to one with a delay.
+        InputError : there is no such actuator, the value is not finite, or too many commands are
+            on their way to one with a delay.
         """
         names = self.actuators
         if actuator not in names:
@@ -393,8 +394,7 @@ class Simulation:
 
         Raises
         ------
-        InputError
-            There is nothing of this name.
+        InputError : there is nothing of this name.
         """
         index = self._run.prepared.model.index
         values = self._present()

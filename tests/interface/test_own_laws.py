@@ -7,6 +7,7 @@ import pytest
 
 import railsim
 from railsim import laws
+from railsim.description.rest import describe_statics
 from railsim.errors import InputError
 
 SOURCE = """
@@ -202,11 +203,11 @@ def test_faults_are_one_line(coach, track, element, words):
     assert len(str(raised.value).splitlines()) == 1
 
 
-def test_nothing_is_executed_without_permission(coach, track, capsys):
+def test_nothing_is_executed_without_permission(coach, track, capsys, monkeypatch):
     vehicle = with_element(coach, law("damper"))
     assert vehicle.to_toml().count("executed") == len(NAMES)
     railsim.describe(vehicle)
-    railsim.static_loads(vehicle)
+    describe_statics(vehicle)
     with pytest.raises(InputError, match=r"'damper' is code of mine.py.*--allow-code"):
         railsim.simulate(vehicle, track, **WAY)
     assert "executed" not in capsys.readouterr().out
@@ -214,6 +215,10 @@ def test_nothing_is_executed_without_permission(coach, track, capsys):
     laws.allow(SOURCE)
     railsim.Simulation(vehicle, track, **WAY)
     assert "executed" in capsys.readouterr().out
+    monkeypatch.delenv(laws.PERMITTED)
+    railsim.Simulation(vehicle, track, **WAY, allow_code=True)
+    assert laws.PERMITTED not in os.environ
+    laws.allow(SOURCE)
     laws.allow("other")
     assert os.environ[laws.PERMITTED].count(",") == 1
 

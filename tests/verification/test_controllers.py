@@ -1,0 +1,150 @@
+"""Controllers in the loop against the linearised loop and against what tilting has to give."""
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim import laws
+from railsim.assessment.weighting import WF
+from railsim.linear.closed_loop import closed_loop
+from railsim.linear.eigenmodes import eigenmodes
+from railsim.linear.vehicle import LinearVehicle
+
+G = 9.80665
+ENDS = {"front": 9.5, "rear": -9.5}
+
+
+@laws.controller
+def skyhook(time, v, c):
+    return c * v
+
+
+@laws.controller
+def tilt(time, curvature, arm):
+    return arm * curvature
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return railsim.load_vehicle("coach_manchester")
+
+
+def bogie_with(coach, actuator, *without):
+    bogie = coach.assemblies["bogie"].model_dump(exclude_none=True)
+    elements = {name: e for name, e in bogie["elements"].items() if name not in without}
+    ends = {"kind": "actuator", "bodies": ["frame", "carbody"]}
+    return {"bogie": {**bogie, "elements": {**elements, "act": {**ends, **actuator}}}}
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.02])
+def test_skyhook_decays_as_its_linearised_loop(coach, delay):
+    """The swaying mode alone, by its left eigenvector: decay within 1 %, frequency within 0.2 %.
+
+    The controller is 500 times faster than the mode; its delay is in the linearisation.
+    """
+    across = {"point": [0.0, 0.0, -0.7], "acts": "y", "delay": delay}
+    vehicle = coach.replace(
+        assemblies=bogie_with(coach, across, "secondary_lateral_damper"),
+        laws={"skyhook": laws.law(skyhook)},
+        signals={
+            end: {"quantity": "velocity", "body": "carbody", "axis": "y", "position": [x, 0, -0.7]}
+            for end, x in ENDS.items()
+        },
+        controllers={
+            end: {
+                "law": "skyhook",
+                "period": 0.005,
+                "inputs": {"v": end},
+                "outputs": [f"{end}.act"],
+                "parameters": {"c": 40e3},
+            }
+            for end in ENDS
+        },
+    )
+    track = railsim.load_track("straight").replace(support={"preset": "rigid"})
+    pushed = railsim.Settings(initial={"carbody": {"vy": 1e-3, "vroll": 3e-4}})
+    sim = railsim.Simulation(vehicle, track, speed=20.0, settings=pushed, record=False)
+    loop = closed_loop(vehicle, track, 20.0, step=sim.step_length)
+    modes = eigenmodes(loop)
+    chosen = [k for k, e in enumerate(modes.eigenvalues) if 1.0 < e.imag < 4.0]
+    k = min(chosen, key=lambda k: modes.eigenvalues[k].imag)
+    indices = LinearVehicle(vehicle, track).coordinates.indices
+    left, rest = modes.left[k][: len(indices)], loop.state[: len(indices)]
+    times, parts = [], []
+    while sim.time < 4.0:
+        sim.step(0.01)
+        times.append(sim.time)
+        parts.append((sim.state.motion[indices] - rest) @ left)
+    t, q = np.array(times)[30:], np.array(parts)[30:]
+    decay = np.polyfit(t, np.log(np.abs(q)), 1)[0]
+    frequency = np.polyfit(t, np.unwrap(np.angle(q)), 1)[0]
+    assert decay == pytest.approx(modes.eigenvalues[k].real, rel=0.01)
+    assert frequency == pytest.approx(modes.eigenvalues[k].imag, rel=0.002)
+    passive = eigenmodes(LinearVehicle(vehicle, track).linearised(20.0)).eigenvalues
+    slow = min((e for e in passive if 1.0 < e.imag < 4.0), key=lambda e: e.imag)
+    assert decay < 4.0 * slow.real  # the passive mode is hardly damped
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_tilted_car_body_feels_less(coach, sign):
+    """a_q cos(tilt) - g_n sin(tilt) in the steady curve, within 0.5 % of a_q; both directions.
+
+    Tilt is the total roll of the car body against the track plane, g_n the part of gravity and
+    centrifugal acceleration normal to that plane.
+    """
+    held = {"point": [0.0, 0.0, -0.9], "acts": "roll", "command": "position"}
+    actuator = {**held, "stiffness": 50e6, "damping": 2e6, "lag": 0.2, "rate_limit": 0.09}
+    vehicle = coach.replace(
+        assemblies=bogie_with(coach, actuator),
+        laws={"tilt": laws.law(tilt)},
+        controllers={
+            "tilt": {
+                "law": "tilt",
+                "period": 0.01,
+                "inputs": {"curvature": "curvature"},
+                "parameters": {"arm": 40.0},
+                "outputs": ["front.act", "rear.act"],
+            }
+        },
+        signals={
+            "curvature": {"quantity": "curvature"},
+            "felt": {"quantity": "acceleration", "body": "carbody", "axis": "y"},
+            "roll": {"quantity": "angle", "body": "carbody", "axis": "roll"},
+        },
+    )
+    radius, cant, speed = sign * 400.0, 0.10, 30.0
+    track = railsim.load_track("straight").replace(
+        plan=[
+            {"type": "STR", "length": 60.0},
+            {"type": "CLO", "length": 80.0, "radius_end": radius},
+            {"type": "CIR", "length": 400.0, "radius": radius},
+        ],
+        cant=[
+            {"type": "CST", "length": 60.0, "cant": 0.0},
+            {"type": "LIR", "length": 80.0},
+            {"type": "CST", "length": 400.0, "cant": sign * cant},
+        ],
+    )
+    sim = railsim.Simulation(vehicle, track, speed=speed, record=False)
+    while sim.distance < 300.0:
+        sim.step(0.05)
+    felt, roll = [], []
+    while sim.distance < 420.0:
+        sim.step(0.02)
+        felt.append(sim.read("felt"))
+        roll.append(sim.read("roll"))
+    angle = np.arcsin(cant / 1.5)
+    centrifugal = speed**2 / 400.0
+    a_q = centrifugal * np.cos(angle) - G * np.sin(angle)
+    g_n = G * np.cos(angle) + centrifugal * np.sin(angle)
+    tilted = sign * np.mean(roll)
+    assert tilted > 0.07  # 0.1 rad less what springs and wheels yield
+    expected = a_q * np.cos(tilted) - g_n * np.sin(tilted)
+    assert abs(sign * np.mean(felt) - expected) < 0.005 * a_q
+
+
+def test_weighting_of_motion_sickness():
+    """ISO 2631-1, table 3: Wf in thousandths, rounded there to three digits."""
+    table = {0.1: 695, 0.16: 1006, 0.2: 992, 0.25: 854, 0.4: 384, 0.5: 224}
+    gains = WF.gain(np.array(list(table)))
+    assert np.allclose(1e3 * gains, list(table.values()), rtol=0.01)
