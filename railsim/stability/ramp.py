@@ -78,7 +78,8 @@ def ramp(
     ----------
     motion : Motion
     low, high : float
-        Range of speeds [m/s]; where every disturbance derails at `high`, a lower one is taken.
+        Range of speeds [m/s]; where every disturbance or the braking after it derails at `high`, a
+        lower one is taken.
     excitations : sequence of float
         Sizes of the disturbances at the highest speed [m].
 
@@ -90,15 +91,16 @@ def ramp(
     tell = progress or (lambda _: None)
     speed = high
     while True:
+        hard: list[Point] = []
         try:
-            seen = hunting(motion, speed, excitations)
+            hard.append(seen_at(speed, hunting(motion, speed, excitations)))
+            _brake(motion, hard, low, BRAKING, lambda share: tell(0.3 * share))
             break
-        except LeftRange:
+        except LeftRange:  # excited, or while it brakes
             if speed <= low:
                 raise
-            speed = max(low, STEP_DOWN * speed)
-    hard = [seen_at(speed, seen)]
-    _brake(motion, hard, low, BRAKING, lambda share: tell(0.3 * share))
+            reached = hard[-1].speed if hard else speed
+            speed = max(low, min(STEP_DOWN * speed, reached))
     begin = min(hard[0].speed, hard[-1].speed + LEAD)
     points = [point for point in hard if point.speed >= begin]
     _brake(motion, points, low, DECELERATION, lambda share: tell(0.3 + 0.4 * share))

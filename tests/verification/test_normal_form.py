@@ -13,7 +13,8 @@ import pytest
 
 from railsim.stability.branches import Branch, Point, jumps, lowest_of
 from railsim.stability.diagram import diagram, settled
-from railsim.stability.motion import Stretch
+from railsim.stability.motion import LeftRange, Stretch
+from railsim.stability.ramp import ramp
 
 A0, RATE, OMEGA, STEP = 4e-3, 4.0, 12.0, 0.01
 FOLD, LOST = 45.0, 50.0
@@ -97,3 +98,15 @@ def test_a_motion_that_grows_is_followed_to_its_end():
     assert settled(NormalForm(), start, 45.5, 45.5).amplitude == pytest.approx(
         hunting(45.5)[0], rel=0.01
     )
+
+
+def test_ramp_goes_on_below_speeds_at_which_braking_derails():
+    class Derails(NormalForm):
+        def stretch(self, state, begin, end, duration):
+            if end < begin and begin > 52.0:
+                raise LeftRange("it derailed")
+            return super().stretch(state, begin, end, duration)
+
+    lowest, branch = ramp(Derails(), 43.0, 58.0)
+    assert lowest.speed == pytest.approx(FOLD, abs=0.15)
+    assert branch.points[0].speed <= 52.0
