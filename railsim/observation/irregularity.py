@@ -20,6 +20,7 @@ from scipy.fft import next_fast_len
 from railsim.contact.geometry import geometry_of
 from railsim.definitions.excitations.recording import ORDER
 from railsim.definitions.excitations.spectra import SPECTRA
+from railsim.definitions.layout import curvature_sections
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, argument_fault, nearest
@@ -172,8 +173,27 @@ def irregularity(
         found.append(smooth.estimate(piece))
         if progress is not None:
             progress((number + 1) / len(pieces))
-    remarks += smooth.remarks()
+    remarks += smooth.remarks() + _curves(track, measurement)
     return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks)
+
+
+def _curves(track: Track, measurement: Measurement) -> list[str]:
+    """Remark on curves, which the model does not have."""
+    begin, end = measurement.distance[[0, -1]]
+    curved = [
+        section
+        for section in curvature_sections(track)
+        if (section.start_value or section.end_value)
+        and section.begin < end
+        and section.end > begin
+    ]
+    if not curved:
+        return []
+    low, high = min(c.begin for c in curved), max(c.end for c in curved)
+    return [
+        f"The track has curves between s = {low:.0f} and {high:.0f} m; the model is one on "
+        "straight track: alignment, Y and sum Y there are not to be relied upon."
+    ]
 
 
 def _used(measurement: Measurement, known: dict[str, Any]) -> dict[str, str]:
