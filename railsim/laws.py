@@ -30,6 +30,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 PERMITTED = "RAILSIM_LAWS"
 """Environment variable with the hashes of permitted sources, for worker processes."""
 ALL = "all"
+KNOWN = "import math\nfrom math import *\n\nimport numpy as np"
+"""What a function that is given in Python knows beside its arguments."""
 MEMORY = "memory"
 KIND = "railsim_law"
 _LOG = logging.getLogger(__name__)
@@ -123,8 +125,8 @@ def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
     Parameters
     ----------
     function : callable
-        Its source has to be readable: of a module, a script or a notebook.  What it needs beside
-        it stands in its body, as ``from math import exp``.
+        Its source has to be readable: of a module, a script or a notebook.  It knows the
+        functions of `math`, numpy as ``np`` and nothing else beside its arguments.
     compiled : bool
         Whether it is compiled; called as Python it is slower by far.
     """
@@ -133,7 +135,7 @@ def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
     definition = tree.body[0]
     assert isinstance(definition, ast.FunctionDef)
     definition.decorator_list = []
-    source = ast.unparse(tree) + "\n"
+    source = f"{KNOWN}\n\n{ast.unparse(tree)}\n"
     allow(source)
     return Law(function=definition.name, source=source, compiled=compiled)
 
@@ -386,7 +388,9 @@ class _Binding:
             entry = numba.cfunc(types.void(types.CPointer(types.float64)), error_model="numpy")(
                 scope["entry"]
             )
-        except numba.core.errors.NumbaError as error:
+        except InputError:
+            raise
+        except Exception as error:  # numba's own are of several kinds
             line = getattr(getattr(error, "loc", None), "line", None)
             self._refuse(f"cannot be compiled: {_short(error)}", "floats, math, if and for", line)
         return entry.address, (entry, compiled)

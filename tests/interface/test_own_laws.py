@@ -231,3 +231,42 @@ def test_a_controller_faster_than_the_step_of_the_settings(coach, track):
         railsim.simulate(vehicle, track, **WAY | {"settings": settings})
     free = railsim.Simulation(vehicle, track, **WAY)
     assert free.step_length == pytest.approx(0.001)
+
+
+def shen_hedrick_elkins(xi_x, xi_y, phi, a, b, mu_N, c11, c22, c23, c33, G):
+    size = sqrt(a * b)  # noqa: F821 - of math
+    x = G * a * b * c11 * xi_x
+    y = G * a * b * (c22 * xi_y + size * c23 * phi)
+    m = G * a * b * size * (size * c33 * phi - c23 * xi_y)
+    arm = 0.5 * 0.6**2 * (a * a + b * b)
+    u = sqrt(x * x + y * y + (G * a * b * phi) ** 2 * c11 * c22 * arm) / mu_N  # noqa: F821
+    factor = 1.0 / u if u >= 3.0 else 1.0 - u / 3.0 + u * u / 27.0
+    return factor * x, factor * y, factor * m
+
+
+def falling(slip, speed, rest, decay=0.6):
+    return (1.0 - rest) * math.exp(-decay * slip) + rest  # noqa: F821
+
+
+def test_creep_and_friction_laws_are_the_built_in_ones(coach, track):
+    """Linear theory bent after Shen, Hedrick, Elkins; friction after Polach: to round-off."""
+    plain = railsim.Settings(initial=PUSHED, creep_law="linear")
+    own = plain.replace(
+        laws={"bent": laws.law(shen_hedrick_elkins), "falling": laws.law(falling)},
+        own_creep_law={"law": "bent"},
+        own_friction={"law": "falling", "parameters": {"rest": 0.4}},
+    )
+    slippery = track.with_values({"friction_falling.rest": 0.4, "friction_falling.decay": 0.6})
+    expected = railsim.simulate(coach, slippery, **WAY | {"settings": plain})
+    found = railsim.simulate(coach, track, **WAY | {"settings": own})
+    assert np.max(np.abs(expected["Y"])) > 1e3
+    assert np.allclose(found["Y"], expected["Y"], atol=1e-5)
+
+
+def test_python_without_compiling(coach, track):
+    """The same forces; an error within ends the run."""
+    compiled = railsim.simulate(with_element(coach, law("damper")), track, **WAY, allow_code=True)
+    slow = with_element(coach, law("damper")).with_values({"laws.damper.compiled": False})
+    plain = railsim.simulate(slow, track, **WAY, allow_code=True)
+    scale = np.max(np.abs(compiled["element_force"]))
+    assert np.allclose(plain["element_force"], compiled["element_force"], atol=1e-9 * scale)
