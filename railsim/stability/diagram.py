@@ -80,7 +80,11 @@ def diagram(
     reached = [point.speed for point in up.points]
     state, before = hunting(motion, reached[-1], excitations).state, reached[-1]
     for speed in reversed(reached):
-        down.points.append(seen_at(speed, settled(motion, state, before, speed)))
+        try:
+            seen = settled(motion, state, before, speed)
+        except LeftRange:  # while it brakes
+            seen = hunting(motion, speed, excitations)
+        down.points.append(seen_at(speed, seen))
         state, before = down.points[-1].state, speed
         tell(0.25 * (1.0 + len(down.points) / len(speeds)))
     branches = [up, down]

@@ -100,13 +100,18 @@ def test_a_motion_that_grows_is_followed_to_its_end():
     )
 
 
-def test_ramp_goes_on_below_speeds_at_which_braking_derails():
-    class Derails(NormalForm):
-        def stretch(self, state, begin, end, duration):
-            if end < begin and begin > 52.0:
-                raise LeftRange("it derailed")
-            return super().stretch(state, begin, end, duration)
+class Derails(NormalForm):
+    """What derails while it brakes from above 52 m/s."""
 
+    def stretch(self, state, begin, end, duration):
+        if end < begin and begin > 52.0:
+            raise LeftRange("it derailed")
+        return super().stretch(state, begin, end, duration)
+
+
+def test_ramp_and_diagram_go_on_below_speeds_at_which_braking_derails():
+    found = lowest_of(diagram(Derails(), [44.0, 46.0, 51.0, 53.0]))
+    assert found.speed == pytest.approx(FOLD, abs=0.15)
     lowest, branch = ramp(Derails(), 43.0, 58.0)
     assert lowest.speed == pytest.approx(FOLD, abs=0.15)
     assert branch.points[0].speed <= 52.0
