@@ -4,16 +4,19 @@ Before each step the change of every contact force over it is predicted, from th
 its rate and from the slopes of the rails ahead (`wheel_contact`, `rails.predict_rate_changes`).
 """
 
+import numpy as np
+
 from railsim.kernels import compiled
 from railsim.kernels.internal import constant_decays
-from railsim.kernels.support_step import step_compliance
-from railsim.kernels.system import AHEAD, DIVIDED, PARTS, SHARE
+from railsim.kernels.support import step_compliance
+from railsim.kernels.system import AHEAD, DIVIDED, LOCATED, PARTS, SHARE
 
 
 @compiled(python=False)
 def prepare_steps(system, work, h):
     """Decays and rails' compliance over steps of length `h` and over their parts."""
     parts = work.parts[PARTS]
+    work.watch[LOCATED] = np.nan  # of another track
     work.watch[AHEAD] = h if parts > 0 else 0.0
     constant_decays(system.internal, h, work.decay)
     if parts > 0:

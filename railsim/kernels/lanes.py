@@ -92,6 +92,33 @@ def _of_one(name):
 square_root, sine, cosine = _of_one("sqrt"), _of_one("sin"), _of_one("cos")
 
 
+def _of_two(name):
+    """Make the intrinsic of an LLVM function of two numbers, lane by lane."""
+
+    @intrinsic
+    def function(typingctx, x, y):
+        def codegen(context, builder, sig, args):
+            return Registers(builder).call(name, *args)
+
+        return lanes(lanes, lanes), codegen
+
+    return function
+
+
+smaller, larger = _of_two("minnum"), _of_two("maxnum")
+
+
+@intrinsic
+def beside(typingctx, x):
+    """Each lane's neighbour: of two that belong together the other one."""
+
+    def codegen(context, builder, sig, args):
+        mask = ir.Constant(ir.VectorType(INDEX, LANES), [1, 0, 3, 2, 5, 4, 7, 6])
+        return builder.shuffle_vector(args[0], args[0], mask)
+
+    return lanes(lanes), codegen
+
+
 @intrinsic
 def spread(typingctx, x):
     """One number in all lanes."""
@@ -137,10 +164,19 @@ def _mask(count):
     return ir.Constant(ir.VectorType(ir.IntType(1), LANES), [k < count for k in range(LANES)])
 
 
+def _few(count):
+    return ir.VectorType(VECTOR.element, count)
+
+
 def _load(builder, pointer, count):
     """Load the first `count` of eight numbers, which need not be aligned."""
     if count == LANES:
         return builder.load(pointer, align=8)
+    if count in (2, 4):
+        narrow = builder.load(builder.bitcast(pointer, _few(count).as_pointer()), align=8)
+        mask = [min(k, count) for k in range(LANES)]
+        zero = ir.Constant(_few(count), [0.0] * count)
+        return builder.shuffle_vector(narrow, zero, ir.Constant(ir.VectorType(INDEX, LANES), mask))
     bits = ir.VectorType(ir.IntType(1), LANES)
     kind = ir.FunctionType(VECTOR, [ir.PointerType(VECTOR), INDEX, bits, VECTOR])
     load = cgutils.get_or_insert_function(builder.module, kind, "llvm.masked.load.v8f64.p0")
@@ -151,6 +187,11 @@ def _load(builder, pointer, count):
 def _store(builder, value, pointer, count):
     if count == LANES:
         builder.store(value, pointer, align=8)
+        return
+    if count in (2, 4):
+        first = ir.Constant(ir.VectorType(INDEX, count), list(range(count)))
+        narrow = builder.shuffle_vector(value, value, first)
+        builder.store(narrow, builder.bitcast(pointer, _few(count).as_pointer()), align=8)
         return
     bits = ir.VectorType(ir.IntType(1), LANES)
     kind = ir.FunctionType(ir.VoidType(), [VECTOR, ir.PointerType(VECTOR), INDEX, bits])
@@ -325,6 +366,46 @@ def eight_from(first, count):
 
 
 @compiled(inline=True)
+def eight_in_pairs(first, count):
+    """2 k and 2 k + 1 of four numbers k from `first` on; beyond `count` those of the last again."""
+    last = count - 1
+    a, b = 2 * min(first, last), 2 * min(first + 1, last)
+    c, d = 2 * min(first + 2, last), 2 * min(first + 3, last)
+    return a, a + 1, b, b + 1, c, c + 1, d, d + 1
+
+
+@compiled(inline=True)
+def pair_starts(numbers, begin, size, between):
+    """Where rows of a `size` start after `begin`: one a pair, for its second `between` on."""
+    a, b = begin + (numbers[0] >> 1) * size, begin + (numbers[2] >> 1) * size
+    c, d = begin + (numbers[4] >> 1) * size, begin + (numbers[6] >> 1) * size
+    return a, a + between, b, b + between, c, c + between, d, d + between
+
+
+@compiled(inline=True)
+def eight_of_pairs(index, numbers):
+    """Entries of `index` at the four numbers k of the eight 2 k and 2 k + 1."""
+    a, b = index[numbers[0] >> 1], index[numbers[2] >> 1]
+    c, d = index[numbers[4] >> 1], index[numbers[6] >> 1]
+    return a, a, b, b, c, c, d, d
+
+
+@compiled(inline=True)
+def second_on(rows, between):
+    """The second of each pair of rows so much further on."""
+    return (
+        rows[0],
+        rows[1] + between,
+        rows[2],
+        rows[3] + between,
+        rows[4],
+        rows[5] + between,
+        rows[6],
+        rows[7] + between,
+    )
+
+
+@compiled(inline=True)
 def eight_of(index, numbers):
     """Entries of `index` at the eight `numbers`."""
     return (
@@ -355,6 +436,7 @@ def starts(numbers, size):
 
 
 if numba.config.DISABLE_JIT:
+    smaller, larger, beside = plain.smaller, plain.larger, plain.beside
     spread, where_beyond, any_beyond = plain.spread, plain.where_beyond, plain.any_beyond
     square_root, sine, cosine = plain.square_root, plain.sine, plain.cosine
     load_rows, store_rows, add_rows = plain.load_rows, plain.store_rows, plain.add_rows

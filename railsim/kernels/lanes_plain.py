@@ -4,6 +4,12 @@ import numpy as np
 
 LANES = 8
 square_root, sine, cosine = np.sqrt, np.sin, np.cos
+smaller, larger = np.fmin, np.fmax
+
+
+def beside(x):
+    """Each lane's neighbour: of two that belong together the other one."""
+    return x[[1, 0, 3, 2, 5, 4, 7, 6]]
 
 
 def spread(x):

@@ -18,12 +18,23 @@ position and to its rate and, other than a shape, is a velocity of the rail's ma
 which the wheel slips.  On rigid rails all four are zero.
 """
 
-from math import asin, sqrt
-
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.system import AHEAD, ARC_LENGTH, SPEED
+from railsim.kernels.lanes import (
+    beside,
+    eight_in_pairs,
+    eight_of_pairs,
+    load_lanes,
+    load_rows,
+    pair_starts,
+    second_on,
+    square_root,
+    starts,
+    store_rows,
+)
+from railsim.kernels.rotation import arc_sine_lanes
+from railsim.kernels.system import AHEAD, ARC_LENGTH, LOCATED, SPEED
 from railsim.kernels.track_frame import (
     MU_LEFT,
     Y_LEFT,
@@ -35,6 +46,9 @@ from railsim.kernels.track_frame import (
 )
 
 CANT_BASE = 1.5  # m, 2 b_0
+
+PAIRS = 4  # wheelsets in eight lanes, one a rail: left, right, left, ...
+SIDES = np.array([-1.0, 1.0] * PAIRS)
 
 # columns of Work.plane[w]: middle of the rails, their slopes; roll of the plane, its sine, cosine
 # and rate along the track; change of the vertical slope along the track
@@ -56,63 +70,67 @@ CHANGES = 4
 
 
 @compiled
-def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
-    """Rails under all wheelsets into `plane` and `rail`.
+def locate_rails(system, work, s):
+    """Rails under all wheelsets, the reference body being at arc length `s` [m].
+
+    Beyond the end of the track's table a wheelset keeps what was under it.
+    """
+    if work.watch[LOCATED] == s:
+        return
+    work.watch[LOCATED] = s
+    track, body, frame = system.track, system.contact.body, system.bodies.frame
+    for w in range(body.shape[0]):
+        i, u = cell_of(track, s + system.frame_offset[frame[body[w]]])
+        if i >= 0:
+            work.rail_cell[w], work.rail_u[w] = i, u
+    locate_in_cells(track, work.rail_cell, work.rail_u, work.plane, work.rail)
+
+
+@compiled(python=False)
+def locate_in_cells(track, cell, cell_u, plane, rail):
+    """Rails of wheelsets at `cell_u` [m] in the cells `cell` of a track's tables.
 
     Parameters
     ----------
     track : TrackTables
-    wheelset_body, frame : int64[w], int64[n]
-        Body of each wheelset, track frame of each body.
-    cell, cell_u : int64[f], float64[f]
-        Where the frames are, see `track_frame.cell_of`.
+    cell, cell_u : int64[w], float64[w]
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
-        Where no rail is displaced only the friction is written.
+        Written; where no rail is displaced only the friction.
     """
-    c = track.rail
-    for w in range(wheelset_body.shape[0]):
-        f = frame[wheelset_body[w]]
-        i, u = cell[f], cell_u[f]
-        for side in range(2):
-            m = MU_LEFT + side
-            rail[w, side, FRICTION], _, _ = polynomial(
-                c[i, m, 0], c[i, m, 1], c[i, m, 2], c[i, m, 3], u
-            )
-        if track.has_irregularity:
-            locate_displaced(c, i, u, w, plane, rail)
-
-
-@compiled(python=False)
-def locate_displaced(c, i, u, w, plane, rail):
-    """Plane and rails of wheelset `w` from the displacements in cell `i` of the tables `c`."""
-    y_l, y_l1, y_l2 = polynomial(
-        c[i, Y_LEFT, 0], c[i, Y_LEFT, 1], c[i, Y_LEFT, 2], c[i, Y_LEFT, 3], u
-    )
-    z_l, z_l1, z_l2 = polynomial(
-        c[i, Z_LEFT, 0], c[i, Z_LEFT, 1], c[i, Z_LEFT, 2], c[i, Z_LEFT, 3], u
-    )
-    y_r, y_r1, y_r2 = polynomial(
-        c[i, Y_RIGHT, 0], c[i, Y_RIGHT, 1], c[i, Y_RIGHT, 2], c[i, Y_RIGHT, 3], u
-    )
-    z_r, z_r1, z_r2 = polynomial(
-        c[i, Z_RIGHT, 0], c[i, Z_RIGHT, 1], c[i, Z_RIGHT, 2], c[i, Z_RIGHT, 3], u
-    )
-    sine = (z_r - z_l) / CANT_BASE
-    cosine = sqrt(1.0 - sine * sine)
-    plane[w, MIDDLE_Y] = 0.5 * (y_l + y_r)
-    plane[w, MIDDLE_Z] = 0.5 * (z_l + z_r)
-    plane[w, SLOPE_Y] = 0.5 * (y_l1 + y_r1)
-    plane[w, SLOPE_Z] = 0.5 * (z_l1 + z_r1)
-    plane[w, ROLL] = asin(sine)
-    plane[w, SINE] = sine
-    plane[w, COSINE] = cosine
-    plane[w, BEND_Z] = 0.5 * (z_l2 + z_r2)
-    plane[w, ROLL_SLOPE] = (z_r1 - z_l1) / (CANT_BASE * cosine)
-    wider, widening = 0.5 * (y_r - y_l), 0.5 * (y_r1 - y_l1)
-    rail[w, 0, ASIDE], rail[w, 0, ASIDE_SLOPE] = -wider, -widening
-    rail[w, 1, ASIDE], rail[w, 1, ASIDE_SLOPE] = wider, widening
-    rail[w, 0, RAIL_SLOPE], rail[w, 0, RAIL_BEND] = y_l1, y_l2
-    rail[w, 1, RAIL_SLOPE], rail[w, 1, RAIL_BEND] = y_r1, y_r2
+    for first in range(0, cell.shape[0], PAIRS):
+        wheels = eight_in_pairs(first, cell.shape[0])
+        i, rails = starts(eight_of_pairs(cell, wheels), 24), starts(wheels, RAIL_SIZE)
+        u = load_rows(cell_u, pair_starts(wheels, 0, 1, 0), 0, 1)[0]
+        m0, m1, m2, m3 = load_rows(track.rail, second_on(i, 4), 4 * MU_LEFT, 4)
+        friction, _, _ = polynomial(m0, m1, m2, m3, u)
+        if not track.has_irregularity:
+            store_rows(rail, rails, FRICTION, (friction,))
+            continue
+        y0, y1, y2, y3, z0, z1, z2, z3 = load_rows(track.rail, second_on(i, 8), 0, 8)
+        y, y_slope, y_bend = polynomial(y0, y1, y2, y3, u)
+        z, z_slope, z_bend = polynomial(z0, z1, z2, z3, u)
+        side = load_lanes(SIDES, 0)
+        sine = side * (z - beside(z)) / CANT_BASE
+        cosine = square_root(1.0 - sine * sine)
+        planes = pair_starts(wheels, 0, PLANE_SIZE, 0)
+        store_rows(
+            plane,
+            planes,
+            0,
+            (
+                0.5 * (y + beside(y)),
+                0.5 * (z + beside(z)),
+                0.5 * (y_slope + beside(y_slope)),
+                0.5 * (z_slope + beside(z_slope)),
+                arc_sine_lanes(sine),
+                sine,
+                cosine,
+                side * (z_slope - beside(z_slope)) / (CANT_BASE * cosine),
+            ),
+        )
+        store_rows(plane, planes, BEND_Z, (0.5 * (z_bend + beside(z_bend)),))
+        wider, widening = 0.5 * (y - beside(y)), 0.5 * (y_slope - beside(y_slope))
+        store_rows(rail, rails, 0, (friction, wider, widening, y_slope, y_bend))
 
 
 @compiled(python=False)
@@ -191,12 +209,16 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
         Lateral displacement [m] and roll [rad] (output).
     """
     yielded = np.zeros(4)
+    n = body.shape[0]
+    cell, cell_u = np.zeros(n, dtype=np.int64), np.zeros(n)
     for i in range(states.shape[0]):
-        for w in range(body.shape[0]):
-            if track.has_irregularity:
-                cell, u = cell_of(track, states[i, ARC_LENGTH] + offset[w])
-                if cell >= 0:
-                    locate_displaced(track.rail, cell, u, w, plane, rail)
+        for w in range(n if track.has_irregularity else 0):
+            k, u = cell_of(track, states[i, ARC_LENGTH] + offset[w])
+            if k >= 0:
+                cell[w], cell_u[w] = k, u
+        if track.has_irregularity:
+            locate_in_cells(track, cell, cell_u, plane, rail)
+        for w in range(n):
             if size > 0:
                 yielded = states[i, first + size * w : first + size * w + 4]
             b = 6 * body[w]

@@ -17,6 +17,8 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
+import numpy as np
+
 from railsim.kernels import compiled
 from railsim.kernels.actuators import actuator_forces
 from railsim.kernels.driving import (
@@ -68,6 +70,7 @@ from railsim.kernels.system import (
     FORCE,
     FREE,
     I_2,
+    LOCATED,
     MOMENT,
     POSE_SIZE,
     PUSH,
@@ -415,6 +418,8 @@ def mechanics(system, work, state, derivative, rails):
     )
     if status != RUNNING:
         return status, 0, 0
+    if rails != AFTER_STEP:
+        work.watch[LOCATED] = np.nan
     if system.support.elastic:
         locate_support(system, work, s)
     if bodies.fixed.shape[0] > 0:

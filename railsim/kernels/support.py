@@ -22,8 +22,21 @@ chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.contact_columns import W_Q, W_Y
-from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE
+from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
+from railsim.kernels.lanes import (
+    any_beyond,
+    beside,
+    eight_in_pairs,
+    larger,
+    load_lanes,
+    load_rows,
+    pair_starts,
+    spread,
+    starts,
+    store_rows,
+    where_beyond,
+)
+from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE, PAIRS, SIDES
 from railsim.kernels.system import LAST_STEP
 
 # columns of a wheelset's track in the state: u, u', r_0, s_0, u''
@@ -80,17 +93,19 @@ FOOT_Y_STIFFNESS, FOOT_Z_STIFFNESS, STIFFNESS = 16, 17, 18
 # set of the patches that carry, in bits; errors of the forces foreseen
 PATCHES, ERROR_Y, ERROR_Z = 19, 20, 21
 SUPPORT_COLUMNS = 24  # whole cache lines
-# columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's motion
-# before the step, see `note_wheelset`, and the factors of pads and ballast
-MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
+# columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the factors of pads
+# and ballast
+PADS, BALLAST = DOF, DOF + 1
 # imbalance of the rails one correction ago, what corrections are multiplied by, and whether one
 # is left to the next step
-BEFORE, RELAXATION, PENDING = DOF + 13, DOF + 17, DOF + 19
+BEFORE, RELAXATION, PENDING = DOF + 2, DOF + 6, DOF + 8
 # whether its contact is not to be evaluated again
-SKIP = DOF + 20
+SKIP = DOF + 9
+# whether its rails move at once
+MOVED = DOF + 10
 # heights of wheels that are not round, left and right, and their rates
-HEIGHTS = DOF + 21
-SUPPORT_STEP = 32
+HEIGHTS = DOF + 11
+SUPPORT_STEP = 24  # whole cache lines
 # share of the creep law's slope that what is learnt may take away: a rail stays damped
 LEAST_SHARE = 0.8
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
@@ -131,133 +146,125 @@ def locate_support(system, work, s):
             factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
 
 
-@compiled(python=False)
-def track_forces(support, track, u, first, k, c, out, sign):
-    """Add `sign` times the forces of pads and ballast, k K x + c C x with x at ``u[first:]``.
-
-    Parameters
-    ----------
-    track : float64[SUPPORT_STEP]
-        For the factors of pads and ballast.
-    out : float64[...]
-        Its first 7 entries take the forces on the degrees of freedom, resistance positive.
-    """
-    row = support.row
-    base = row[HALF_BASE]
-    y, z, roll = 0.0, 0.0, 0.0
-    for side in range(2):
-        arm = (2.0 * side - 1.0) * base
-        i = first + 2 * side
-        f_y = (u[i] - u[first + 4]) * sign * track[PADS] * (k * row[K_PAD_Y] + c * row[C_PAD_Y])
-        f_z = (
-            (u[i + 1] - u[first + 5] - arm * u[first + 6])
-            * sign
-            * track[PADS]
-            * (k * row[K_PAD_Z] + c * row[C_PAD_Z])
-        )
-        out[2 * side] += f_y
-        out[2 * side + 1] += f_z
-        y += f_y
-        z += f_z
-        roll += arm * f_z
-    if support.sleeper:
-        much = sign * track[BALLAST]
-        out[4] += much * (k * row[K_BALLAST_Y] + c * row[C_BALLAST_Y]) * u[first + 4] - y
-        out[5] += much * (k * row[K_BALLAST_Z] + c * row[C_BALLAST_Z]) * u[first + 5] - z
-        out[6] += much * (k * row[K_BALLAST_ROLL] + c * row[C_BALLAST_ROLL]) * u[first + 6] - roll
+@compiled(inline=True)
+def load_track(state, rails, sleepers, first):
+    """Entries from `first` on of tracks: y, z of the rails, then y, z, roll of the sleepers."""
+    return load_rows(state, rails, first, 2) + load_rows(state, sleepers, first, 3)
 
 
 @compiled(inline=True)
-def product(contact, matrix, y, z, roll):
-    """Matrix K or D of a contact times a motion of the wheel against the rail: forces (Y, Q)."""
-    m = matrix
+def store_track(state, rails, sleepers, first, values):
+    """Store what `load_track` loads."""
+    store_rows(state, rails, first, values[:2])
+    store_rows(state, sleepers, first, values[2:])
+
+
+@compiled(inline=True)
+def track_rows(system, wheels):
+    """Where rails and sleepers of eight wheels begin in the state."""
+    first = support_begin(system)
     return (
-        contact[m] * y + contact[m + 1] * z + contact[m + 2] * roll,
-        contact[m + 3] * y + contact[m + 4] * z + contact[m + 5] * roll,
+        pair_starts(wheels, first, SUPPORT_SIZE, 2),
+        pair_starts(wheels, first + RAIL_DOF, SUPPORT_SIZE, 0),
     )
 
 
 @compiled(inline=True)
-def rail_matrix(contact, y, z, c, k):
-    """Matrix of a rail's y and z, row by row, c D + k K with `y` and `z` on its diagonal; 1/det."""
-    p = y + c * contact[D + Y_Y] + k * contact[K + Y_Y]
-    q = c * contact[D + Y_Z] + k * contact[K + Y_Z]
-    r = c * contact[D + Z_Y] + k * contact[K + Z_Y]
-    t = z + c * contact[D + Z_Z] + k * contact[K + Z_Z]
-    return p, q, r, t, 1.0 / (p * t - q * r)
+def track_forces(support, factors, u, rate, g):
+    """Forces of pads and ballast on rails and sleepers, g C u' - K u, of `u` and `rate`.
+
+    Both as `load_track` gives them, as is the result; `factors` of pads and ballast.
+    """
+    row = support.row
+    pads, ballast = factors
+    arm = row[HALF_BASE] * load_lanes(SIDES, 0)
+    y = g * row[C_PAD_Y] * (rate[0] - rate[2]) - row[K_PAD_Y] * (u[0] - u[2])
+    z = g * row[C_PAD_Z] * (rate[1] - rate[3] - arm * rate[4])
+    z = z - row[K_PAD_Z] * (u[1] - u[3] - arm * u[4])
+    y, z = pads * y, pads * z
+    if not support.sleeper:
+        zero = spread(0.0)
+        return y, z, zero, zero, zero
+    roll = arm * z
+    return (
+        y,
+        z,
+        ballast * (g * row[C_BALLAST_Y] * rate[2] - row[K_BALLAST_Y] * u[2]) - (y + beside(y)),
+        ballast * (g * row[C_BALLAST_Z] * rate[3] - row[K_BALLAST_Z] * u[3]) - (z + beside(z)),
+        ballast * (g * row[C_BALLAST_ROLL] * rate[4] - row[K_BALLAST_ROLL] * u[4])
+        - (roll + beside(roll)),
+    )
 
 
-@compiled(python=False)
-def solve_track(support, track, side, m, c, k):
-    """Solve (m M + c (C + D) + k (K + K_c)) x = b for one wheelset's track.
+@compiled(inline=True)
+def product(matrix, y, z, roll):
+    """Matrix K or D of a contact times a motion of the wheel against the rail: forces (Y, Q)."""
+    return (
+        matrix[0] * y + matrix[1] * z + matrix[2] * roll,
+        matrix[3] * y + matrix[4] * z + matrix[5] * roll,
+    )
 
-    The rails are eliminated side by side; what is left is 3 by 3.  D and K_c: damping and stiffness
-    of the contacts as seen by the rails.
+
+@compiled(inline=True)
+def solve_track(support, factors, K, D, b, m, c, k):
+    """Solve (m M + c (C + D) + k (K + K_c)) x = b for the tracks of four wheelsets.
+
+    The rails are eliminated side by side; what is left is 3 by 3, worked out in both lanes of a
+    wheelset.
 
     Parameters
     ----------
-    track : float64[SUPPORT_STEP]
-        b in its first 7 entries on entry, x on return.
-    side : float64[2, SUPPORT_COLUMNS]
-        See `Work.support`.
+    factors : two Lanes
+        Of pads and ballast.
+    K, D : six Lanes
+        Stiffness and damping of the contact as seen by the rail, see `Work.support`.
+    b : five Lanes
+        y, z of the rails, then y, z and roll of the sleepers; x likewise.
     """
     row = support.row
+    pads, ballast = factors
     base, rail = row[HALF_BASE], m * row[M_RAIL]
-    a_y = track[PADS] * (c * row[C_PAD_Y] + k * row[K_PAD_Y])
-    a_z = track[PADS] * (c * row[C_PAD_Z] + k * row[K_PAD_Z])
-    much = track[BALLAST]
-    s_yy = m * row[M_SLEEPER] + much * (c * row[C_BALLAST_Y] + k * row[K_BALLAST_Y])
-    s_zz = m * row[M_SLEEPER] + much * (c * row[C_BALLAST_Z] + k * row[K_BALLAST_Z])
-    s_rr = m * row[I_SLEEPER] + much * (c * row[C_BALLAST_ROLL] + k * row[K_BALLAST_ROLL])
-    s_yz, s_yr, s_zy, s_zr, s_ry, s_rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    b_y, b_z, b_r = track[4], track[5], track[6]
-    for i in range(2):
-        arm = (2.0 * i - 1.0) * base
-        p, q, r, t, inverse = rail_matrix(side[i], rail + a_y, rail + a_z, c, k)
-        x_y = inverse * (t * track[2 * i] - q * track[2 * i + 1])
-        x_z = inverse * (p * track[2 * i + 1] - r * track[2 * i])
-        track[2 * i], track[2 * i + 1] = x_y, x_z
-        if support.sleeper:
-            b_y += a_y * x_y
-            b_z += a_z * x_z
-            b_r += arm * a_z * x_z
-            # pad and contact in series
-            e_yy = a_y - a_y * a_y * t * inverse
-            e_zz = a_z - a_z * a_z * p * inverse
-            e_yz = a_y * a_z * q * inverse
-            e_zy = a_y * a_z * r * inverse
-            s_yy += e_yy
-            s_yz += e_yz
-            s_yr += arm * e_yz
-            s_zy += e_zy
-            s_zz += e_zz
-            s_zr += arm * e_zz
-            s_ry += arm * e_zy
-            s_rz += arm * e_zz
-            s_rr += base * base * e_zz
+    arm = base * load_lanes(SIDES, 0)
+    a_y = pads * (c * row[C_PAD_Y] + k * row[K_PAD_Y])
+    a_z = pads * (c * row[C_PAD_Z] + k * row[K_PAD_Z])
+    p = rail + a_y + c * D[0] + k * K[0]
+    q = c * D[1] + k * K[1]
+    r = c * D[3] + k * K[3]
+    t = rail + a_z + c * D[4] + k * K[4]
+    inverse = 1.0 / (p * t - q * r)
+    x_y, x_z = inverse * (t * b[0] - q * b[1]), inverse * (p * b[1] - r * b[0])
     if not support.sleeper:
-        track[4], track[5], track[6] = 0.0, 0.0, 0.0
-        return
+        zero = spread(0.0)
+        return x_y, x_z, zero, zero, zero
+    own = m * row[M_SLEEPER]
+    # pad and contact in series
+    yy, yz = a_y - a_y * a_y * t * inverse, a_y * a_z * q * inverse
+    zy, zz = a_y * a_z * r * inverse, a_z - a_z * a_z * p * inverse
+    yr, zr, ry = arm * yz, arm * zz, arm * zy
+    b_y, b_z, b_r = a_y * x_y, a_z * x_z, arm * a_z * x_z
+    b_y, b_z, b_r = (
+        b[2] + (b_y + beside(b_y)),
+        b[3] + (b_z + beside(b_z)),
+        b[4] + (b_r + beside(b_r)),
+    )
+    s_rr = m * row[I_SLEEPER] + ballast * (c * row[C_BALLAST_ROLL] + k * row[K_BALLAST_ROLL])
+    s_rr = s_rr + base * base * (zz + beside(zz))
+    s_yy = own + ballast * (c * row[C_BALLAST_Y] + k * row[K_BALLAST_Y]) + (yy + beside(yy))
+    s_zz = own + ballast * (c * row[C_BALLAST_Z] + k * row[K_BALLAST_Z]) + (zz + beside(zz))
+    s_yz, s_zy, s_yr = yz + beside(yz), zy + beside(zy), yr + beside(yr)
+    s_zr, s_ry = zr + beside(zr), ry + beside(ry)
     # the matrix is far from singular: ballast on its diagonal
     f = s_zy / s_yy
-    s_zz -= f * s_yz
-    s_zr -= f * s_yr
-    b_z -= f * b_y
+    s_rz = s_zr
+    s_zz, s_zr, b_z = s_zz - f * s_yz, s_zr - f * s_yr, b_z - f * b_y
     f = s_ry / s_yy
-    s_rz -= f * s_yz
-    s_rr -= f * s_yr
-    b_r -= f * b_y
+    s_rz, s_rr, b_r = s_rz - f * s_yz, s_rr - f * s_yr, b_r - f * b_y
     f = s_rz / s_zz
     roll = (b_r - f * b_z) / (s_rr - f * s_zr)
     z = (b_z - s_zr * roll) / s_zz
     y = (b_y - s_yz * z - s_yr * roll) / s_yy
-    track[4], track[5], track[6] = y, z, roll
-    for i in range(2):
-        arm = (2.0 * i - 1.0) * base
-        p, q, r, t, inverse = rail_matrix(side[i], rail + a_y, rail + a_z, c, k)
-        f_y, f_z = a_y * y, a_z * (z + arm * roll)
-        track[2 * i] += inverse * (t * f_y - q * f_z)
-        track[2 * i + 1] += inverse * (p * f_z - r * f_y)
+    f_y, f_z = a_y * y, a_z * (z + arm * roll)
+    return (x_y + inverse * (t * f_y - q * f_z), x_z + inverse * (p * f_z - r * f_y), y, z, roll)
 
 
 @compiled(inline=True)
@@ -268,18 +275,27 @@ def mass_of(row, k):
     return row[M_SLEEPER] if k < DOF - 1 else row[I_SLEEPER]
 
 
-@compiled(python=False)
-def imbalance(system, work, state, w):
-    """F - C u' - K u of the track under wheelset `w` into ``work.support_step[w, :7]``."""
-    first = support_begin(system) + SUPPORT_SIZE * w
-    track = work.support_step[w]
-    for k in range(DOF):
-        track[k] = 0.0
-    for side in range(2):
-        track[2 * side] = work.support[w, side, F_Y]
-        track[2 * side + 1] = work.support[w, side, F_Z]
-    track_forces(system.support, track, state, first, 1.0, 0.0, track, -1.0)
-    track_forces(system.support, track, state, first + RATE, 0.0, 1.0, track, -1.0)
+@compiled(inline=True)
+def weighed(row, x):
+    """Masses times accelerations of rails and sleepers."""
+    return (
+        row[M_RAIL] * x[0],
+        row[M_RAIL] * x[1],
+        row[M_SLEEPER] * x[2],
+        row[M_SLEEPER] * x[3],
+        row[I_SLEEPER] * x[4],
+    )
+
+
+@compiled(inline=True)
+def imbalance(system, work, state, wheels):
+    """F - C u' - K u of the tracks under eight wheels, as `load_track` gives displacements."""
+    rails, sleepers = track_rows(system, wheels)
+    factors = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PADS, 2)
+    u, rate = load_track(state, rails, sleepers, 0), load_track(state, rails, sleepers, RATE)
+    y, z, s_y, s_z, s_r = track_forces(system.support, factors, u, rate, -1.0)
+    f_y, f_z = load_rows(work.support, starts(wheels, SUPPORT_COLUMNS), F_Y, 2)
+    return f_y + y, f_z + z, s_y, s_z, s_r
 
 
 @compiled(inline=True)
@@ -298,15 +314,18 @@ def support_rates(system, work, state, derivative):
     support = system.support
     if not support.elastic:
         return
-    row = support.row
-    for w in range(work.support.shape[0]):
+    row, count = support.row, work.support.shape[0]
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        rails, sleepers = track_rows(system, wheels)
+        store_track(derivative, rails, sleepers, RATE, imbalance(system, work, state, wheels))
+    for w in range(count):
         first = support_begin(system) + SUPPORT_SIZE * w
-        imbalance(system, work, state, w)
         for k in range(DOF):
             mass = REFERENCE_MASS if support.massless else mass_of(row, k)
             moves = k < RAIL_DOF or support.sleeper
             derivative[first + k] = state[first + RATE + k] if moves else 0.0
-            derivative[first + RATE + k] = work.support_step[w, k] / mass if moves else 0.0
+            derivative[first + RATE + k] = derivative[first + RATE + k] / mass if moves else 0.0
 
 
 @compiled(python=False)
@@ -320,21 +339,44 @@ def settle_rates(system, work, state):
     -------
     bool : whether rates changed, so that the forces are to be evaluated again.
     """
-    changed = False
-    for w in range(work.support.shape[0]):
-        first = support_begin(system) + SUPPORT_SIZE * w
-        imbalance(system, work, state, w)
-        track = work.support_step[w]
-        own = 0.0
-        for k in range(DOF):
-            own = max(own, abs(track[k]))
-        if own < BALANCE:
+    changed, count = False, work.support.shape[0]
+    zero, one = spread(0.0), spread(1.0)
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        rails, sleepers = track_rows(system, wheels)
+        b = imbalance(system, work, state, wheels)
+        much = larger(b[0] * b[0], b[1] * b[1])
+        much = larger(larger(much, beside(much)), larger(b[2] * b[2], b[3] * b[3]))
+        much = larger(much, b[4] * b[4])
+        if not any_beyond(much, BALANCE * BALANCE):
             continue
         changed = True
-        solve_track(system.support, track, work.support[w], 0.0, 1.0, 0.0)
-        for k in range(DOF):
-            state[first + RATE + k] += track[k]
+        much = where_beyond(much, BALANCE * BALANCE, one, zero)
+        x = solve_track(
+            system.support,
+            load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PADS, 2),
+            load_rows(work.support, starts(wheels, SUPPORT_COLUMNS), K, 6),
+            load_rows(work.support, starts(wheels, SUPPORT_COLUMNS), D, 6),
+            b,
+            0.0,
+            1.0,
+            0.0,
+        )
+        u = load_track(state, rails, sleepers, RATE)
+        store_track(state, rails, sleepers, RATE, plus_part(u, much, x))
     return changed
+
+
+@compiled(inline=True)
+def plus_part(u, part, x):
+    """Five Lanes u plus a part of five others."""
+    return (
+        u[0] + part * x[0],
+        u[1] + part * x[1],
+        u[2] + part * x[2],
+        u[3] + part * x[3],
+        u[4] + part * x[4],
+    )
 
 
 @compiled(python=False)
@@ -353,22 +395,38 @@ def rail_motions(system, work, state):
 @compiled(python=False)
 def complete_slopes(system, work, state):
     """Forces on the rails, and what their slopes have learnt at the same set of patches."""
-    for w in range(work.support.shape[0]):
-        if work.support_step[w, SKIP] > 0.0:
-            continue
-        for side in range(2):
-            contact = work.support[w, side]
-            contact[F_Y], contact[F_Z] = work.wheel[w, side, W_Y], work.wheel[w, side, W_Q]
-            i = support_begin(system) + SUPPORT_SIZE * w + LEARNT + LEARNT_SIZE * side
-            if state[i + L_PATCHES] != contact[PATCHES]:
-                continue
-            contact[K + Y_Y] += state[i + L_Y_Y]
-            contact[K + Z_Y] += state[i + L_Z_Y]
-            across = max(-LEAST_SHARE * contact[D_Y_SLIP], state[i + L_Y_SLIP])
-            contact[D + Y_Y] += across
-            contact[D_Y_SLIP] += across
-            contact[D + Z_Y] += state[i + L_Z_SLIP]
-            contact[D_Z_SLIP] += state[i + L_Z_SLIP]
+    count, begin = work.support.shape[0], support_begin(system) + LEARNT
+    zero, one = spread(0.0), spread(1.0)
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        own = starts(wheels, SUPPORT_COLUMNS)
+        y_y, z_y, y_slip, z_slip, _, _, _, _ = load_rows(
+            state, pair_starts(wheels, begin, SUPPORT_SIZE, LEARNT_SIZE), 0, 8
+        )
+        learnt = load_rows(
+            state, pair_starts(wheels, begin, SUPPORT_SIZE, LEARNT_SIZE), L_PATCHES, 1
+        )[0]
+        patches = load_rows(work.support, own, PATCHES, 1)[0]
+        skip = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), SKIP, 1)[0]
+        _, _, k0, k1, k2, k3, k4, k5 = load_rows(work.support, own, 0, 8)
+        d0, d1, d2, d3, d4, d5, s0, s1 = load_rows(work.support, own, D, 8)
+        Q, Y = load_rows(work.wheel, starts(wheels, WHEEL_COLUMNS), W_Q, 2)
+        take = where_beyond(patches - learnt, 0.0, zero, one - skip)
+        across = take * larger(-LEAST_SHARE * s0, y_slip)
+        along = take * z_slip
+        store_rows(work.support, own, 0, (Y, Q, k0 + take * y_y, k1, k2, k3 + take * z_y, k4, k5))
+        store_rows(
+            work.support, own, D, (d0 + across, d1, d2, d3 + along, d4, d5, s0 + across, s1 + along)
+        )
+
+
+@compiled(inline=True)
+def step_compliance(support, h, out):
+    """Velocity of a rail per force over a step `h`, lateral and vertical, the sleeper held."""
+    row = support.row
+    mass = 2.25 / h * row[M_RAIL]
+    out[0] = 1.0 / (mass + 1.5 * row[C_PAD_Y] + h * row[K_PAD_Y])
+    out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
 
 
 @compiled(python=False)

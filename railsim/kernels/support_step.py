@@ -12,75 +12,80 @@ state keeps them; g = h/(h + h_0), 1/2 in equal steps.  The forces themselves ar
 contact at (q, u): the linearisation affects only the change of u within one step.
 """
 
+import numpy as np
+
 from railsim.kernels import compiled
-from railsim.kernels.contact_columns import W_Q, W_Y
-from railsim.kernels.rails import (
-    ASIDE,
-    COSINE,
-    MIDDLE_Y,
-    MIDDLE_Z,
-    RAIL_SLOPE,
-    ROLL,
-    ROLL_SLOPE,
-    SINE,
-    SLOPE_Z,
-    locate_displaced,
+from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
+from railsim.kernels.lanes import (
+    LANES,
+    any_beyond,
+    beside,
+    eight_in_pairs,
+    eight_of_pairs,
+    larger,
+    load_rows,
+    pair_starts,
+    smaller,
+    spread,
+    starts,
+    store_rows,
+    where_beyond,
 )
+from railsim.kernels.rails import PAIRS, PLANE_SIZE, RAIL_SIZE, SINE, locate_rails
 from railsim.kernels.support import (
     ACCELERATION,
     BEFORE,
     BY_SLOPES_Y,
     BY_SLOPES_Z,
-    C_PAD_Y,
-    C_PAD_Z,
-    D_Y_SLIP,
-    D_Z_SLIP,
     DOF,
     ERROR_Y,
-    ERROR_Z,
     F_Y,
-    F_Z,
     FOOT_Y_STIFFNESS,
-    FOOT_Z_STIFFNESS,
     HEIGHTS,
-    K_PAD_Y,
-    K_PAD_Z,
     L_ERROR_Y,
-    L_ERROR_Z,
     L_PATCHES,
-    L_SLIP,
     L_WAY,
-    L_Y_SLIP,
-    L_Y_Y,
-    L_Z_SLIP,
-    L_Z_Y,
     LEARNT,
     LEARNT_SIZE,
-    M_RAIL,
     MEAN_CHANGE,
     MEAN_RATE,
     MOST_CORRECTIONS,
-    MOTION,
+    MOVED,
+    PADS,
     PATCHES,
     PENDING,
+    RAIL_DOF,
     RATE,
     RELAXATION,
     SETTLED,
-    SKIP,
-    STIFFNESS,
+    SUPPORT_COLUMNS,
     SUPPORT_SIZE,
+    SUPPORT_STEP,
     WEIGHT,
     D,
     K,
     imbalance,
-    mass_of,
+    load_track,
+    plus_part,
     product,
     solve_track,
+    store_track,
     support_begin,
     track_forces,
+    track_rows,
+    weighed,
 )
-from railsim.kernels.system import AGAIN, ARC_LENGTH, LAST_STEP, SPEED, WHOLE, WHOLE_TOLERANCE, Z_0
-from railsim.kernels.track_frame import cell_of
+from railsim.kernels.system import (
+    AGAIN,
+    ARC_LENGTH,
+    BODY_SIZE,
+    LAST_STEP,
+    RATES_SIZE,
+    SPEED,
+    WHOLE,
+    WHOLE_TOLERANCE,
+    Z_0,
+)
 from railsim.kernels.wheel_surface import foreseen_heights
 
 # `learn`: scales of way and slip [m, m/s] in a step of this length [s]; share of an error that is
@@ -91,15 +96,6 @@ GAIN, REST, FORGOTTEN = 0.3, 0.05, 0.01
 LARGE_Y, LARGE_Z = 0.1, 0.3
 # bounds of what slopes learn [N/m, N s/m]: a rail stays damped
 LEAST_K, MOST_K, MOST_D = -2e7, 3e8, 3e5
-
-
-@compiled(inline=True)
-def step_compliance(support, h, out):
-    """Velocity of a rail per force over a step `h`, lateral and vertical, the sleeper held."""
-    row = support.row
-    mass = 2.25 / h * row[M_RAIL]
-    out[0] = 1.0 / (mass + 1.5 * row[C_PAD_Y] + h * row[K_PAD_Y])
-    out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
 
 
 @compiled(python=False)
@@ -116,218 +112,277 @@ def remember_track(system, work, state):
             state[first + ACCELERATION + k] = 0.0
 
 
+@compiled(inline=True)
+def motion_of_wheelsets(system, work, state, wheels):
+    """Motion of the wheelsets of eight wheels in the planes of their rails.
+
+    Lateral position less the rail's displacement aside, vertical position, with the height of a
+    wheel that is not round, and roll; their rates, that of the rail being none; speed at which the
+    wheelset, yawed against the rail, slips across it.  The lateral rate is that of the material
+    (slip); to first order in the roll of the plane.
+    """
+    n, speed = system.bodies.kind.shape[0], state[SPEED]
+    body = eight_of_pairs(system.contact.body, wheels)
+    own = starts(body, 6)
+    height = load_rows(system.bodies.row, starts(body, BODY_SIZE), Z_0, 1)[0]
+    _, y, z, roll, _, yaw, _, _ = load_rows(state, own, 0, 8)
+    _, y_rate, z_rate, roll_rate = load_rows(state, own, 6 * n, 4)
+    middle_y, middle_z, _, slope_z, lean, _, _, lean_slope = load_rows(
+        work.plane, pair_starts(wheels, 0, PLANE_SIZE, 0), 0, 8
+    )
+    _, aside, _, slope = load_rows(work.rail, starts(wheels, RAIL_SIZE), 0, 4)
+    turn = speed * lean_slope
+    if system.contact.surface_of.shape[0] > 0:
+        heights = pair_starts(wheels, 0, SUPPORT_STEP, 1)
+        z = z + load_rows(work.support_step, heights, HEIGHTS, 1)[0]
+        z_rate = z_rate + load_rows(work.support_step, heights, HEIGHTS + 2, 1)[0]
+    return (
+        y - middle_y + height * lean - aside,
+        z - middle_z,
+        roll - lean,
+        y_rate + height * turn,
+        z_rate - speed * slope_z,
+        roll_rate - turn,
+        speed * (slope - yaw),
+    )
+
+
+@compiled(python=False)
+def note_heights(system, work, state):
+    """Heights of wheels that are not round."""
+    if system.contact.surface_of.shape[0] > 0:
+        for w in range(work.support.shape[0]):
+            foreseen_heights(system, work, state, w, work.support_step[w], HEIGHTS)
+
+
 @compiled(python=False)
 def note_wheelsets(system, work, state):
-    """Store the positions of the wheelsets in the planes of their rails before a step.
-
-    Slopes learn from the forces found, and rails whose correction has waited for the step move, see
-    `correct_support`.
-    """
-    for w in range(work.support.shape[0]):
-        track = work.support_step[w]
-        first = support_begin(system) + SUPPORT_SIZE * w
-        learn(work, state, first + LEARNT, w, system.contact.load[w], abs(state[LAST_STEP]))
-        if track[PENDING] > 0.0:
-            move_rails(track, state, first, state[LAST_STEP])
-            track[PENDING] = 0.0
-        note_wheelset(system, work, state, w)
+    """Store the motion of the wheelsets before a step."""
+    count = work.support.shape[0]
+    note_heights(system, work, state)
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        motion = motion_of_wheelsets(system, work, state, wheels)
+        store_rows(work.motion, starts(wheels, LANES), 0, motion)
 
 
-@compiled(python=False)
-def note_wheelset(system, work, state, w):
-    """Motion of a wheelset in the plane of its rails into its row of `work.support_step`.
-
-    Lateral and vertical position, roll and their rates, displacements of the rails.  The
-    lateral rate is that of the material (slip); to first order in the roll of the plane.
-    """
-    n = system.bodies.kind.shape[0]
-    b = system.contact.body[w]
-    track, plane, speed = work.support_step[w], work.plane, state[SPEED]
-    height = system.bodies.row[b, Z_0]
-    q = 6 * b
-    v = 6 * n + q
-    turn = speed * plane[w, ROLL_SLOPE]
-    track[MOTION] = state[q + 1] - plane[w, MIDDLE_Y] + height * plane[w, ROLL]
-    track[MOTION + 1] = state[q + 2] - plane[w, MIDDLE_Z]
-    track[MOTION + 2] = state[q + 3] - plane[w, ROLL]
-    track[MOTION + 3] = state[v + 1] + height * turn
-    track[MOTION + 4] = state[v + 2] - speed * plane[w, SLOPE_Z]
-    track[MOTION + 5] = state[v + 3] - turn
-    track[MOTION + 6] = work.rail[w, 0, ASIDE]
-    track[MOTION + 7] = work.rail[w, 1, ASIDE]
-    track[MOTION + 8] = speed * (work.rail[w, 0, RAIL_SLOPE] - state[q + 5])
-    track[MOTION + 9] = speed * (work.rail[w, 1, RAIL_SLOPE] - state[q + 5])
-    if system.contact.surface_of.shape[0] > 0:
-        foreseen_heights(system, work, state, w, track, HEIGHTS)
+@compiled(inline=True)
+def since_noted(work, wheels, motion):
+    """By how much the motion of wheelsets has changed since it was noted."""
+    noted = load_rows(work.motion, starts(wheels, LANES), 0, 7)
+    return (
+        motion[0] - noted[0],
+        motion[1] - noted[1],
+        motion[2] - noted[2],
+        motion[3] - noted[3],
+        motion[4] - noted[4],
+        motion[5] - noted[5],
+        motion[6] - noted[6],
+    )
 
 
 @compiled(python=False)
 def step_support(system, work, state, h, last):
     """Advance the track under all wheelsets by `h`, with bodies, position and speed after it.
 
-    `last`: length of the step before.
+    Slopes learn from the forces found, and rails whose correction has waited for the step move, see
+    `correct_support`.  `last`: length of the step before.
     """
+    locate_rails(system, work, state[ARC_LENGTH])
+    note_heights(system, work, state)
+    count = work.support.shape[0]
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        load = load_rows(system.contact.load, pair_starts(wheels, 0, 1, 0), 0, 1)[0]
+        learnt = pair_starts(wheels, support_begin(system) + LEARNT, SUPPORT_SIZE, LEARNT_SIZE)
+        learn(work, state, learnt, starts(wheels, SUPPORT_COLUMNS), load, last)
+        motion = motion_of_wheelsets(system, work, state, wheels)
+        step_tracks(system, work, state, wheels, learnt, since_noted(work, wheels, motion), h, last)
+
+
+@compiled(inline=True)
+def step_tracks(system, work, state, wheels, learnt, change, h, last):
+    """Advance the tracks under eight wheels whose wheelsets move by `change`."""
     support = system.support
-    row, before = support.row, work.above
-    g = h / (h + last)
-    for w in range(work.support.shape[0]):
-        first = support_begin(system) + SUPPORT_SIZE * w
-        b = system.contact.body[w]
-        track = work.support_step[w]
-        for k in range(10):
-            before[k] = track[MOTION + k]
-        heights = track[HEIGHTS], track[HEIGHTS + 1], track[HEIGHTS + 2], track[HEIGHTS + 3]
-        if system.track.has_irregularity:
-            f = system.bodies.frame[b]
-            cell, cell_u = cell_of(system.track, state[ARC_LENGTH] + system.frame_offset[f])
-            if cell >= 0:
-                locate_displaced(system.track.rail, cell, cell_u, w, work.plane, work.rail)
-        note_wheelset(system, work, state, w)
-        z, roll = track[MOTION + 1] - before[1], track[MOTION + 2] - before[2]
-        y_rate, z_rate = track[MOTION + 3] - before[3], track[MOTION + 4] - before[4]
-        roll_rate = track[MOTION + 5] - before[5]
-        for k in range(DOF):
-            track[k] = 0.0
-        # what is known of -(C u' + K u) after the step
-        track_forces(support, track, state, first, 1.0, 0.0, track, -1.0)
-        track_forces(support, track, state, first + MEAN_RATE, 0.0, 1.0, track, g)
-        for k in range(DOF):
-            track[k] += mass_of(row, k) * (
-                (1.0 + g) / h * (state[first + RATE + k] + g * state[first + MEAN_RATE + k])
-                + g * state[first + MEAN_CHANGE + k]
-            )
-        for side in range(2):
-            contact = work.support[w, side]
-            i = first + 2 * side
-            y = track[MOTION] - before[0] - (track[MOTION + 6 + side] - before[6 + side])
-            slip = track[MOTION + 8 + side] - before[8 + side]
-            v_y = y_rate + state[i + RATE] + g * state[i + MEAN_RATE]
-            v_z = z_rate + state[i + RATE + 1] + g * state[i + MEAN_RATE + 1]
-            v_z += track[HEIGHTS + 2 + side] - heights[2 + side]
-            k_y, k_z = product(contact, K, y, z + track[HEIGHTS + side] - heights[side], roll)
-            d_y, d_z = product(contact, D, v_y, v_z, roll_rate)
-            track[2 * side] += contact[F_Y] + k_y + d_y + contact[D_Y_SLIP] * slip
-            track[2 * side + 1] += contact[F_Z] + k_z + d_z + contact[D_Z_SLIP] * slip
-            learnt = first + LEARNT + LEARNT_SIZE * side
-            state[learnt + L_WAY] = y
-            state[learnt + L_SLIP] = v_y + slip
-        state[first + WEIGHT] = g
-        solve_track(support, track, work.support[w], (1.0 + g) * (1.0 + g) / h, 1.0 + g, h)
-        for side in range(2):
-            learnt = first + LEARNT + LEARNT_SIZE * side
-            state[learnt + L_WAY] -= h * track[2 * side]
-            state[learnt + L_SLIP] -= (1.0 + g) * track[2 * side]
-        for k in range(DOF):
-            rate = (1.0 + g) * track[k] - g * state[first + MEAN_RATE + k]
-            state[first + k] += h * track[k]
-            change = (rate - state[first + RATE + k]) / h
-            state[first + ACCELERATION + k] = (1.0 + g) * change - g * state[
-                first + MEAN_CHANGE + k
-            ]
-            state[first + MEAN_CHANGE + k] = change
-            state[first + RATE + k] = rate
-            state[first + MEAN_RATE + k] = track[k]
+    row, g = support.row, h / (h + last)
+    rails, sleepers = track_rows(system, wheels)
+    factors = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PADS, 2)
+    u, rate = load_track(state, rails, sleepers, 0), load_track(state, rails, sleepers, RATE)
+    mean = load_track(state, rails, sleepers, MEAN_RATE)
+    slower = load_track(state, rails, sleepers, MEAN_CHANGE)
+    waits = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PENDING, 1)[0]
+    if any_beyond(waits, 0.5):
+        rows, thirds = step_rows(wheels)
+        r = load_track(work.support_step, rows, thirds, 0)
+        weights = pair_starts(wheels, support_begin(system) + WEIGHT, SUPPORT_SIZE, 0)
+        c = 1.0 + load_rows(state, weights, 0, 1)[0]
+        u, rate = plus_part(u, last * waits, r), plus_part(rate, c * waits, r)
+        mean, slower = plus_part(mean, waits, r), plus_part(slower, c / last * waits, r)
+    # what is known of -(C u' + K u) after the step
+    b = track_forces(support, factors, u, mean, g)
+    if not support.massless:
+        b = plus_part(b, g, weighed(row, slower))
+        b = plus_part(b, (1.0 + g) / h, weighed(row, plus_part(rate, g, mean)))
+    own = starts(wheels, SUPPORT_COLUMNS)
+    f_y, f_z, k0, k1, k2, k3, k4, k5 = load_rows(work.support, own, 0, 8)
+    d0, d1, d2, d3, d4, d5, slip_y, slip_z = load_rows(work.support, own, D, 8)
+    y, z, roll, y_rate, z_rate, roll_rate, slip = change
+    v_y = y_rate + rate[0] + g * mean[0]
+    v_z = z_rate + rate[1] + g * mean[1]
+    K, D_ = (k0, k1, k2, k3, k4, k5), (d0, d1, d2, d3, d4, d5)
+    k_y, k_z = product(K, y, z, roll)
+    d_y, d_z = product(D_, v_y, v_z, roll_rate)
+    b = (
+        b[0] + f_y + k_y + d_y + slip_y * slip,
+        b[1] + f_z + k_z + d_z + slip_z * slip,
+        b[2],
+        b[3],
+        b[4],
+    )
+    r = solve_track(support, factors, K, D_, b, (1.0 + g) * (1.0 + g) / h, 1.0 + g, h)
+    store_rows(state, learnt, L_WAY, (y - h * r[0], v_y + slip - (1.0 + g) * r[0]))
+    weights = pair_starts(wheels, support_begin(system) + WEIGHT, SUPPORT_SIZE, 0)
+    store_rows(state, weights, 0, (spread(g),))
+    after = combined(1.0 + g, r, -g, mean)
+    changed = combined(1.0 / h, after, -1.0 / h, rate)
+    store_track(state, rails, sleepers, 0, plus_part(u, h, r))
+    store_track(state, rails, sleepers, RATE, after)
+    store_track(state, rails, sleepers, MEAN_RATE, r)
+    store_track(state, rails, sleepers, MEAN_CHANGE, changed)
+    store_track(state, rails, sleepers, ACCELERATION, combined(1.0 + g, changed, -g, slower))
 
 
-@compiled(python=False)
-def learn(work, state, first, w, load, h):
-    """Take the errors of the forces foreseen in the last step into the slopes at both wheels.
+@compiled(inline=True)
+def step_rows(wheels):
+    """Where the columns of rails and sleepers in `Work.support_step` begin."""
+    return (pair_starts(wheels, 0, SUPPORT_STEP, 2), pair_starts(wheels, RAIL_DOF, SUPPORT_STEP, 0))
+
+
+@compiled(inline=True)
+def combined(a, x, b, y):
+    """A x + b y of five Lanes each."""
+    return (
+        a * x[0] + b * y[0],
+        a * x[1] + b * y[1],
+        a * x[2] + b * y[2],
+        a * x[3] + b * y[3],
+        a * x[4] + b * y[4],
+    )
+
+
+@compiled(inline=True)
+def learn(work, state, learnt, own, load, h):
+    """Take the errors of the forces foreseen in the last step into the slopes at eight wheels.
 
     Normalised least mean squares (Widrow and Hoff 1960): of an error e with the way y and the slip
     v of the step, in units of `WAY` and `SLIP` at 1.25 ms, the slopes take gain e y/(y^2 + v^2 +
     rest).  They are forgotten slowly, and at once where the set of patches changes, a wheel lifts
     or the error is large: there the contact is another one.
     """
-    share = h / WHOLE_STEP if h > 0.0 else 1.0
+    zero, one, share = spread(0.0), spread(1.0), h / WHOLE_STEP
     per_way, per_slip = 1.0 / (WAY * share), 1.0 / (SLIP * share)
-    for side in range(2):
-        contact = work.support[w, side]
-        i = first + LEARNT_SIZE * side
-        # the first error of the step, also where rails have moved for it at once
-        d_y, d_z = state[i + L_ERROR_Y], state[i + L_ERROR_Z]
-        if d_y == 0.0 and d_z == 0.0:
-            d_y, d_z = contact[ERROR_Y], contact[ERROR_Z]
-        y, v = per_way * state[i + L_WAY], per_slip * state[i + L_SLIP]
-        keep, gain = 1.0 - FORGOTTEN * share, GAIN / (y * y + v * v + REST)
-        patches = contact[PATCHES]
-        another = patches == 0.0 or patches != state[i + L_PATCHES]
-        if another or abs(d_y) > LARGE_Y * load or abs(d_z) > LARGE_Z * load:
-            keep, gain = 0.0, 0.0
-        y, v = gain * per_way * y, gain * per_slip * v
-        state[i + L_Y_Y] = bounded(keep * state[i + L_Y_Y] + d_y * y, LEAST_K, MOST_K)
-        state[i + L_Z_Y] = bounded(keep * state[i + L_Z_Y] + d_z * y, -MOST_K, MOST_K)
-        state[i + L_Y_SLIP] = bounded(keep * state[i + L_Y_SLIP] + d_y * v, -MOST_D, MOST_D)
-        state[i + L_Z_SLIP] = bounded(keep * state[i + L_Z_SLIP] + d_z * v, -MOST_D, MOST_D)
-        state[i + L_ERROR_Y] = state[i + L_ERROR_Z] = 0.0
-        state[i + L_PATCHES] = patches
+    y_y, z_y, y_slip, z_slip, way, slip, error_y, error_z = load_rows(state, learnt, 0, 8)
+    before = load_rows(state, learnt, L_PATCHES, 1)[0]
+    patches, d_y, d_z = load_rows(work.support, own, PATCHES, 3)
+    # the first error of the step, also where rails have moved for it at once
+    either = error_y * error_y + error_z * error_z
+    d_y, d_z = where_beyond(either, 0.0, error_y, d_y), where_beyond(either, 0.0, error_z, d_z)
+    known = where_beyond(patches - before, 0.0, zero, where_beyond(patches, 0.0, one, zero))
+    known = where_beyond(d_y / load, LARGE_Y, zero, known)
+    known = where_beyond(d_z / load, LARGE_Z, zero, known)
+    y, v = per_way * way, per_slip * slip
+    gain = known * GAIN / (y * y + v * v + REST)
+    keep = known * (1.0 - FORGOTTEN * share)
+    y, v = gain * per_way * y, gain * per_slip * v
+    store_rows(
+        state,
+        learnt,
+        0,
+        (
+            bounded(keep * y_y + d_y * y, LEAST_K, MOST_K),
+            bounded(keep * z_y + d_z * y, -MOST_K, MOST_K),
+            bounded(keep * y_slip + d_y * v, -MOST_D, MOST_D),
+            bounded(keep * z_slip + d_z * v, -MOST_D, MOST_D),
+            way,
+            slip,
+            zero,
+            zero,
+        ),
+    )
+    store_rows(state, learnt, L_PATCHES, (patches,))
 
 
 @compiled(inline=True)
 def bounded(value, least, most):
     """The value, not beyond its bounds."""
-    return min(most, max(least, value))
+    return smaller(spread(most), larger(spread(least), value))
 
 
-@compiled(python=False)
-def relax_correction(track, i, relaxation):
-    """Multiply the imbalance of one rail so that the next correction does what the last missed.
+@compiled(inline=True)
+def relax_corrections(work, wheels, y, z, begins):
+    """Multiply imbalances of eight rails so that corrections do what the last ones missed.
 
     The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
-    dominates, convergence as with the secant.  A factor of zero asks for the first one.
+    dominates, convergence as with the secant.  `begins`: nothing was corrected before.
     """
-    y, z = track[i], track[i + 1]
-    if track[relaxation] == 0.0:
-        track[relaxation] = 1.0
-    else:
-        d_y, d_z = y - track[BEFORE + i], z - track[BEFORE + i + 1]
+    rails = pair_starts(wheels, 0, SUPPORT_STEP, 2)
+    factor = pair_starts(wheels, 0, SUPPORT_STEP, 1)
+    relaxation = spread(1.0)
+    if not begins:
+        b_y, b_z = load_rows(work.support_step, rails, BEFORE, 2)
+        last = load_rows(work.support_step, factor, RELAXATION, 1)[0]
+        d_y, d_z = y - b_y, z - b_z
         square = d_y * d_y + d_z * d_z
-        if square > 0.0:
-            share = -(track[BEFORE + i] * d_y + track[BEFORE + i + 1] * d_z) / square
-            track[relaxation] = min(3.0, max(0.3, share * track[relaxation]))
-    track[BEFORE + i], track[BEFORE + i + 1] = y, z
-    track[i], track[i + 1] = track[relaxation] * y, track[relaxation] * z
+        found = -(b_y * d_y + b_z * d_z) / square * last
+        relaxation = where_beyond(square, 0.0, bounded(found, 0.3, 3.0), last)
+    store_rows(work.support_step, rails, BEFORE, (y, z))
+    store_rows(work.support_step, factor, RELAXATION, (relaxation,))
+    return relaxation * y, relaxation * z
 
 
 @compiled(python=False)
-def change_forces(system, work, w, h, c):
-    """Change the forces between wheelset `w` and its rails as moving the rails does, linearly.
+def change_forces(system, work, state, wheels, waits, h):
+    """Change the forces between wheelsets and rails as moving the rails will, linearly.
 
-    The motion is the mean rate r in ``work.support_step[w, :4]`` over a step `h`: displacements
-    change by h r, rates by c r.  Forces on the wheelset act at its contacts; longitudinal creep
-    forces, creepages and patches remain those of the evaluation.
+    The motion is the mean rate r in ``work.support_step[w, :7]`` over a step `h`, found here from
+    the imbalance there: displacements change by h r, rates by c r.  Forces on the wheelset act at
+    its contacts; longitudinal creep forces, creepages and patches remain those of the evaluation.
     """
-    b = system.contact.body[w]
-    track, force = work.support_step[w], work.rail_force
-    sine, cosine = work.plane[w, SINE], work.plane[w, COSINE]
-    for side in range(2):
-        contact = work.support[w, side]
-        if contact[STIFFNESS] <= 0.0:
-            continue
-        r_y, r_z = track[2 * side], track[2 * side + 1]
-        k_y, k_z = product(contact, K, -h * r_y, -h * r_z, 0.0)
-        d_y, d_z = product(contact, D, -c * r_y, -c * r_z, 0.0)
-        f_y, f_z = k_y + d_y, k_z + d_z
-        contact[F_Y] += f_y
-        contact[F_Z] += f_z
-        work.wheel[w, side, W_Y] += f_y
-        work.wheel[w, side, W_Q] += f_z
-        moment = contact[FOOT_Y_STIFFNESS] * f_z - contact[FOOT_Z_STIFFNESS] * f_y
-        force[b, 1] -= cosine * f_y - sine * f_z
-        force[b, 2] -= cosine * f_z + sine * f_y
-        force[b, 3] -= moment / contact[STIFFNESS]
-
-
-@compiled(python=False)
-def move_rails(track, state, first, h):
-    """Add the mean rate in ``track[:7]`` over a step `h` to the motion that led to `state`."""
-    c = 1.0 + state[first + WEIGHT]
-    for k in range(DOF):
-        r = track[k]
-        state[first + k] += h * r
-        state[first + RATE + k] += c * r
-        state[first + MEAN_RATE + k] += r
-        state[first + MEAN_CHANGE + k] += c / h * r
-        state[first + ACCELERATION + k] += c * c / h * r
+    rows, sleepers = step_rows(wheels)
+    own = starts(wheels, SUPPORT_COLUMNS)
+    weights = pair_starts(wheels, support_begin(system) + WEIGHT, SUPPORT_SIZE, 0)
+    c = 1.0 + load_rows(state, weights, 0, 1)[0]
+    stiffness, damping = load_rows(work.support, own, K, 6), load_rows(work.support, own, D, 6)
+    factors = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PADS, 2)
+    b = load_track(work.support_step, rows, sleepers, 0)
+    r = solve_track(system.support, factors, stiffness, damping, b, c * c / h, c, h)
+    store_track(work.support_step, rows, sleepers, 0, r)
+    foot_y, foot_z, contact = load_rows(work.support, own, FOOT_Y_STIFFNESS, 3)
+    zero = spread(0.0)
+    part = where_beyond(contact, 0.0, waits, zero)
+    k_y, k_z = product(stiffness, r[0], r[1], zero)
+    d_y, d_z = product(damping, r[0], r[1], zero)
+    f_y, f_z = -part * (h * k_y + c * d_y), -part * (h * k_z + c * d_z)
+    F = load_rows(work.support, own, F_Y, 2)
+    store_rows(work.support, own, F_Y, (F[0] + f_y, F[1] + f_z))
+    wheel = starts(wheels, WHEEL_COLUMNS)
+    Q, Y = load_rows(work.wheel, wheel, W_Q, 2)
+    store_rows(work.wheel, wheel, W_Q, (Q + f_z, Y + f_y))
+    sine, cosine = load_rows(work.plane, pair_starts(wheels, 0, PLANE_SIZE, 0), SINE, 2)
+    y, z = cosine * f_y - sine * f_z, cosine * f_z + sine * f_y
+    moment = where_beyond(contact, 0.0, (foot_y * f_z - foot_z * f_y) / contact, zero)
+    body = starts(eight_of_pairs(system.contact.body, wheels), RATES_SIZE)
+    force = load_rows(work.rail_force, body, 1, 3)
+    store_rows(
+        work.rail_force,
+        body,
+        1,
+        (
+            force[0] - (y + beside(y)),
+            force[1] - (z + beside(z)),
+            force[2] - (moment + beside(moment)),
+        ),
+    )
 
 
 @compiled(python=False)
@@ -350,46 +405,90 @@ def correct_support(system, work, state, left):
     -------
     bool : whether rails have moved, so that the forces are to be evaluated again.
     """
-    h = state[LAST_STEP]
+    h, count = state[LAST_STEP], work.support.shape[0]
     share = min(1.0, h / work.watch[WHOLE_TOLERANCE])
     moved = False
-    for w in range(work.support.shape[0]):
-        first = support_begin(system) + SUPPORT_SIZE * w
-        track, contact = work.support_step[w], work.support[w]
-        if track[SKIP] > 0.0:
-            continue
-        imbalance(system, work, state, w)
-        if left == MOST_CORRECTIONS:
-            track[RELAXATION] = track[RELAXATION + 1] = 0.0
-        for k in range(DOF):
-            track[k] -= mass_of(system.support.row, k) * state[first + ACCELERATION + k]
-        for side in range(2):
-            contact[side, ERROR_Y] = track[2 * side]
-            contact[side, ERROR_Z] = track[2 * side + 1]
-        y, z = max(abs(track[0]), abs(track[2])), max(abs(track[1]), abs(track[3]))
-        load = share * system.contact.load[w]
-        small = left == 0 or (y < BY_SLOPES_Y * load and z < BY_SLOPES_Z * load)
-        track[PENDING] = 1.0 if small and max(y, z) >= SETTLED * load else 0.0
-        if small:
-            track[SKIP] = 1.0 - work.parts[WHOLE]
-            continue
-        moved = True
-        work.events[w, AGAIN] += 1
-        for side in range(2):
-            i = first + LEARNT + LEARNT_SIZE * side
-            if state[i + L_ERROR_Y] == 0.0 and state[i + L_ERROR_Z] == 0.0:
-                state[i + L_ERROR_Y] = contact[side, ERROR_Y]
-                state[i + L_ERROR_Z] = contact[side, ERROR_Z]
-            relax_correction(track, 2 * side, RELAXATION + side)
-        c = 1.0 + state[first + WEIGHT]
-        solve_track(system.support, track, work.support[w], c * c / h, c, h)
-        move_rails(track, state, first, h)
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        if judge_imbalance(system, work, state, wheels, share, left):
+            moved = True
+            move_rails(system, work, state, wheels, h, left == MOST_CORRECTIONS)
+            for w in range(first, min(first + PAIRS, count)):
+                work.events[w, AGAIN] += np.int64(work.support_step[w, MOVED])
     if moved:
         return True
-    for w in range(work.support.shape[0]):
-        track = work.support_step[w]
-        if track[PENDING] > 0.0:
-            c = 1.0 + state[support_begin(system) + SUPPORT_SIZE * w + WEIGHT]
-            solve_track(system.support, track, work.support[w], c * c / h, c, h)
-            change_forces(system, work, w, h, c)
+    for first in range(0, count, PAIRS):
+        wheels = eight_in_pairs(first, count)
+        waits = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), PENDING, 1)[0]
+        if any_beyond(waits, 0.5):
+            change_forces(system, work, state, wheels, waits, h)
     return False
+
+
+@compiled(inline=True)
+def judge_imbalance(system, work, state, wheels, share, left):
+    """Store the imbalance of the tracks under eight wheels and what is to be done about it.
+
+    Returns whether any is to be corrected at once: `MOVED`.
+    """
+    b = imbalance(system, work, state, wheels)
+    if not system.support.massless:
+        rails, sleepers = track_rows(system, wheels)
+        acceleration = load_track(state, rails, sleepers, ACCELERATION)
+        b = plus_part(b, -1.0, weighed(system.support.row, acceleration))
+    rows, thirds = step_rows(wheels)
+    store_track(work.support_step, rows, thirds, 0, b)
+    store_rows(work.support, starts(wheels, SUPPORT_COLUMNS), ERROR_Y, (b[0], b[1]))
+    zero, one = spread(0.0), spread(1.0)
+    load = share * load_rows(system.contact.load, pair_starts(wheels, 0, 1, 0), 0, 1)[0]
+    y, z = b[0] / load, b[1] / load
+    moves = where_beyond(y, BY_SLOPES_Y, one, where_beyond(z, BY_SLOPES_Z, one, zero))
+    if left == 0:
+        moves = zero
+    moves = larger(moves, beside(moves))
+    waits = where_beyond(y, SETTLED, one, where_beyond(z, SETTLED, one, zero))
+    waits = larger(waits, beside(waits)) * (one - moves)
+    step = pair_starts(wheels, 0, SUPPORT_STEP, 0)
+    skip = (one - moves) * (1.0 - work.parts[WHOLE])
+    store_rows(work.support_step, step, PENDING, (waits, skip, moves))
+    return any_beyond(moves, 0.5)
+
+
+@compiled(python=False)
+def move_rails(system, work, state, wheels, h, begins):
+    """Correct the rails of those wheelsets whose forces are to be evaluated again."""
+    rails, sleepers = track_rows(system, wheels)
+    own, step = starts(wheels, SUPPORT_COLUMNS), pair_starts(wheels, 0, SUPPORT_STEP, 0)
+    moves = load_rows(work.support_step, step, MOVED, 1)[0]
+    begin = support_begin(system)
+    learnt = pair_starts(wheels, begin + LEARNT, SUPPORT_SIZE, LEARNT_SIZE)
+    error_y, error_z = load_rows(state, learnt, L_ERROR_Y, 2)
+    rows, thirds = step_rows(wheels)
+    b = load_track(work.support_step, rows, thirds, 0)
+    either = error_y * error_y + error_z * error_z
+    free = where_beyond(either, 0.0, spread(0.0), moves)
+    store_rows(state, learnt, L_ERROR_Y, (error_y + free * b[0], error_z + free * b[1]))
+    y, z = relax_corrections(work, wheels, b[0], b[1], begins)
+    c = 1.0 + load_rows(state, pair_starts(wheels, begin + WEIGHT, SUPPORT_SIZE, 0), 0, 1)[0]
+    r = solve_track(
+        system.support,
+        load_rows(work.support_step, step, PADS, 2),
+        load_rows(work.support, own, K, 6),
+        load_rows(work.support, own, D, 6),
+        (y, z, b[2], b[3], b[4]),
+        c * c / h,
+        c,
+        h,
+    )
+    move_part(state, rails, sleepers, 0, h * moves, r)
+    move_part(state, rails, sleepers, RATE, c * moves, r)
+    move_part(state, rails, sleepers, MEAN_RATE, moves, r)
+    move_part(state, rails, sleepers, MEAN_CHANGE, c / h * moves, r)
+    move_part(state, rails, sleepers, ACCELERATION, c * c / h * moves, r)
+
+
+@compiled(inline=True)
+def move_part(state, rails, sleepers, first, factor, r):
+    """Add a multiple of the mean rate to the entries of tracks from `first` on."""
+    there = load_track(state, rails, sleepers, first)
+    store_track(state, rails, sleepers, first, plus_part(there, factor, r))

@@ -62,9 +62,10 @@ PARTS, DIVIDED, UNSETTLED, STEPS, EVALUATIONS, WHOLE = range(6)
 N_PARTS = 6
 # Work.watch: time for which contact forces are foreseen [s]; share of the static wheel load by
 # which they may change in a step, and what a change of the lateral force counts against that of
-# the vertical one; shortest step that has the full tolerance of forces on elastic rails [s]
-AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE = range(4)
-N_WATCH = 4
+# the vertical one; shortest step that has the full tolerance of forces on elastic rails [s]; arc
+# length at which the rails of `Work.plane` and `Work.rail` are [m], no number where that is open
+AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE, LOCATED = range(5)
+N_WATCH = 5
 # Work.events, of each wheelset: loaded patches so far, how many of them were outside the range of
 # the creep law; the same kept over corrections; look-ups beyond the yaw of the contact table;
 # evaluations of its contact alone
@@ -420,6 +421,7 @@ class Work(NamedTuple):
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
     rail_motion : float64[w, 2, MOTION_SIZE]   the rails under each wheelset, see `rails`
+    rail_cell : int64[w];  rail_u : float64[w]   where in the track's tables they are
     above : float64[10]         the wheelset at hand in the plane of its rails: y, z, roll, yaw,
                                 their rates, stretched roll and slope, see `wheel_rail`
     look_up, weights, stiffness, approach : of the wheel at hand, see `contact_table`
@@ -429,6 +431,7 @@ class Work(NamedTuple):
     wheel : float64[w, 2, WHEEL_COLUMNS]  see `wheel_rail`
     support : float64[w, 2, SUPPORT_COLUMNS];  support_step : float64[w, SUPPORT_STEP]
                                 of each wheelset's track, see `support`; w = 0 on rigid rails
+    motion : float64[w, 2, LANES]   motion of the wheelsets before a step, see `support_step`
     compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
                                 [m/(N s)]
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
@@ -462,6 +465,8 @@ class Work(NamedTuple):
     plane: np.ndarray
     rail: np.ndarray
     rail_motion: np.ndarray
+    rail_cell: np.ndarray
+    rail_u: np.ndarray
     above: np.ndarray
     look_up: np.ndarray
     weights: np.ndarray
@@ -472,6 +477,7 @@ class Work(NamedTuple):
     creep: CreepScratch
     support: np.ndarray
     support_step: np.ndarray
+    motion: np.ndarray
     compliance: np.ndarray
     vibration: np.ndarray
     events: np.ndarray

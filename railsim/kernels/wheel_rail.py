@@ -71,6 +71,7 @@ from railsim.kernels.patches import side_by_side
 from railsim.kernels.rails import locate_rails
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions
+from railsim.kernels.system import ARC_LENGTH
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
 
@@ -138,15 +139,7 @@ def wheel_rail(system, work, speed, state):
     status, wheelset, n : int
         Status code, the wheelset it concerns, number of active patches.
     """
-    locate_rails(
-        system.track,
-        system.contact.body,
-        system.bodies.frame,
-        work.cell,
-        work.cell_u,
-        work.plane,
-        work.rail,
-    )
+    locate_rails(system, work, state[ARC_LENGTH])
     if system.support.elastic:
         rail_motions(system, work, state)
         begin_support(work.support, work.support_step)

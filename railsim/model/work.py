@@ -12,6 +12,7 @@ from railsim.kernels.controllers import CONTROLLER_WHICH, SIGNAL_ROW, SIGNAL_WHI
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
+from railsim.kernels.lanes import LANES
 from railsim.kernels.rails import CHANGES, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
 from railsim.kernels.system import (
@@ -72,6 +73,8 @@ def work_arrays(system: System) -> Work:
         plane=smooth_planes(n_wheelsets),
         rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
         rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
+        rail_cell=aligned_zeros(n_wheelsets, np.int64),
+        rail_u=aligned_zeros(n_wheelsets),
         above=aligned_zeros(10),
         look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
         weights=aligned_zeros(N_WEIGHT),
@@ -82,12 +85,13 @@ def work_arrays(system: System) -> Work:
         creep=creep_scratch(n_patches, system.contact.law),
         support=aligned_zeros((n_tracks, 2, SUPPORT_COLUMNS)),
         support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
+        motion=aligned_zeros((n_tracks, 2, LANES)),
         compliance=aligned_zeros(2),
         vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
         events=aligned_zeros((n_wheelsets, N_EVENTS), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         force_rate=aligned_zeros(n_wheelsets),
-        watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE]),
+        watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE, np.nan]),
         rate_change=aligned_zeros((2, CHANGES)),
         parts=aligned_zeros(N_PARTS, np.int64),
         extremes=no_extremes(n_wheelsets),

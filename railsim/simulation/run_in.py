@@ -217,15 +217,7 @@ def _located(model: Model, s: float) -> Work:
         != RUNNING
     ):
         raise ModelError("the vehicle is longer than the track's table allows")
-    locate_rails(
-        system.track,
-        system.contact.body,
-        system.bodies.frame,
-        work.cell,
-        work.cell_u,
-        work.plane,
-        work.rail,
-    )
+    locate_rails(system, work, s)
     return work
 
 
