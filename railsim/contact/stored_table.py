@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import zlib
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from railsim.kernels import table_slice as kernel
 from railsim.profiles.profile import Profile
 
 MOST_OPEN = 16  # stored tables that a process keeps open, mapped and checked
+# bytes of all stored tables, beyond which those go that have not been used for longest, and for an
+# hour at least: some 70 of 0.12 GB
+MOST_BYTES, IN_USE = 8e9, 3600.0
 
 
 def generator_hash() -> str:
@@ -101,6 +105,8 @@ def _checked_table(path: Path, text: bytes, stamp: tuple[int, ...]) -> ContactTa
         crc = facts.pop("crc32")
         facts["w"] = np.array(facts["w"])
         table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
+        with suppress(OSError):
+            os.utime(path.with_suffix(".json"))  # the time of the last use
         if cache.stored(checked) == known:
             return table
         whole = zlib.crc32(table.values.data) == crc
@@ -127,3 +133,19 @@ def _store_table(table: ContactTable, path: Path) -> None:
 
     if cache.store_file(path, write):
         cache.store(path.with_suffix(".json"), json.dumps(facts).encode())
+        with suppress(OSError):
+            drop_unused(path.parent)
+
+
+def drop_unused(folder: Path) -> None:
+    """Remove the tables that have not been used for longest where all are larger than allowed."""
+    tables = [path for path in folder.glob("*.json") if path.with_suffix(".npy").exists()]
+    used = {path: path.stat().st_mtime for path in tables}
+    sizes = {path: path.with_suffix(".npy").stat().st_size for path in tables}
+    total, latest = sum(sizes.values()), max(used.values(), default=0.0)
+    for path in sorted(used, key=used.__getitem__):
+        if total <= MOST_BYTES or used[path] > latest - IN_USE:
+            return
+        for name in (".json", ".checked", ".npy"):  # without the first it is not read
+            path.with_suffix(name).unlink(missing_ok=True)
+        total -= sizes[path]

@@ -12,6 +12,7 @@ from cases import tried
 from mutations import bytes_damaged
 
 import railsim.kernels
+from railsim.contact import stored_table
 from railsim.kernels import cache
 
 AGO = time.time() - 60 * 24 * 3600.0  # two months
@@ -255,3 +256,20 @@ def test_only_the_source_of_the_cache_is_left_out_of_the_hash(tmp_path):
         path.write_text(f"{text}#", encoding="utf-8")
         assert (railsim.kernels.source_hash(kernels) == before) == (path.name == "cache.py")
         path.write_text(text, encoding="utf-8")
+
+
+def test_tables_unused_for_longest_go_where_all_are_too_large(tmp_path, monkeypatch):
+    monkeypatch.setattr(stored_table, "MOST_BYTES", 2500)
+    now = time.time()
+    for age, name in ((9e5, "old"), (7e5, "older_file_used_later"), (4e4, "new"), (10.0, "last")):
+        for end in ("json", "checked", "npy"):
+            (tmp_path / f"{name}.{end}").write_bytes(bytes(1000))
+        os.utime(tmp_path / f"{name}.json", (now - age, now - age))
+    (tmp_path / "half_a_table.json").write_text("{}")
+    stored_table.drop_unused(tmp_path)
+    names = {"new", "last", "half_a_table"}
+    assert {path.stem for path in tmp_path.iterdir()} == names
+    monkeypatch.setattr(stored_table, "MOST_BYTES", 0)
+    os.utime(tmp_path / "new.json", (now - 60.0, now - 60.0))
+    stored_table.drop_unused(tmp_path)  # both used within the hour: another process may map them
+    assert {path.stem for path in tmp_path.iterdir()} == names
