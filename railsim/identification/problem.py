@@ -7,7 +7,6 @@ if one is given, so that an identification that was interrupted goes on where it
 """
 
 import hashlib
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -255,15 +254,11 @@ class Problem:
 def _simulated(
     run: "object", model: Model, parameters: Sequence[Parameter], x: Floats, slope: bool
 ) -> Floats:
-    from railsim.identification.runs import Run
+    from railsim.identification.runs import Run, silent
 
     assert isinstance(run, Run)
-    log = logging.getLogger("railsim")
-    level = log.level
-    log.setLevel(logging.ERROR)  # a variant's remarks are not reported
     try:
-        return run.simulated(model, parameters, x, slope=slope)
+        with silent():
+            return run.simulated(model, parameters, x, slope=slope)
     except ModelError as error:
         raise ModelError(f"{run.name}: {error}") from None
-    finally:
-        log.setLevel(level)

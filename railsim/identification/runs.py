@@ -6,7 +6,9 @@ spline of degree five over five values for the shortest period in the band: its 
 2e-4 of the amplitude, and 2e-6 at half the frequency.
 """
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -36,6 +38,18 @@ DEGREE = 5  # of the spline
 MARGIN = 0.85  # of the step of the model, for variants that are stiffer
 ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
 VARYING_RATE = 1000.0  # 1/s, where the speed varies and nothing is low-passed
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Do not report the remarks of runs within the block: those of variants."""
+    log = logging.getLogger("railsim")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +141,8 @@ class Run:
         interval = 1.0 / self.settings.output_rate
         short = self.settings
         probe = replace(self, until=self.start + max(1.0, self.speed * 0.1))
-        step = float(probe._result(model.with_track(self.track), short).attributes["step"])
+        with silent():
+            step = float(probe._result(model.with_track(self.track), short).attributes["step"])
         count = int(np.ceil(interval / (MARGIN * step) - 1e-9))
         if self.settings.drive.mode != "constant":
             return self

@@ -10,10 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.loading import load_vehicle
 from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.measurement.data import Measurement
 from railsim.result.filters import band_passed
+from railsim.result.sensors import all_sensors
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement
 
@@ -78,12 +81,12 @@ def shift_of(
     a, b = np.interp(grid, s[known], x[known]), np.interp(grid, s_reference, reference)
     size, reach = int(length / STEP), int(most / STEP)
     centres, shifts, clear = [], [], []
-    for begin in range(0, len(grid) - size + 1, max(1, size // 2)):
+    for begin in range(reach, len(grid) - size - reach + 1, max(1, size // 2)):
         rows = slice(begin, begin + size)
-        found = _lag(a[rows] - a[rows].mean(), b[rows] - b[rows].mean(), reach)
+        found = _lag(a[rows], b[begin - reach : begin + size + reach])
         if found[1] > CLEAR:
             centres.append(grid[rows].mean())
-            shifts.append(found[0] * STEP)
+            shifts.append((found[0] - reach) * STEP)
             clear.append(found[1])
     if not shifts:
         return None
@@ -95,29 +98,30 @@ def shift_of(
     return Shift(float(at_zero), float(stretch), float(np.median(clear)), len(shifts))
 
 
-def _lag(a: Floats, b: Floats, reach: int) -> tuple[float, float]:
-    """Lag of b behind a in grid points, by which a has to be moved, and the correlation there."""
-    size = 2 * len(a)
-    spectrum = np.fft.rfft(b, size) * np.conj(np.fft.rfft(a, size))
-    product = np.fft.irfft(spectrum, size)
-    lags = np.arange(-reach, reach + 1)
-    scale = float(np.sqrt(np.sum(a**2) * np.sum(b**2))) or 1.0
-    values = product[lags] / scale
+def _lag(a: Floats, b: Floats) -> tuple[float, float]:
+    """Place of a within the longer b in grid points, and the correlation there."""
+    parts = np.lib.stride_tricks.sliding_window_view(b, len(a))
+    parts = parts - parts.mean(axis=1, keepdims=True)
+    own = a - a.mean()
+    scale = np.sqrt(np.sum(parts**2, axis=1) * np.sum(own**2))
+    values = parts @ own / np.where(scale > 0.0, scale, np.inf)
     k = int(np.argmax(values))
     offset = 0.0
     if 0 < k < len(values) - 1:
         left, middle, right = values[k - 1 : k + 2]
         bend = left - 2.0 * middle + right
         offset = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
-    return float(lags[k] + offset), float(values[k])
+    return k + float(offset), float(values[k])
 
 
-def aligned(measurement: Measurement, track: Track, *, most: float = 50.0) -> Measurement:
+def aligned(
+    measurement: Measurement, track: Track, vehicle: Vehicle | None = None, *, most: float = 50.0
+) -> Measurement:
     """Return a run with its arc length put right by the track.
 
     By a channel of `curvature` or `yaw_rate` (over the speed) against the plan; otherwise by the
     vertical acceleration of an axlebox against v^2 d2z/ds2 of the rails' mean level, waves of 3 to
-    40 m.
+    40 m, where the vehicle (given, or named by the file) says how far ahead the axlebox is.
 
     Raises
     ------
@@ -148,7 +152,8 @@ def aligned(measurement: Measurement, track: Track, *, most: float = 50.0) -> Me
                 "irregularities",
             )])  # fmt: skip
         level = moved(grid)[0][[1, 3]].mean(axis=0)
-        reference, at = np.gradient(np.gradient(level, STEP), STEP), s
+        reference = np.gradient(np.gradient(level, STEP), STEP)
+        at = s + _ahead(measurement, vehicle, box.split(":")[1])
         x = measurement[box] / np.maximum(measurement.speed, 1.0) ** 2
         step = float(np.mean(np.diff(s)))
         known = np.isfinite(x)
@@ -167,3 +172,15 @@ def aligned(measurement: Measurement, track: Track, *, most: float = 50.0) -> Me
         f"{found.windows} windows)."
     )
     return moved_run.with_remarks(remark)
+
+
+def _ahead(measurement: Measurement, vehicle: Vehicle | None, point: str) -> float:
+    """Return how far a sensor is ahead of the reference body [m]."""
+    if vehicle is None:
+        name = measurement.definition.vehicle
+        if name is None:
+            allowed = "give it, or the key 'vehicle' of the measurement"
+            raise InputError([argument_fault("vehicle", "", "none", allowed)])
+        vehicle = load_vehicle(name)
+    sensor = all_sensors(vehicle)[point]
+    return sensor.offset + sensor.arm[0]

@@ -8,7 +8,9 @@ import pytest
 from scipy.io import savemat
 
 import railsim
+from railsim.measurement.alignment import aligned
 from railsim.measurement.clock import clock_of, delayed
+from railsim.track.alignment import Alignment
 
 RATE, COUNT = 500.0, 3000
 HEAD = """format = "railsim-measurement/1"
@@ -216,3 +218,36 @@ def test_text_among_numbers_names_its_line(tmp_path):
     path = written(tmp_path, cell=lambda row, name, text: "off" if row == 70 else text)
     with pytest.raises(railsim.InputError, match="line 72: not a number"):
         railsim.load_measurement(path)
+
+
+def test_the_place_is_found_by_the_level_of_the_rails():
+    """The shipped run: its counter is 3 m and 0.8 m/km ahead."""
+    run = railsim.load_measurement("coach_25t_run")
+    track = railsim.load_track(run.definition.track)
+    moved = aligned(run, track)
+    late = moved.distance - run.distance + 3.0 + 8e-4 * run.distance
+    assert np.abs(late).max() < 0.6
+    other = [{"type": "random", "spectrum": "fra_4", "seed": 9}]
+    elsewhere = track.replace(irregularities=other)
+    with pytest.raises(railsim.InputError, match="matches nowhere"):
+        aligned(run, elsewhere)
+
+
+def test_the_place_is_found_by_curvature(tmp_path):
+    """A yaw velocity with noise, 12 m late, on a counter that is 0.2 % long."""
+    track = railsim.load_track("curve_r500")
+    s = np.arange(20.0, track.length - 20.0, 0.1)
+    written = (s - s[0]) * 1.002
+    noise = np.random.default_rng(2).standard_normal(len(s))
+    rate = 25.0 * (Alignment(track).curvature(s) + 2e-5 * noise)
+    rows = np.column_stack([np.arange(len(s)) / 250.0, written, rate, noise])
+    header = "t,s,yaw,box"
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=header, comments="")
+    (tmp_path / "m.toml").write_text(
+        'format = "railsim-measurement/1"\nname = "run"\nfile = "a.csv"\n[channels]\n'
+        't = { quantity = "time" }\ns = { quantity = "distance" }\n'
+        'yaw = { quantity = "yaw_rate" }\nbox = { quantity = "sensor_acceleration:box:z" }\n'
+    )
+    run = railsim.load_measurement(tmp_path / "m.toml")
+    moved = aligned(run, track)
+    assert np.abs(moved.distance - s).max() < 2.0
