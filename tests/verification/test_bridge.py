@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "25_coach_on_a_bridge.py"
+SCRIPT = Path(__file__).parents[2] / "examples" / "18_coach_on_a_bridge.py"
 
 
 @pytest.fixture(scope="module")

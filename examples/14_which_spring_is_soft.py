@@ -29,4 +29,4 @@ print(found.table())
 print(found.residual_table())
 print(*found.unidentified, *found.remarks, sep="\n")
 
-save(fits(found), "21_which_spring_is_soft.png", overwrite=True)
+save(fits(found), "14_which_spring_is_soft.png", overwrite=True)

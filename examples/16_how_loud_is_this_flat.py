@@ -58,7 +58,7 @@ with styled():
     axes[0].set(xlabel="speed (km/h)", ylabel="peak of Q (kN)", ylim=(0.0, None))
     axes[1].set(xlabel="speed (km/h)", ylabel="change at the axle box (kN)", ylim=(0.0, None))
     axes[1].legend()
-    figure.savefig("23_how_loud_is_this_flat.png")
+    figure.savefig("16_how_loud_is_this_flat.png")
 
 print(f"Length of a fresh flat (mm) at which the peak of Q reaches {1e-3 * LIMIT:g} kN")
 print("load    ", *(f"{3.6 * speed:5.0f} km/h" for speed in speeds))

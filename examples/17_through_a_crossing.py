@@ -56,4 +56,4 @@ with styled():
         print(f"{speed:g} m/s: largest Q {Q.max():.0f} kN, static {Q[0]:.0f} kN")
     axes[2].set(xlabel="s (m)", ylabel="Q, leading right wheel (kN)", xlim=(-0.2, 0.8))
     axes[2].legend()
-    figure.savefig("24_through_a_crossing.png")
+    figure.savefig("17_through_a_crossing.png")

@@ -67,4 +67,4 @@ with styled():
     axes[2].set(xlabel="s (m)", ylabel="Q of wheel 1 left (kN)", xlim=(400.0, 700.0))
     for at in axes:
         at.legend(loc="upper right", ncols=2)
-    figure.savefig("22_coach_as_recording_car.png")
+    figure.savefig("15_coach_as_recording_car.png")
