@@ -7,7 +7,7 @@ from typing import Any
 
 from railsim.bench.scenarios import STUDY, Scenario
 from railsim.definitions.loading import load_track, load_vehicle
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.simulation import simulate_together
 
 SIZES = (1, 2, 4, 8, 16)

@@ -17,11 +17,11 @@ import exudyn.itemInterface as items
 import numpy as np
 from exudyn_contact import OUTPUT, forces_of
 
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_vehicle
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.kernels.status import RUNNING
 from railsim.model.work import work_arrays
 from railsim.simulation import prepare

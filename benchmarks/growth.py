@@ -24,7 +24,7 @@ from railsim import simulate
 from railsim.bench.machine import hardware, versions
 from railsim.definitions.loading import load_track, load_vehicle, load_vehicle_text
 from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.time_loop import RK4, Chunk, time_loop
 from railsim.model.time_step import empty_recorder

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
         load_track,
         load_vehicle,
     )
-    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.mechanism.definition import Mechanism
     from railsim.definitions.settings import Settings
     from railsim.definitions.spring import TrailingArmSuspension
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.track.definition import Track
+    from railsim.definitions.vehicle.definition import Vehicle
     from railsim.description import Description, describe
     from railsim.errors import InputError, ModelError
     from railsim.identification import Identified, Sensitivity, identify, sensitivity
@@ -57,7 +57,7 @@ _HOMES = {
     "Identified": "railsim.identification",
     "InputError": "railsim.errors",
     "Measurement": "railsim.measurement",
-    "Mechanism": "railsim.definitions.mechanism",
+    "Mechanism": "railsim.definitions.mechanism.definition",
     "ModelError": "railsim.errors",
     "ModelValidation": "railsim.assessment.model_comparison",
     "Profile": "railsim.profiles",
@@ -66,9 +66,9 @@ _HOMES = {
     "Settings": "railsim.definitions.settings",
     "Simulation": "railsim.simulation",
     "StaticLoads": "railsim.model.statics",
-    "Track": "railsim.definitions.track",
+    "Track": "railsim.definitions.track.definition",
     "TrailingArmSuspension": "railsim.definitions.spring",
-    "Vehicle": "railsim.definitions.vehicle",
+    "Vehicle": "railsim.definitions.vehicle.definition",
     "assess": "railsim.assessment",
     "critical_speed": "railsim.stability.critical_speed",
     "curving": "railsim.stability.curving",

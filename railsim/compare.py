@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.layout import curvature_sections
+from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks

@@ -22,8 +22,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from railsim.definitions.laws import Law
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, InputError
 
 F = TypeVar("F", bound=Callable[..., Any])

@@ -17,7 +17,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from generators.filling import fill_page, table
-from railsim.definitions.sources import library_files
+from railsim.files.sources import library_files
 from railsim.studies.summary import read_index
 
 PAGE = Path(__file__).parents[1] / "validation" / "vehicles_and_tracks.md"

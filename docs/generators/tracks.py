@@ -9,7 +9,7 @@ from scipy.signal import welch
 
 from generators.filling import fill_page, table
 from railsim.definitions.excitations.spectra import SPECTRA
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.notation import QUANTITIES
 from railsim.plot.style import DISTINCT, save, styled
 from railsim.track.irregularity import displacement

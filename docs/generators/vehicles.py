@@ -16,11 +16,11 @@ from PIL import Image
 import railsim
 from generators.filling import filled, table
 from railsim.cli.library import MEANING, text_with_bases, trust
-from railsim.definitions.layout import curvature_sections
 from railsim.definitions.settings import Settings
-from railsim.definitions.sources import read_toml, shipped_folder
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.files.sources import read_toml, shipped_folder
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.statics import SLOW
@@ -132,7 +132,7 @@ def letters() -> str:
 
 def facts(name: str, vehicle: Vehicle) -> str:
     """Table of what one asks first."""
-    flat = railsim.definitions.flatten.flatten(vehicle)
+    flat = railsim.definitions.vehicle.flatten.flatten(vehicle)
     wheelsets = flat.of_kind("wheelset")
     mass = sum(body.mass for body in flat.bodies)
     wheel = wheelsets[0].wheelset
@@ -187,7 +187,7 @@ def vehicles_table() -> str:
     rows = []
     for name in VEHICLES:
         vehicle = railsim.load_vehicle(name)
-        flat = railsim.definitions.flatten.flatten(vehicle)
+        flat = railsim.definitions.vehicle.flatten.flatten(vehicle)
         load = vehicle.mass * GRAVITY / 2e3 / len(flat.of_kind("wheelset"))
         rows.append(
             (

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from railsim.animation.scene import Drawn, Scene
 from railsim.errors import InputError, argument_fault
-from railsim.files import check_file, whole_file
+from railsim.files.access import check_file, whole_file
 from railsim.result.data import Array
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from railsim.animation.scene import Scene
-from railsim.files import check_file, whole_file
+from railsim.files.access import check_file, whole_file
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
 

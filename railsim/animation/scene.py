@@ -1,6 +1,6 @@
 """What an animation shows: bodies with their shapes, poses over time, the track, wheel forces.
 
-Bodies are the boxes of `railsim.definitions.outlines`; wheels have their radii.
+Bodies are the boxes of `railsim.definitions.vehicle.outlines`; wheels have their radii.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from railsim.animation.wheels import contact_points, seats, sections
-from railsim.definitions.flatten import FlatVehicle, flatten
-from railsim.definitions.outlines import body_boxes
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
+from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.result import Result
 from railsim.result.data import Array

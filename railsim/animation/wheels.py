@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from railsim.contact.curves import rail_curve, tape_circle_position
-from railsim.definitions.flatten import FlatVehicle
+from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.track.irregularity import displacement

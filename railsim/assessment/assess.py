@@ -20,7 +20,7 @@ from railsim.assessment.wear_report import WheelWear, wear_report
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits, load_running_limits
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.result import Result
 

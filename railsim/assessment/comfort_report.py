@@ -17,8 +17,8 @@ from railsim.assessment.comfort import (
 from railsim.assessment.record import PIECE, Record
 from railsim.assessment.sperling import Direction, index_of_rms, sperling_mean_square
 from railsim.assessment.weighting import WK
-from railsim.definitions.layout import curvature_sections
 from railsim.definitions.limits import Classes, ComfortLimits
+from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError
 from railsim.result.filters import Floats, band_passed
 

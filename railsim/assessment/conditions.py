@@ -14,7 +14,7 @@ import numpy as np
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.zones import Population, ZoneReport
 from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.tables import Service
 from railsim.result import Result
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"

@@ -21,7 +21,7 @@ from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Band, Signal, Signals, between
 from railsim.constants import CANT_BASE
 from railsim.contact.geometry import ContactGeometry
-from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.result.filters import Floats, band_passed, distance_means, window_centres
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"

@@ -12,7 +12,7 @@ import numpy as np
 from railsim.assessment.criteria import CRITERIA, Criterion
 from railsim.assessment.statistics import Regression, multiple_regression
 from railsim.assessment.zones import ZoneReport
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.tables import Service
 
 RADIUS = 300.0  # m, mean one of zone 4
 FORCES = ("sum_Y", "Y_over_Q", "Q", "Q_qst", "Y_qst", "T_qst")

@@ -24,10 +24,10 @@ from railsim.assessment.model_comparison import (
 )
 from railsim.assessment.sections import TestSection, section_length, track_sections
 from railsim.assessment.signals import OUTWARDS, Band, Signal
-from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import RunningLimits, ValidationLimits
 from railsim.definitions.loading import load_running_limits, load_validation_limits
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import Shift, shift_of

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from railsim.contact.geometry import ContactGeometry, geometry_of
-from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError
 from railsim.result import Result
 from railsim.result.filters import Floats

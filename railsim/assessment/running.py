@@ -27,7 +27,7 @@ from railsim.assessment.track_quality import TrackQuality, quality_class
 from railsim.assessment.verdict import Verdict, all_verdicts
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.limits import RunningLimits
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, nearest
 from railsim.result import Result
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from railsim.assessment.record import Record
 from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
-from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 
 HALF_BASE = 0.75  # m, from the middle of the axle to the nominal rolling circle

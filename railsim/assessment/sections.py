@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from railsim.cant import cant_deficiency
-from railsim.definitions.layout import cant_sections, curvature_sections
 from railsim.definitions.limits import RunningLimits, Zone
-from railsim.definitions.section import Section
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import cant_sections, curvature_sections
+from railsim.definitions.track.section import Section
+from railsim.definitions.vehicle.tables import Service
 from railsim.notation import SIDES
 
 

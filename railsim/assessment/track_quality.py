@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.result.filters import Floats, butterworth, filtered
 from railsim.track.irregularity import displacement
 

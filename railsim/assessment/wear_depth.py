@@ -14,8 +14,8 @@ import numpy as np
 
 from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import inclined_to_track, tape_circle_position
-from railsim.definitions.flatten import flatten
-from railsim.definitions.vehicle_tables import Wheelset
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.tables import Wheelset
 from railsim.errors import Fault, InputError
 from railsim.profiles import Profile
 from railsim.profiles.profile import FLANGE_BACK

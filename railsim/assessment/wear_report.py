@@ -14,7 +14,7 @@ from railsim.assessment.wear import (
     surface_fatigue_index,
     wear_law,
 )
-from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 from railsim.result.filters import Floats, StreamingPercentiles
 

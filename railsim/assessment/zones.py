@@ -17,8 +17,8 @@ from railsim.assessment.en14363 import SectionValues
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.statistics import Estimate, extreme, one_dimensional, two_dimensional
 from railsim.definitions.limits import RunningLimits, Situation
-from railsim.definitions.vehicle import Vehicle
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.tables import Service
 from railsim.result.filters import Floats
 
 WELL_SPREAD = 0.1

@@ -19,14 +19,14 @@ from railsim.cli.common import (
     show,
 )
 from railsim.errors import Fault, InputError
-from railsim.files import check_folder, make_folder, whole_file
+from railsim.files.access import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from railsim.definitions.settings import Settings
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.track.definition import Track
+    from railsim.definitions.vehicle.definition import Vehicle
     from railsim.table import Table
 
 MOST_VALUES = 2000
@@ -60,7 +60,7 @@ def load_inputs(
     """Load vehicle (in a load case), track (by default ``straight``), settings; all faults."""
     from railsim.cli.common import with_load
     from railsim.definitions.loading import load_settings, load_track, load_vehicle
-    from railsim.definitions.overrides import split_overrides
+    from railsim.files.overrides import split_overrides
     from railsim.studies.case import short_name
 
     faults: list[Fault] = []

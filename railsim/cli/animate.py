@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import output_options, report_file
-from railsim.files import TABLE_BYTES, check_file, read_text
+from railsim.files.access import TABLE_BYTES, check_file, read_text
 
 if TYPE_CHECKING:
     from railsim.animation import Scene

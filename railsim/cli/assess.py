@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import Speed, echo, output_options, print_json, show
-from railsim.files import check_folder, make_folder, whole_file
+from railsim.files.access import check_folder, make_folder, whole_file
 from railsim.text import counted_remarks, spreadsheet_cell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from railsim.assessment import Assessment
-    from railsim.definitions.vehicle_tables import Service
+    from railsim.definitions.vehicle.tables import Service
     from railsim.result import Result
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
@@ -145,7 +145,7 @@ def _service(
         return None
     from pydantic import ValidationError
 
-    from railsim.definitions.vehicle_tables import Service
+    from railsim.definitions.vehicle.tables import Service
     from railsim.errors import Fault, InputError
 
     service = next(iter(results.values())).vehicle().service

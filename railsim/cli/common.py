@@ -73,7 +73,7 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         from click.shell_completion import CompletionItem
 
-        from railsim.definitions.sources import shipped_names
+        from railsim.files.sources import shipped_names
 
         names = [name for name in shipped_names(kind) if name.startswith(incomplete)]
         return [*map(CompletionItem, names)] or [CompletionItem(incomplete, type="file")]
@@ -83,8 +83,8 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
 
 def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["Remark"]:
     """Return what is allowed but unusual in a definition, and in a vehicle's `supports` at rest."""
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.track.definition import Track
+    from railsim.definitions.vehicle.definition import Vehicle
 
     found = definition.unusual()
     if isinstance(definition, Vehicle):
@@ -126,7 +126,7 @@ def _allow_code(ctx: click.Context, param: click.Parameter, given: bool) -> None
 
 def _allow_files(ctx: click.Context, param: click.Parameter, files: tuple[str, ...]) -> None:
     if files:
-        from railsim.files import DEFINITION_BYTES, read_text
+        from railsim.files.access import DEFINITION_BYTES, read_text
         from railsim.laws import allow
 
         allow(*(read_text(file, DEFINITION_BYTES) for file in files))
@@ -197,8 +197,8 @@ def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
     name : str
         The definition's own name, which faults found by computing bear.
     """
-    from railsim.definitions.sources import find_file, read_source
     from railsim.errors import InputError
+    from railsim.files.sources import find_file, read_source
 
     try:
         yield

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import echo, output_options, print_json, show
-from railsim.files import check_folder, make_folder, whole_file
+from railsim.files.access import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ import click
 
 from railsim.cli.common import echo, output_options, print_json, show
 from railsim.cli.progress import progress_bar
-from railsim.files import check_folder, make_folder, whole_file
+from railsim.files.access import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     from railsim.contact.summary import Array, ContactSummary

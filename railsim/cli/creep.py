@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from railsim.cli.common import echo, print_json
 from railsim.cli.progress import progress_bar
-from railsim.files import check_folder, whole_file
+from railsim.files.access import check_folder, whole_file
 
 if TYPE_CHECKING:
     from railsim.contact.creep_curves import Patch

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from railsim.cli.common import output_options, report_file
-from railsim.files import check_file
+from railsim.files.access import check_file
 
 
 @click.command()

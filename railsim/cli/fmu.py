@@ -57,7 +57,7 @@ def command(
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
     """  # noqa: D301 - click reads the escape
     from railsim.errors import InputError, argument_fault
-    from railsim.files import check_file
+    from railsim.files.access import check_file
     from railsim.fmi import OUTPUTS, fmu
     from railsim.studies.case import load_case
     from railsim.studies.spec import RunSpec

@@ -8,7 +8,7 @@ import click
 
 from railsim.cli.common import echo, names_of, output_options, print_json, show
 from railsim.errors import Fault, InputError
-from railsim.files import check_folder, make_folder, write_folder
+from railsim.files.access import check_folder, make_folder, write_folder
 
 FILES = ("identified.toml", "identified.json", "report.html", "fits.png", "residuals.png")
 KEPT = "evaluations"

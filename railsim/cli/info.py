@@ -18,7 +18,7 @@ from railsim.cli.common import (
     with_load,
 )
 from railsim.cli.gathered import STUDY_FILES, described_runs
-from railsim.files import PICTURES, RESULTS, check_file
+from railsim.files.access import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
     from railsim.definitions.file_definition import FileDefinition
@@ -77,7 +77,7 @@ def command(
         found = describe(open_result(file))
     else:
         from railsim.definitions.loading import load_any
-        from railsim.definitions.vehicle import Vehicle
+        from railsim.definitions.vehicle.definition import Vehicle
         from railsim.description import describe
 
         definition = load_any(file, with_load(assignments, load))
@@ -102,8 +102,8 @@ def command(
 
 
 def _draw(definition: "FileDefinition", path: Path, overwrite: bool) -> None:
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.track.definition import Track
+    from railsim.definitions.vehicle.definition import Vehicle
     from railsim.plot.style import save
     from railsim.plot.track import track_figure
     from railsim.plot.vehicle import vehicle_figure

@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 from railsim.cli.common import echo
-from railsim.files import remove_partial_files
+from railsim.files.access import remove_partial_files
 
 # Ctrl-C, and on POSIX what `kill` sends, and what a terminal that is closed
 SIGNALS = [

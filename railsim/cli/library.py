@@ -26,7 +26,7 @@ MEANING = {
 
 def _kinds() -> dict[str, str]:
     """Words of the command line and the kinds of files they stand for."""
-    from railsim.definitions.sources import FOLDERS
+    from railsim.files.sources import FOLDERS
 
     return {Path(folder).name: kind for kind, folder in FOLDERS.items()}
 
@@ -84,7 +84,7 @@ def _entries(kind: str) -> list[dict[str, Any]]:
             }
             for name, p in profiles.items()
         ]
-    from railsim.definitions.sources import library_files
+    from railsim.files.sources import library_files
 
     word = _kinds()[kind]
     return [
@@ -107,8 +107,8 @@ def _title(data: dict[str, Any]) -> str:
 @cache
 def _text_and_data(path: Path) -> tuple[str, dict[str, Any]]:
     """Text of a file and what it says; many files extend the same one."""
-    from railsim.definitions.sources import parse_toml
-    from railsim.files import DEFINITION_BYTES, read_text
+    from railsim.files.access import DEFINITION_BYTES, read_text
+    from railsim.files.sources import parse_toml
 
     text = read_text(path, DEFINITION_BYTES)
     return text, parse_toml(text, str(path))
@@ -130,7 +130,7 @@ def trust(text: str) -> str:
 
 def text_with_bases(path: Path, kind: str) -> str:
     """Return the text of a file with those of all files that it extends."""
-    from railsim.definitions.sources import find_file
+    from railsim.files.sources import find_file
 
     texts: dict[Path, str] = {}
     while path.resolve() not in texts:  # a circle is reported where the file is loaded
@@ -144,9 +144,9 @@ def text_with_bases(path: Path, kind: str) -> str:
 
 def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:
     from railsim.definitions.loading import load_any
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
-    from railsim.files import check_folder
+    from railsim.definitions.track.definition import Track
+    from railsim.definitions.vehicle.definition import Vehicle
+    from railsim.files.access import check_folder
     from railsim.plot.style import save
     from railsim.plot.track import track_figure
     from railsim.plot.vehicle import vehicle_figure

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import echo, faults_in, output_options, print_json, set_option, show
-from railsim.files import check_folder, write_folder
+from railsim.files.access import check_folder, write_folder
 
 if TYPE_CHECKING:
-    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.mechanism.definition import Mechanism
     from railsim.mechanisms.analysis import Analysis
     from railsim.mechanisms.optimum import Optimum
 

@@ -13,7 +13,7 @@ from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.vehicle.definition import Vehicle
     from railsim.linear.modes import Modes, RootLocus
 
 FILES = ("modes.json", "modes.png")
@@ -121,7 +121,7 @@ def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) 
     """Write the oscillations as a page that shows one of them; nothing where there is none."""
     from railsim.animation import mode_scene, write_page
     from railsim.animation.scene import chosen_mode
-    from railsim.files import make_folder
+    from railsim.files.access import make_folder
     from railsim.linear.modes import SHOWN
 
     records = [m.record() for m in found.oscillations if m.natural_frequency <= SHOWN]

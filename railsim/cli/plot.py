@@ -8,7 +8,7 @@ import click
 
 from railsim.cli.common import output_options, report_file
 from railsim.errors import Fault, InputError, nearest
-from railsim.files import PICTURES, RESULTS, check_file
+from railsim.files.access import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -193,7 +193,7 @@ def _recording_figure(file: str) -> "Figure":
     """The recording of a track as its file holds it, and as it acts."""
     from railsim.definitions.excitations.measured_file import recordings
     from railsim.definitions.loading import load_track
-    from railsim.definitions.sources import find_file, read_source
+    from railsim.files.sources import find_file, read_source
     from railsim.plot.recording import recording_figure
 
     track = load_track(file)  # says what is wrong

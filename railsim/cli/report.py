@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli.common import output_options, report_file
-from railsim.files import check_file, whole_file
+from railsim.files.access import check_file, whole_file
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment

@@ -88,7 +88,7 @@ def command(
       railsim run coach_manchester curve_r250 --speed 20 --check-step --overwrite
     """  # noqa: D301 - click reads the escape
     from railsim.cli import DONE, ENDED_EARLY
-    from railsim.definitions.layout import track_remarks
+    from railsim.definitions.track.layout import track_remarks
     from railsim.result.facts import run_facts
     from railsim.simulation.assumptions import assumptions
     from railsim.studies.run import run_case
@@ -158,7 +158,7 @@ def _checked(
 ) -> "tuple[Case, Path]":
     """Load the case and settle its file; everything that is wrong with either at once."""
     from railsim.errors import Fault, InputError
-    from railsim.files import PICTURES, RESULTS, check_file
+    from railsim.files.access import PICTURES, RESULTS, check_file
     from railsim.studies.case import load_case
     from railsim.studies.spec import RunSpec
 

@@ -19,7 +19,7 @@ from railsim.cli.common import (
     set_option,
     show,
 )
-from railsim.files import TABLES, check_file, check_folder, is_file, whole_file, write_folder
+from railsim.files.access import TABLES, check_file, check_folder, is_file, whole_file, write_folder
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
@@ -289,8 +289,8 @@ def _load_remarks(
     suspension: "TrailingArmSuspension", case: "Case", extends: str | None
 ) -> list[str]:
     """Remark on springs that are taken at a load unlike that which the vehicle puts on them."""
-    from railsim.definitions.flatten import flatten
     from railsim.definitions.loading import load_vehicle
+    from railsim.definitions.vehicle.flatten import flatten
     from railsim.errors import RailsimError
     from railsim.springs.vehicle_table import LIKELY, axlebox_load
 
@@ -316,8 +316,8 @@ def _base(
     """The vehicle to extend as the written file must name it, and what to remove there."""
     if extends is None or suspension.vehicle is None:
         return None, None
-    from railsim.definitions.paths import key_path
-    from railsim.definitions.sources import find_file, read_source
+    from railsim.files.key_paths import key_path
+    from railsim.files.sources import find_file, read_source
 
     base = find_file(extends, "vehicle")
     data = read_source(base, "vehicle").data

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from railsim.cli.common import echo, json_option, print_json, quiet_option, remarks_on
-from railsim.files import RESULTS, is_file
+from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli.common import echo, names_of, output_options, print_json, show
-from railsim.files import RESULTS, check_folder, write_folder
+from railsim.files.access import RESULTS, check_folder, write_folder
 
 if TYPE_CHECKING:
     from railsim.measurement import Measurement

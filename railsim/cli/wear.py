@@ -276,7 +276,7 @@ def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
 
 def _write_profile(path: "Path", profile: "Profile") -> "Path":
     """Write a profile so that it can stand in a vehicle or track file."""
-    from railsim.files import whole_file
+    from railsim.files.access import whole_file
 
     lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
     lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from railsim.contact.conicity import equivalent_conicity
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle_tables import Wheelset
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.tables import Wheelset
 from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile

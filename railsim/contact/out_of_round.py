@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.contact.curves import RailCurve
-from railsim.definitions.out_of_round import Flat, Harmonics, RadiusTable, Sections, Uneven
+from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, RadiusTable, Sections, Uneven
 from railsim.kernels.wheel_surface import SURFACE_ROW
 
 Array = NDArray[np.float64]

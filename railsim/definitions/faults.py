@@ -8,9 +8,9 @@ from typing import Any
 from pydantic import BaseModel, Tag, ValidationError
 
 from railsim.definitions.base import meanings
-from railsim.definitions.paths import LONGEST_KEY
-from railsim.definitions.sources import Source, located_fault
 from railsim.errors import MOST_FAULTS, Fault, nearest
+from railsim.files.key_paths import LONGEST_KEY
+from railsim.files.sources import Source, located_fault
 from railsim.text import shortened
 
 

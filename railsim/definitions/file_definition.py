@@ -10,10 +10,10 @@ from pydantic import ValidationError
 
 from railsim.definitions.base import Definition, Remark
 from railsim.definitions.faults import validation_faults
-from railsim.definitions.overrides import apply_overrides, with_values
-from railsim.definitions.sources import Source, text_source
 from railsim.errors import Fault, InputError
-from railsim.files import check_file, whole_file
+from railsim.files.access import check_file, whole_file
+from railsim.files.overrides import apply_overrides, with_values
+from railsim.files.sources import Source, text_source
 from railsim.table import Table
 from railsim.text import printable, shortened
 

@@ -24,9 +24,9 @@ from railsim.definitions.base import (
     rising,
 )
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.flatten import flatten
-from railsim.definitions.vehicle import Vehicle
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.tables import Service
 
 COMFORT_LIMITS_FORMAT = "railsim-comfort-limits/1"
 

@@ -10,15 +10,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from railsim.definitions import sources
 from railsim.definitions.file_definition import FileDefinition, format_fault, loaded
-from railsim.definitions.flatten import wrong_type
 from railsim.definitions.settings import Settings
-from railsim.definitions.sources import Source
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import wrong_type
 from railsim.errors import Fault, InputError
-from railsim.files import is_file
+from railsim.files import sources
+from railsim.files.access import is_file
+from railsim.files.sources import Source
 
 if TYPE_CHECKING:
     from railsim.definitions.limits import (
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
         ValidationLimits,
         WheelLimits,
     )
-    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.mechanism.definition import Mechanism
     from railsim.definitions.published import Published
-    from railsim.definitions.scenario import Scenario
     from railsim.definitions.spring import TrailingArmSuspension
-    from railsim.definitions.study import Study
+    from railsim.definitions.study.definition import Study
+    from railsim.definitions.study.scenario import Scenario
     from railsim.definitions.wear_law import WearLawFile
 
 D = TypeVar("D", bound=FileDefinition)
@@ -144,14 +144,14 @@ def load_mechanism(path: str | Path, overrides: Overrides = ()) -> "Mechanism":
         beside = Path(source.file_of(("optimise", "reference"))).parent / name
         if is_file(beside):
             optimise["reference"] = str(beside.resolve())
-    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.mechanism.definition import Mechanism
 
     return loaded(Mechanism, source, overrides)
 
 
 def load_scenario(path: str | Path, overrides: Overrides = ()) -> "Scenario":
     """Load a scenario, or a shipped one by its name; as `load_vehicle`."""
-    from railsim.definitions.scenario import Scenario
+    from railsim.definitions.study.scenario import Scenario
 
     return _load(Scenario, path, overrides)
 
@@ -211,7 +211,7 @@ def load_study(path: str | Path, overrides: Overrides = ()) -> "Study":
             data[key] = [_beside(folder, name) for name in data[key]]
     if "settings" in data:
         data["settings"] = _beside(folder, data["settings"])
-    from railsim.definitions.study import Study
+    from railsim.definitions.study.definition import Study
 
     return loaded(Study, source, overrides)
 

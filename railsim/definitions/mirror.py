@@ -9,9 +9,9 @@ from typing import TypeVar
 from railsim.definitions.base import Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.excitations.single import OTHER_RAIL
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
-from railsim.definitions.vehicle_tables import Assembly, Axlebox, Body, Placement, Wheelset
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.tables import Assembly, Axlebox, Body, Placement, Wheelset
 
 SIGNS = (1.0, -1.0, 1.0)
 

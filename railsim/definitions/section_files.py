@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.errors import Fault, InputError
-from railsim.files import TABLE_BYTES, is_file, read_text
+from railsim.files.access import TABLE_BYTES, is_file, read_text
 from railsim.text import LONGEST_FILE, shortened
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.creep_law import CreepLawName
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.laws import Law, LawUse, with_sources
+from railsim.definitions.vehicle.laws import Law, LawUse, with_sources
 from railsim.errors import Fault
 
 SpeedRows = Annotated[tuple[tuple[Finite, Speed], ...], Field(min_length=1), rises("first column")]

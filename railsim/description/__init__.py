@@ -11,17 +11,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.description.tracks import describe_track
 from railsim.description.values import Description
 from railsim.description.vehicles import describe_vehicle
 from railsim.table import Table
 
 if TYPE_CHECKING:
-    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.mechanism.definition import Mechanism
     from railsim.definitions.spring import TrailingArmSuspension
-    from railsim.definitions.study import Study
+    from railsim.definitions.study.definition import Study
     from railsim.result import Result
 
 __all__ = ["Description", "describe"]

@@ -1,7 +1,7 @@
 """What spring and mechanism files hold."""
 
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_values import parameter_values
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.values import parameter_values
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.description.values import Parts
 from railsim.table import Column, Table

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from railsim.definitions.flatten import flatten
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.description.values import Description, Parts
 from railsim.laws import permitted_part
 from railsim.linear.modes import modes

@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from railsim.definitions.alignment_rules import cant_at
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured import READING, Measured
-from railsim.definitions.layout import cant_sections, curvature_sections, gradient_sections
-from railsim.definitions.section import Section
-from railsim.definitions.track import Track
+from railsim.definitions.track.alignment_rules import cant_at
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import cant_sections, curvature_sections, gradient_sections
+from railsim.definitions.track.section import Section
 from railsim.description.values import Description, Parts, either, short
 from railsim.errors import InputError, argument_fault
 from railsim.table import Column, Table

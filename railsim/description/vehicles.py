@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from railsim.definitions.elements.base import Element
-from railsim.definitions.flatten import flatten
-from railsim.definitions.vehicle import Vehicle
-from railsim.definitions.vehicle_tables import Assembly
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.tables import Assembly
 from railsim.description.values import Description, Parts, either, short
 from railsim.table import Column, Table
 

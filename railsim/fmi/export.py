@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, argument_fault, nearest, optional_package
-from railsim.files import check_file, whole_file
+from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
 from railsim.notation import QUANTITIES, REQUESTED
 from railsim.plot.selection import panels

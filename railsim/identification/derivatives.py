@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.identification.parameters import Model, Parameter, parsed
 from railsim.identification.variants import Workers, cores

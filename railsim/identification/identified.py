@@ -12,8 +12,8 @@ import tomli_w
 from numpy.typing import NDArray
 
 from railsim.definitions.base import FrozenDict
-from railsim.definitions.vehicle import Vehicle
-from railsim.files import check_file, whole_file
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.files.access import check_file, whole_file
 from railsim.identification.parameters import TRACK, Parameter, present, scaled
 from railsim.table import Column, Table
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.paths import descend, full_path, key_path
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, argument_fault
+from railsim.files.key_paths import descend, full_path, key_path
 from railsim.profiles import Profile, load_profile
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.errors import ModelError
-from railsim.files import read_bytes, whole_file
+from railsim.files.access import read_bytes, whole_file
 from railsim.identification.parameters import Model, Parameter
 from railsim.identification.residuals import Form
 from railsim.identification.runs import Prepared

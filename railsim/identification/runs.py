@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.measurement import Channel
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.identification.parameters import Model, Parameter
 from railsim.measurement import Measurement

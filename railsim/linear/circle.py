@@ -2,7 +2,7 @@
 
 import math
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 
 LENGTH = 50.0  # m; the tables reach beyond both ends
 POSITION = 25.0  # m, where a vehicle stands on it

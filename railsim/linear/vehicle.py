@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from railsim.definitions.creep_law import CREEP_LAWS
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.loading import load_vehicle
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.measurement.data import Measurement
 from railsim.result.filters import band_passed

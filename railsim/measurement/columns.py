@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.measurement import MeasurementFile
 from railsim.errors import Fault, InputError, nearest, optional_package
-from railsim.files import open_regular
+from railsim.files.access import open_regular
 
 Floats = NDArray[np.float64]
 Wanted = Mapping[str, tuple[str, tuple[int, ...]]]

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.flatten import flatten
 from railsim.definitions.measurement import AXES, Channel
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError, nearest
 from railsim.measurement.data import Measurement
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SIDES

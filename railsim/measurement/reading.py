@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
-from railsim.definitions import sources
 from railsim.definitions.file_definition import loaded
 from railsim.definitions.loading import load_track
 from railsim.definitions.measurement import AXES, FEWEST, Channel, MeasurementFile, quantity_of
 from railsim.errors import Fault, InputError, nearest
+from railsim.files import sources
 from railsim.measurement.clock import Clock, bridged, clock_of, delayed, joined
 from railsim.measurement.columns import pieces
 from railsim.measurement.data import Measurement

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism.definition import Mechanism
 from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.mechanisms.cams import Transition, transitions
 from railsim.mechanisms.contact import Contact, Rest, contact_of, positions_of_rest

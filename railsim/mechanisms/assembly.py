@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism_parts import Link, Prismatic, Revolute
+from railsim.definitions.mechanism.parts import Link, Prismatic, Revolute
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.model import Model
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism_parts import Cam
-from railsim.definitions.mechanism_values import body_name
+from railsim.definitions.mechanism.parts import Cam
+from railsim.definitions.mechanism.values import body_name
 from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel

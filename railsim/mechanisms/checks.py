@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from railsim.definitions.mechanism_parts import AirSpring, Cylinder, GasSpring, Piston
-from railsim.definitions.mechanism_values import points_of
+from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring, Piston
+from railsim.definitions.mechanism.values import points_of
 from railsim.design_checks import ROUNDING, Check
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.components import cylinder_area, lid_force, next_size

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.expressions import Expression
-from railsim.definitions.mechanism_parts import AUTO
+from railsim.definitions.mechanism.expressions import Expression
+from railsim.definitions.mechanism.parts import AUTO
 from railsim.mechanisms.forces import (
     Rates,
     force_at_pressure,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism_parts import (
+from railsim.definitions.mechanism.parts import (
     GasSpring,
     Link,
     PointMass,
@@ -15,7 +15,7 @@ from railsim.definitions.mechanism_parts import (
     Slot,
     Spring,
 )
-from railsim.definitions.mechanism_values import ends
+from railsim.definitions.mechanism.values import ends
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.kinematics import Motion
 

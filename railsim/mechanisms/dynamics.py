@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions import mechanism as written
-from railsim.definitions.mechanism_values import points_of
+from railsim.definitions.mechanism import definition as written
+from railsim.definitions.mechanism.values import points_of
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve

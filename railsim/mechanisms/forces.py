@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.definitions.mechanism import Actuator, Element
-from railsim.definitions.mechanism_parts import (
+from railsim.definitions.mechanism.definition import Actuator, Element
+from railsim.definitions.mechanism.parts import (
     AirSpring,
     Cylinder,
     Damper,
@@ -32,7 +32,7 @@ from railsim.definitions.mechanism_parts import (
     Torque,
     TorsionSpring,
 )
-from railsim.definitions.mechanism_values import body_name, points_of
+from railsim.definitions.mechanism.values import body_name, points_of
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.components import (
     AirSpringTable,

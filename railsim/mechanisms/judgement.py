@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import Mechanism, Optimise
-from railsim.definitions.mechanism_parts import AirSpring, Cylinder, GasSpring
-from railsim.definitions.mechanism_values import ends, number, parameter_values
+from railsim.definitions.mechanism.definition import Mechanism, Optimise
+from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
+from railsim.definitions.mechanism.values import ends, number, parameter_values
 from railsim.errors import Fault, InputError
 from railsim.mechanisms.forces import Rates, generalised_force, rubs, unit_work
 from railsim.mechanisms.inversion import largest

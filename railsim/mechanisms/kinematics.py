@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from railsim.definitions.expressions import atan2
-from railsim.definitions.mechanism_parts import Angle
+from railsim.definitions.mechanism.expressions import atan2
+from railsim.definitions.mechanism.parts import Angle
 from railsim.errors import Fault, InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel

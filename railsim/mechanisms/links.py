@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism_parts import Link
-from railsim.definitions.mechanism_values import ends
+from railsim.definitions.mechanism.parts import Link
+from railsim.definitions.mechanism.values import ends
 from railsim.mechanisms.kinematics import Motion, dot
 
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
-from railsim.definitions.mechanism_values import coordinates, number, parameter_values, point_names
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
+from railsim.definitions.mechanism.values import coordinates, number, parameter_values, point_names
 from railsim.errors import Fault, InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_values import number
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.values import number
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.judgement import Judge, Judgement

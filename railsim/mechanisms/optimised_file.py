@@ -6,8 +6,8 @@ from typing import Any
 
 import tomli_w
 
-from railsim.definitions.mechanism import MECHANISM_FORMAT
-from railsim.definitions.paths import key_path
+from railsim.definitions.mechanism.definition import MECHANISM_FORMAT
+from railsim.files.key_paths import key_path
 from railsim.mechanisms.optimum import Optimum
 
 

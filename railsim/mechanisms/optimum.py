@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism.definition import Mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis, analyse
 from railsim.mechanisms.judgement import Judge, Judgement

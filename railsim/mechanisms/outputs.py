@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_parts import AirSpring, Cylinder, GasSpring
-from railsim.definitions.mechanism_values import ends
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
+from railsim.definitions.mechanism.values import ends
 from railsim.errors import Fault, InputError
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.dynamics import driven_motion

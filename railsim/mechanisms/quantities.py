@@ -1,7 +1,7 @@
 """Names, units and meanings of a mechanism's results: tables, files and pictures take them here."""
 
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_parts import HandTorque
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.parts import HandTorque
 from railsim.table import Column
 
 QUANTITIES = {

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from railsim.definitions.mechanism_faults import bounds_remarks
-from railsim.definitions.mechanism_parts import (
+from railsim.definitions.mechanism.faults import bounds_remarks
+from railsim.definitions.mechanism.parts import (
     GasSpring,
     HandForce,
     HandTorque,
@@ -11,7 +11,7 @@ from railsim.definitions.mechanism_parts import (
     Prismatic,
     Revolute,
 )
-from railsim.definitions.mechanism_values import body_name
+from railsim.definitions.mechanism.values import body_name
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
 from railsim.mechanisms.kinematics import solve

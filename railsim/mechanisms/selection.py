@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import CatalogueRow
-from railsim.definitions.mechanism_parts import Cylinder, GasSpring
+from railsim.definitions.mechanism.definition import CatalogueRow
+from railsim.definitions.mechanism.parts import Cylinder, GasSpring
 from railsim.design_checks import ROUNDING
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import force_range

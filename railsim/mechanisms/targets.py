@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_values import number, parameter_values
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.values import number, parameter_values
 from railsim.errors import Fault, InputError
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve

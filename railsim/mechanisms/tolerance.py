@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_values import number, parameter_values
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.values import number, parameter_values
 from railsim.mechanisms.forces import Rates, generalised_force, unit_work
 from railsim.mechanisms.kinematics import derivative, solve, tangents
 from railsim.mechanisms.model import build

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.contact.curves import GAUGE_DEPTH, tape_circle_position
-from railsim.definitions.check_rail import CheckRail
-from railsim.definitions.flatten import FlatVehicle
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle_tables import Wheelset
+from railsim.definitions.track.check_rail import CheckRail
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.flatten import FlatVehicle
+from railsim.definitions.vehicle.tables import Wheelset
 from railsim.kernels.check_rails import CHECK_ROW, CHECK_WHEEL
 from railsim.profiles.profile import Profile
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from railsim.contact.creep import creep_law
-from railsim.definitions.laws import LawUse
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.laws import LawUse
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.creep import OWN
 from railsim.kernels.own_laws import CREEP_GIVES, CREEP_TAKES, FRICTION_GIVES, FRICTION_TAKES

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from railsim.definitions.laws import BODY_SIGNALS, Controller, Signal
 from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.laws import BODY_SIGNALS, Controller, Signal
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import controllers as kernel
 from railsim.kernels import element_outputs as element

@@ -28,8 +28,8 @@ from railsim.definitions.elements.rows import (
     State,
     Triple,
 )
-from railsim.definitions.flatten import FlatBody, FlatElement
-from railsim.definitions.laws import Law
+from railsim.definitions.vehicle.flatten import FlatBody, FlatElement
+from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.actuators import (
     ALONG,

@@ -16,8 +16,8 @@ from railsim.definitions.base import Remark
 from railsim.definitions.elements.base import FreeLength
 from railsim.definitions.elements.side_bearer import SideBearer
 from railsim.definitions.elements.spring_damper import SpringDamper
-from railsim.definitions.flatten import FlatElement, FlatVehicle, flatten
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.errors import ModelError
 
 if TYPE_CHECKING:

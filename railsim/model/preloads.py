@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.flatten import FlatElement
+from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.element_columns import FRICTION, ONE_SIDED

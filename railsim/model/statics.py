@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
 from railsim.definitions.elements.base import two_sided
-from railsim.definitions.flatten import FlatElement
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.kernels.element_outputs import DEFLECTION, FORCE, LINK, MOUNT
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.laws import permitted_part

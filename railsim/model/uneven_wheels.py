@@ -18,12 +18,12 @@ from railsim.contact.out_of_round import (
     wheel_surface,
 )
 from railsim.contact.rail_sections import HEIGHTS, path_heights, rail_parts
-from railsim.definitions.flatten import FlatVehicle
-from railsim.definitions.out_of_round import Flat, Sections, Uneven
-from railsim.definitions.rail_sections import RailSections
 from railsim.definitions.section_files import SectionList
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle_tables import Wheelset
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.rail_sections import RailSections
+from railsim.definitions.vehicle.flatten import FlatVehicle
+from railsim.definitions.vehicle.out_of_round import Flat, Sections, Uneven
+from railsim.definitions.vehicle.tables import Wheelset
 from railsim.kernels.contact_table import FLANGE, N_PATCH
 from railsim.kernels.system import System
 from railsim.kernels.wheel_surface import FLAT, SURFACE_ROW, WAVE

@@ -12,8 +12,8 @@ from railsim.kernels.controllers import CONTROLLER_WHICH, SIGNAL_ROW, SIGNAL_WHI
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
-from railsim.kernels.lanes import LANES
 from railsim.kernels.rails import CHANGES, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.registers import LANES
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
 from railsim.kernels.system import (
     AXLEBOX,

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError
 from railsim.linear.track_response import COMPONENTS, ORDERS, RAILS, TrackResponse
 from railsim.linear.vehicle import LinearVehicle

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.files import make_folder, whole_file
+from railsim.files.access import make_folder, whole_file
 from railsim.linear.track_response import QUANTITIES
 from railsim.table import Column, Table
 

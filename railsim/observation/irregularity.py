@@ -20,9 +20,9 @@ from scipy.fft import next_fast_len
 from railsim.contact.geometry import geometry_of
 from railsim.definitions.excitations.recording import ORDER
 from railsim.definitions.excitations.spectra import SPECTRA
-from railsim.definitions.layout import curvature_sections
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from railsim.definitions.layout import curvature_sections
+from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.notation import QUANTITIES, Quantity
 from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels

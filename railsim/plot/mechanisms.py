@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from railsim.definitions.mechanism_parts import AirSpring, Cam
+from railsim.definitions.mechanism.parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
 from railsim.mechanisms.drawing import Line, centres, joint_points, lines, points, working_box

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.compare import Difference
-from railsim.definitions.layout import curvature_sections
+from railsim.definitions.track.layout import curvature_sections
 from railsim.plot.histories import check_not_empty, draw_limit, unit_label
 from railsim.plot.selection import STUDY, Panel, panels
 from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, shade, spans, styled

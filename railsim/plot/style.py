@@ -19,8 +19,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from railsim.definitions.section import Section
-from railsim.files import PICTURES, check_file, whole_file
+from railsim.definitions.track.section import Section
+from railsim.files.access import PICTURES, check_file, whole_file
 from railsim.result.data import Array
 
 STYLE: Any = {

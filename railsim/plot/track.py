@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.integrate import cumulative_simpson
 
-from railsim.definitions.layout import (
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import (
     cant_sections,
     curvature_sections,
     gradient_sections,
     track_remarks,
 )
-from railsim.definitions.section import Section
-from railsim.definitions.track import Track
+from railsim.definitions.track.section import Section
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, shade, spans, styled
 from railsim.result.data import Array
 from railsim.text import unformatted

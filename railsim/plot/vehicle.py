@@ -11,9 +11,9 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 
 from railsim.definitions.base import Vector
-from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
-from railsim.definitions.outlines import Box, body_boxes
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
+from railsim.definitions.vehicle.outlines import Box, body_boxes
 from railsim.plot.style import DISTINCT, Picture, styled
 from railsim.text import unformatted
 
@@ -32,9 +32,8 @@ NEAR = (3.0, 0.4)
 def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     """Draw a vehicle in three views with its elements.
 
-    Bodies are crosses at their centres of gravity with the boxes of `railsim.definitions.outlines`,
-    axleboxes squares, wheels circles or lines;
-    every element is drawn between its points, with a thin line from each point to the body that it
+    Bodies are crosses at their centres of gravity with the boxes of
+    `railsim.definitions.vehicle.outlines`, axleboxes squares, wheels circles or lines; every element is drawn between its points, with a thin line from each point to the body that it
     is attached to.
 
     Parameters

@@ -15,7 +15,7 @@ Read `profile` first: it states the frames.
 from pathlib import Path
 
 from railsim.errors import Fault, InputError, nearest
-from railsim.files import is_file
+from railsim.files.access import is_file
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
 from railsim.text import LONGEST_FILE, shortened

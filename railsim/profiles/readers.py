@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.errors import Fault, InputError
-from railsim.files import read_bytes
+from railsim.files.access import read_bytes
 from railsim.profiles.profile import Kind
 
 Array = NDArray[np.float64]

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
-from railsim.definitions.vehicle_tables import Assembly
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.tables import Assembly
 from railsim.errors import Fault, InputError
 from railsim.profiles import load_profile
 from railsim.profiles.profile import Kind

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.layout import curvature_sections
-from railsim.definitions.section import Section
+from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.track.section import Section
 from railsim.notation import plain_symbol
 from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result

@@ -9,11 +9,11 @@ from html import escape
 import numpy as np
 
 from railsim.definitions.base import Vector
-from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
-from railsim.definitions.layout import curvature_sections
-from railsim.definitions.outlines import body_boxes
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
+from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.track.alignment import Alignment
 
 MARGIN = 0.9  # m, margin around a vehicle

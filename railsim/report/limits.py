@@ -12,7 +12,7 @@ from railsim.assessment.running import group_key
 from railsim.assessment.verdict import DERAILED, FAIL, PASS
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
-from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.report.tables import Cell, Table
 from railsim.result import Result

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from railsim.definitions.mechanism_parts import AirSpring
+from railsim.definitions.mechanism.parts import AirSpring
 from railsim.design_checks import check_table
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis

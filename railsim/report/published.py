@@ -8,7 +8,7 @@ import numpy as np
 
 from railsim.definitions.loading import load_published, load_track, load_vehicle
 from railsim.definitions.published import Published, PublishedValue
-from railsim.definitions.sources import shipped_names
+from railsim.files.sources import shipped_names
 from railsim.notation import SIDES
 from railsim.result import Result
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from railsim.definitions.analyses import unit_of_number
+from railsim.definitions.study.analyses import unit_of_number
 from railsim.notation import QUANTITIES, Quantity
 from railsim.text import printable
 

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from railsim.definitions.settings import Settings
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.track.definition import Track
+    from railsim.definitions.vehicle.definition import Vehicle
 
 D = TypeVar("D")
 Array = NDArray[np.float64]

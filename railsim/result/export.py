@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from railsim.errors import InputError, argument_fault, nearest
-from railsim.files import check_file, whole_file
+from railsim.files.access import check_file, whole_file
 from railsim.result.data import Array, Result
 from railsim.result.filters import low_passed
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.layout import curvature_sections
-from railsim.definitions.section import Section
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.track.section import Section
 from railsim.notation import Quantity
 from railsim.result.data import Array, Result
 from railsim.result.filters import low_passed

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.result.data import Result
 from railsim.result.extremes import PEAK_QUANTITIES, mid_curves, peaks
 

@@ -32,7 +32,7 @@ import h5py
 import numpy as np
 
 from railsim.errors import Fault, InputError
-from railsim.files import PartialFile, check_file
+from railsim.files.access import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result.data import Array, Attributes, Result, frozen, register_writer

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
-from railsim.definitions.flatten import FlatBody, flatten
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatBody, flatten
 from railsim.track.alignment import Alignment
 
 Floats = NDArray[np.float64]

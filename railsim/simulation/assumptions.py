@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 from railsim.definitions.creep_law import CREEP_LAWS
-from railsim.definitions.flatten import flatten
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.simulation.sampling import output_words
 
 

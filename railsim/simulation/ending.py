@@ -8,7 +8,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, NOT_FINITE, STATUS
 from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS, TIME
 from railsim.model.assembly import Model

@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.layout import curvature_sections
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import curvature_sections
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import LAST_STEP, System
 from railsim.kernels.time_loop import FAST

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import contact_columns as patch
 from railsim.kernels import element_outputs as element

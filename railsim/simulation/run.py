@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.profiles import Profile
 from railsim.result import Result, Sink
 from railsim.simulation.run_progress import Progress

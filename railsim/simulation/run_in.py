@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (

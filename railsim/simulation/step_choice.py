@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile

@@ -19,8 +19,8 @@ import numpy as np
 import tomli_w
 
 from railsim.constants import GRAVITY
-from railsim.definitions.flatten import FlatVehicle
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
+from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.errors import Fault, InputError
 from railsim.springs.verification import Case, load_cases
 
@@ -46,7 +46,7 @@ def axlebox_load(vehicle: FlatVehicle) -> float:
 
     Examples
     --------
-    >>> from railsim.definitions.flatten import flatten
+    >>> from railsim.definitions.vehicle.flatten import flatten
     >>> from railsim.definitions.loading import load_vehicle
     >>> round(axlebox_load(flatten(load_vehicle("coach_manchester"))))
     59912

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, ModelError, argument_fault
 from railsim.linear.eigenmodes import (
     SEARCHED,

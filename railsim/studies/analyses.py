@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from railsim.definitions.analyses import (
+from railsim.definitions.study.analyses import (
     AssessAnalysis,
     CriticalSpeedAnalysis,
     CurvingAnalysis,

@@ -26,10 +26,10 @@ from railsim.definitions.excitations.recording import BANDS, band_passed
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, argument_fault
-from railsim.files import check_folder, whole_file
+from railsim.files.access import check_folder, whole_file
 from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out
 from railsim.studies.case import Case, short_name

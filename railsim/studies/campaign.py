@@ -13,10 +13,10 @@ from pathlib import Path
 from railsim.assessment import Assessment, assess
 from railsim.cant import curve_speed
 from railsim.definitions.loading import load_running_limits, load_scenario, load_vehicle
-from railsim.definitions.scenario import Scenario, Speed, TestCondition
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, RailsimError
-from railsim.files import check_folder
+from railsim.files.access import check_folder
 from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out, cores
 from railsim.studies.case import Case, load_case, short_name

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import InputError, argument_fault
-from railsim.files import is_file, make_folder, sweep
+from railsim.files.access import is_file, make_folder, sweep
 from railsim.studies.execute import (
     Batch,
     Job,

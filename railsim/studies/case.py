@@ -9,14 +9,14 @@ from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.analyses import Analysis, needs_run, needs_speed
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.overrides import split_overrides
 from railsim.definitions.settings import Settings
-from railsim.definitions.sources import OVERRIDE
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.study.analyses import Analysis, needs_run, needs_speed
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError
+from railsim.files.overrides import split_overrides
+from railsim.files.sources import OVERRIDE
 from railsim.profiles import load_profile
 from railsim.profiles.used import profile_faults, used_profiles
 from railsim.simulation.conditions import check_range, initial_speed

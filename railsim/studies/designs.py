@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.design import Constraint, Objective, Optimise, Value, Variable
-from railsim.definitions.study import Study
+from railsim.definitions.study.definition import Study
+from railsim.definitions.study.design import Constraint, Objective, Optimise, Value, Variable
 from railsim.errors import Fault, InputError, nearest
 from railsim.studies.outcome import Outcome
 from railsim.studies.records import Record

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import InputError, ModelError, RailsimError, argument_fault
-from railsim.files import remove_partial_files, sweep, whole_file
+from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
 from railsim.result import Result, open_result

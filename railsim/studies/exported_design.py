@@ -7,9 +7,9 @@ from typing import Any
 
 import tomli_w
 
-from railsim.definitions import sources
-from railsim.definitions.overrides import apply_overrides, split_overrides
-from railsim.files import is_file, whole_file
+from railsim.files import sources
+from railsim.files.access import is_file, whole_file
+from railsim.files.overrides import apply_overrides, split_overrides
 from railsim.studies.designs import Design, Evaluation, name_of
 from railsim.studies.summary import unit_of
 
@@ -53,7 +53,7 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     folder : Path
         Folder of the new file; the path to the original is relative to it.
     """
-    from railsim.definitions.vehicle import Vehicle
+    from railsim.definitions.vehicle.definition import Vehicle
 
     base = sources.read_source(sources.find_file(vehicle, "vehicle"), "vehicle")
     defaults = Vehicle.model_construct().model_dump(mode="json")

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self, overload
 
 from railsim.errors import Fault, InputError, argument_fault
-from railsim.files import locked
+from railsim.files.access import locked
 from railsim.studies.records import Record, json_bytes
 
 JOURNAL = "study.journal"

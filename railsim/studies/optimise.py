@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from railsim.definitions.design import Optimise
 from railsim.definitions.loading import load_study
-from railsim.definitions.study import Study
+from railsim.definitions.study.definition import Study
+from railsim.definitions.study.design import Optimise
 from railsim.errors import Fault, InputError, argument_fault
-from railsim.files import check_folder, is_file, make_folder, read_text, whole_file
+from railsim.files.access import check_folder, is_file, make_folder, read_text, whole_file
 from railsim.studies.carry_out import cores
 from railsim.studies.designs import (
     INPUTS,

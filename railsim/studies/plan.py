@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
-from railsim.definitions.analyses import needs_run
 from railsim.definitions.loading import load_track
-from railsim.definitions.study import value_texts
+from railsim.definitions.study.analyses import needs_run
+from railsim.definitions.study.definition import value_texts
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.studies.case import Case, Loader, run_labels, run_name
 from railsim.studies.points import Fingerprints, Point, check_number, point_key

@@ -16,9 +16,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions import sources
 from railsim.errors import Fault, InputError
-from railsim.files import TABLE_BYTES, is_file, read_bytes
+from railsim.files import sources
+from railsim.files.access import TABLE_BYTES, is_file, read_bytes
 from railsim.studies.case import Overrides
 from railsim.studies.spec import RunSpec
 from railsim.units import duration_in_words

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError
-from railsim.files import TABLE_BYTES, make_folder, read_text, whole_file
+from railsim.files.access import TABLE_BYTES, make_folder, read_text, whole_file
 
 Record = dict[str, Any]
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from railsim.definitions.study import Sample, Spread
+from railsim.definitions.study.definition import Sample, Spread
 from railsim.errors import InputError, argument_fault
 from railsim.units import speed_in_si
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, ValidationError
 
-from railsim.definitions.analyses import Analysis
 from railsim.definitions.base import Name
-from railsim.definitions.study import Sample, Study, value_texts
+from railsim.definitions.study.analyses import Analysis
+from railsim.definitions.study.definition import Sample, Study, value_texts
 from railsim.errors import Fault, InputError
 from railsim.studies.rows import PERMITTED, speed_of
 from railsim.units import ALLOWED
@@ -127,7 +127,7 @@ class StudySpec(BaseModel):
     keep, compress, single
         Parts of each result that are kept, see `railsim.studies.retention`.
 
-    Others as in a study file (`railsim.definitions.study`).
+    Others as in a study file (`railsim.definitions.study.definition`).
     """
 
     model_config = ConfigDict(extra="ignore", frozen=True)

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import workers_begin

@@ -21,11 +21,11 @@ import numpy as np
 
 from railsim.cant import cant_deficiency
 from railsim.constants import CANT_BASE
-from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.limits import StationaryLimits, Value
 from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.errors import Fault, InputError
 from railsim.linear.sliding import has_pads
 from railsim.linear.stationary import (

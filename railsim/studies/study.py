@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.analyses import Analysis, needs_run
 from railsim.definitions.settings import Settings
-from railsim.definitions.study import Sample
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.study.analyses import Analysis, needs_run
+from railsim.definitions.study.definition import Sample
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
-from railsim.files import check_folder, is_file
+from railsim.files.access import check_folder, is_file
 from railsim.studies.carry_out import carry_out, cores
 from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome

@@ -17,9 +17,9 @@ from typing import Annotated, Any, BinaryIO, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from railsim.definitions.analyses import unit_of_number
+from railsim.definitions.study.analyses import unit_of_number
 from railsim.errors import Fault, InputError, RailsimError, words_of
-from railsim.files import is_file, read_text, whole_file
+from railsim.files.access import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.result.facts import FACTS, run_facts

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import InputError, RailsimError, argument_fault
-from railsim.files import TABLE_BYTES, read_bytes
+from railsim.files.access import TABLE_BYTES, read_bytes
 from railsim.result import Result
 
 PARAMETER = "quantities"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.definitions.file_definition import FileDefinition
-from railsim.files import make_folder, whole_file
+from railsim.files.access import make_folder, whole_file
 
 INPUTS = "inputs"
 

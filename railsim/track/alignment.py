@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from railsim.constants import CANT_BASE
-from railsim.definitions.layout import (
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import (
     cant_sections,
     curvature_sections,
     gradient_sections,
     track_faults,
 )
-from railsim.definitions.rounded_profile import RoundedProfile
-from railsim.definitions.section import Section
-from railsim.definitions.track import Track
+from railsim.definitions.track.rounded_profile import RoundedProfile
+from railsim.definitions.track.section import Section
 from railsim.errors import Fault, InputError
 
 Array = NDArray[np.float64]

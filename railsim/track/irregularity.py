@@ -10,9 +10,9 @@ import numpy as np
 
 from railsim.definitions.excitations.base import Array, Displacement
 from railsim.definitions.excitations.measured import Measured, largest_between_rows
-from railsim.definitions.rounded_profile import RoundedProfile
-from railsim.definitions.section import Section
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.rounded_profile import RoundedProfile
+from railsim.definitions.track.section import Section
 
 # Largest displacement between the rows over that at the rows, from which on it is remarked on.
 BEYOND_ROWS = 1.05

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from railsim.definitions.excitations.base import Displacement
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.errors import Fault, InputError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables

@@ -3,7 +3,7 @@
 import numpy as np
 from example_result import BODIES, COORDINATES, OFFSETS, PROFILES, text
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.notation import QUANTITIES
 from railsim.result import MemorySink
 

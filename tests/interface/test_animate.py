@@ -13,8 +13,8 @@ import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
 from railsim.animation.page import scene_data
 from railsim.cli import main
-from railsim.definitions.flatten import flatten
-from railsim.definitions.outlines import body_boxes
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.errors import InputError
 from railsim.profiles import load_profile
 

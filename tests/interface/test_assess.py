@@ -15,7 +15,7 @@ from railsim.assessment.comfort_report import PointComfort
 from railsim.cli import main
 from railsim.cli.assess import FILES
 from railsim.definitions.loading import load_comfort_limits
-from railsim.definitions.vehicle_tables import Service
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
 from railsim.plot.assessment import assessment_figure

@@ -15,8 +15,8 @@ from railsim.assessment import assess
 from railsim.assessment.sections import track_sections
 from railsim.assessment.track_quality import TrackQuality
 from railsim.cli import main
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_running_limits, load_scenario
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.profiles import load_profile
 from railsim.studies.campaign import campaign, part_speed, scenario_cases

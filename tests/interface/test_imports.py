@@ -24,7 +24,10 @@ NOTHING_COMPILED = f"{PICTURES} {SCIPY} numba scipy"
         (NOTHING_COMPILED, ["list"]),
         (NOTHING_COMPILED, ["info", "curve_r250"]),
         (NOTHING_COMPILED, ["info", "result.h5"]),
-        (f"{NOTHING_COMPILED} railsim.definitions.mechanism", ["info", "coach_manchester"]),
+        (
+            f"{NOTHING_COMPILED} railsim.definitions.mechanism.definition",
+            ["info", "coach_manchester"],
+        ),
         (f"{SCIPY} numba scipy pandas railsim.model railsim.studies", ["plot", "result.h5"]),
         (
             f"{PICTURES} {SCIPY} railsim.report railsim.assessment railsim.stability",

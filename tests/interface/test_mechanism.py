@@ -10,7 +10,7 @@ import pytest
 
 from railsim import cli
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.sources import find_file, shipped_names
+from railsim.files.sources import find_file, shipped_names
 
 FEW = ["--set", "sampling.points=51"]
 FOUR_BAR = """

@@ -8,7 +8,7 @@ from example_result import example_result
 
 from railsim.cli import main
 from railsim.errors import InputError
-from railsim.files import PartialFile, check_folder
+from railsim.files.access import PartialFile, check_folder
 
 FIRST = {"contact": "functions.csv", "compare": "compare.csv", "spring verify": "report.html"}
 

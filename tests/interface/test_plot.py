@@ -11,8 +11,8 @@ from matplotlib.colors import to_hex
 from railsim.cli import main
 from railsim.definitions.excitations.measured_file import recordings
 from railsim.definitions.loading import load_track
-from railsim.definitions.sources import read_source
 from railsim.errors import InputError
+from railsim.files.sources import read_source
 from railsim.plot.histories import STUDY, histories
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure

@@ -7,7 +7,7 @@ import pytest
 
 import railsim
 from railsim.definitions.loading import load_track, load_vehicle
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 
 
 @cache

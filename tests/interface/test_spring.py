@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 import pytest
 
 from railsim import cli
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_vehicle
-from railsim.definitions.sources import shipped_names
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.files.sources import shipped_names
 
 MINIMAL = """
 format = "railsim-spring/1"

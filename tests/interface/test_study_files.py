@@ -13,7 +13,7 @@ from test_study import simulated as simulated
 import railsim
 from railsim.cli import main
 from railsim.definitions.loading import load_study, load_track, load_vehicle
-from railsim.definitions.study import Sample, Spread
+from railsim.definitions.study.definition import Sample, Spread
 from railsim.errors import InputError
 from railsim.studies import user_function
 from railsim.studies.rows import made_rows, quantile, sampled

@@ -7,7 +7,7 @@ import pytest
 
 import railsim
 from railsim import cli
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.model.plausibility import vehicle_remarks
 from railsim.result import peak
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from railsim.definitions.expressions import Expression, evaluate
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.expressions import Expression, evaluate
 from railsim.errors import InputError
 from railsim.mechanisms.components import AirSpringTable, gas_spring_force, lid_force
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, reactions

@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from railsim.definitions.layout import curvature_sections, track_faults
 from railsim.definitions.loading import load_track_text
 from railsim.definitions.mirror import mirrored_track
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import curvature_sections, track_faults
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 

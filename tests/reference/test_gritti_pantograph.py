@@ -12,8 +12,8 @@ import pytest
 from selection import points
 
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_parts import Cylinder
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.parts import Cylinder
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.forces import table_of

@@ -10,7 +10,7 @@ import pytest
 from cases import bounded
 
 from railsim.cli import main
-from railsim.files import PartialFile
+from railsim.files.access import PartialFile
 from railsim.studies.journal import Journal
 
 ROOT = Path(__file__).parents[2]

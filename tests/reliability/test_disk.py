@@ -13,7 +13,7 @@ from cases import tried
 
 from railsim.cli import main
 from railsim.errors import InputError
-from railsim.files import PartialFile, sweep, whole_file
+from railsim.files.access import PartialFile, sweep, whole_file
 from railsim.result import check_result
 from railsim.studies.journal import Journal
 
@@ -154,7 +154,7 @@ def test_file_that_appeared_in_the_meantime_is_kept_and_so_is_the_result(tmp_pat
 
 def test_partial_files_of_the_dead_are_swept_and_nothing_else(tmp_path):
     program = (
-        "import os, sys; from pathlib import Path; from railsim.files import PartialFile;"
+        "import os, sys; from pathlib import Path; from railsim.files.access import PartialFile;"
         "PartialFile(Path(sys.argv[1])); os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", program, tmp_path / "run.h5"])

@@ -17,7 +17,7 @@ import pytest
 from cases import MORE, tried
 
 from railsim.cli import main
-from railsim.files import sweep
+from railsim.files.access import sweep
 from railsim.result import check_result
 
 sys.path.append(str(Path(__file__).parents[1] / "interface"))
@@ -184,7 +184,7 @@ def test_signal_is_obeyed_while_python_cannot(tmp_path):
     """As while the time loop is compiled: one call outside Python that takes minutes."""
     program = (
         "import sys, hashlib, click; from pathlib import Path; import railsim.cli as cli;"
-        "import railsim.cli.interrupts as interrupts; from railsim.files import PartialFile;"
+        "import railsim.cli.interrupts as interrupts; from railsim.files.access import PartialFile;"
         "interrupts.PATIENCE = 0.5;"
         "partial = PartialFile(Path(sys.argv[1]));"
         "cli._called = lambda _: print('begun', flush=True)"

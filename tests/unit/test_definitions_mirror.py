@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.track.tables import track_tables
 
 RICH = {

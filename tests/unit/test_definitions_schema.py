@@ -8,9 +8,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from railsim.definitions import sources
 from railsim.definitions.loading import FORMATS, load_any, load_vehicle
 from railsim.definitions.schema import filled, json_schema, schema_name
+from railsim.files import sources
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"assess.md", "vehicle_file.md", "track_file.md", "settings.md"}

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from railsim.definitions.support import PRESETS, Support, beam_on_foundation
+from railsim.definitions.track.support import PRESETS, Support, beam_on_foundation
 
 
 def test_single_keys_replace_values_of_the_preset():

@@ -5,15 +5,15 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from railsim.definitions.layout import (
+from railsim.definitions.loading import load_track, load_track_text
+from railsim.definitions.settings import Settings
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import (
     cant_sections,
     curvature_sections,
     track_faults,
     track_remarks,
 )
-from railsim.definitions.loading import load_track, load_track_text
-from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
 from railsim.errors import InputError
 from railsim.track.alignment import Alignment
 

@@ -5,10 +5,10 @@ import pytest
 from pydantic import ValidationError
 
 from railsim.definitions.elements.base import two_sided
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_vehicle, load_vehicle_text
-from railsim.definitions.names import resolve
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.names import resolve
 from railsim.errors import InputError
 
 BODY = {"mass": 10.0, "inertia": [1.0, 1.0, 1.0], "position": [0.0, 0.0, -0.6]}

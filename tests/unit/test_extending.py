@@ -18,7 +18,7 @@ import numpy as np, railsim
 from railsim.definitions.loading import load_vehicle
 from railsim.definitions.schema import json_schema, key_table
 from railsim.errors import InputError
-from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.model.element_arrays import ElementArrays
 
 key = "assemblies.bogie.assemblies.axle.elements.primary"

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from railsim.definitions import sources
 from railsim.definitions.loading import (
     load_any,
     load_settings,
@@ -14,8 +13,9 @@ from railsim.definitions.loading import (
     load_track_text,
     load_vehicle,
 )
-from railsim.definitions.overrides import split_overrides
 from railsim.errors import InputError
+from railsim.files import sources
+from railsim.files.overrides import split_overrides
 
 HEAD = 'format = "railsim-vehicle/1"\nname = "mine"\n'
 COACH = HEAD + 'extends = "coach_manchester"\n'

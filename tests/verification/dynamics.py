@@ -5,7 +5,7 @@ import numpy as np
 from railsim.definitions.loading import load_track as load_any_track
 from railsim.definitions.loading import load_vehicle
 from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.contact_table import (
     LOOK_UP_SIZE,
     N_WEIGHT,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from dynamics import Settings, absolute_frame, load_track, load_vehicle, rotation
 
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.step_rk4 import settle_limits

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from railsim.definitions.check_rail import CheckRail
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.track.check_rail import CheckRail
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.model.check_rails import flange_back
 from railsim.profiles import Profile

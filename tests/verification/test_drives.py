@@ -12,7 +12,7 @@ import pytest
 import railsim
 from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 
 RADIUS, HEIGHT, HALF_BASE, HALF_WIDTH, KZ = 0.46, 0.9, 1.25, 1.0, 8e5
 MASS, TORQUE = 20e3, 3e3
@@ -241,7 +241,7 @@ def test_mirror_image():
     ],
 )
 def test_faults_are_named(change, found):
-    from railsim.definitions.flatten import flatten
+    from railsim.definitions.vehicle.flatten import flatten
 
     with pytest.raises((ValueError, railsim.InputError), match=found) as caught:
         flatten(bogie(traction(**change)))

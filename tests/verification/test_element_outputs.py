@@ -10,7 +10,7 @@ from test_one_sided import with_elements
 import railsim
 from railsim.animation import result_scene
 from railsim.definitions.settings import Settings
-from railsim.definitions.support import PRESETS
+from railsim.definitions.track.support import PRESETS
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
 BAR, BAR_DAMPING, DAMPER = 8e5, 1.5e4, 2e4

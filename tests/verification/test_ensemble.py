@@ -12,7 +12,7 @@ from selection import points
 
 from railsim import load_track, load_vehicle, simulate, simulate_together
 from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, ModelError
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.fastsim_simd import available

@@ -7,7 +7,7 @@ from rig import test_vehicle
 
 import railsim
 from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError
 from railsim.linear.eigenmodes import loss_of_stability
 from railsim.linear.vehicle import Contact, LinearVehicle

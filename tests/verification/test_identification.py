@@ -9,7 +9,7 @@ from rig import test_vehicle
 
 import railsim
 from railsim.cli import railsim as command_line
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
 from railsim.identification.parameters import Model, parsed, scaled
 from railsim.identification.residuals import whiteness

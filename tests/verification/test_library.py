@@ -14,10 +14,10 @@ from scipy.linalg import eigh
 from selection import points
 
 import railsim
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
-from railsim.definitions.sources import library_files, shipped_folder
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.files.sources import library_files, shipped_folder
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.studies.plan import Plan

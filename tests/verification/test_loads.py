@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium

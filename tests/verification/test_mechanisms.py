@@ -5,7 +5,7 @@ import pytest
 from mechanism_closed_forms import LENGTHS, upper
 
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.mechanism_values import ends, parameter_values
+from railsim.definitions.mechanism.values import ends, parameter_values
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.dynamics import driven_motion, energy, free_motion
 from railsim.mechanisms.forces import (

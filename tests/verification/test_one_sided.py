@@ -7,7 +7,7 @@ from test_loads import GRAVITY, MASS, K, at_rest, wagon
 
 import railsim
 from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError
 from railsim.model.assembly import without_rails
 from railsim.model.plausibility import vehicle_remarks

@@ -11,10 +11,10 @@ import pytest
 
 from railsim.contact.curves import RailCurve, rail_curve
 from railsim.contact.out_of_round import ACROSS, rolled_out, surface_arrays, wheel_surface
-from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_vehicle
-from railsim.definitions.out_of_round import Flat, Harmonics, Sections
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, Sections
 from railsim.errors import InputError
 from railsim.kernels.wheel_surface import angle_to_flat, surface_at
 from railsim.profiles import Profile

@@ -6,7 +6,7 @@ from dynamics import Settings, load_track, load_vehicle, steady
 from rig import test_vehicle
 
 import railsim
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.stationary import WALKING_PACE, on_twist, twist_loop
 
 STIFFNESS, STICKING, SLIDING = 1e6, 3e6, 2e3  # N/m, N/m, N

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from dynamics import Settings, evaluate, load_track, load_vehicle, steady
 
-from railsim.definitions.support import PRESETS
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.track.support import PRESETS
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.status import RUNNING

@@ -5,8 +5,8 @@ import pytest
 from scipy.special import fresnel
 
 from railsim.definitions.loading import load_track
-from railsim.definitions.rounded_profile import RoundedProfile
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables, usual_cell_length
 

@@ -6,7 +6,7 @@ from dynamics import Settings, evaluate, load_vehicle, steady
 from rig import test_vehicle
 
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.kernels.contact_columns import W_NORMAL
 from railsim.simulation import simulate
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dynamics import Settings, advance, changed, evaluate, load_track, load_vehicle, steady
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.simulation import simulate
 

@@ -6,7 +6,7 @@ from dynamics import Settings, changed, energy, load_track, load_vehicle, steady
 from rig import WorkOfDissipation, step_by_step, test_vehicle
 
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
-from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.simulation import simulate
 
 SPEEDS = {

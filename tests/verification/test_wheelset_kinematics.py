@@ -14,7 +14,7 @@ from dynamics import (
     steady,
 )
 
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,

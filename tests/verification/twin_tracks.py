@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from railsim.constants import CANT_BASE
-from railsim.definitions.track import Track
+from railsim.definitions.track.definition import Track
 from railsim.simulation import simulate
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement

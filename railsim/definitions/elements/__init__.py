@@ -14,9 +14,11 @@ from pydantic import Field
 
 from railsim.definitions.elements.base import Element
 from railsim.definitions.registry import kinds
+from railsim.files.key_paths import NEW_MEMBERS
 
 KINDS = kinds(Element, "kind", __name__)  # type: ignore[type-abstract]
 """Definition of every kind of force element."""
+NEW_MEMBERS["elements"] = f'kind="{"|".join(KINDS)}", '
 
 if TYPE_CHECKING:
     AnyElement = Element

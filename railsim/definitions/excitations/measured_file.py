@@ -16,7 +16,7 @@ from railsim.definitions.excitations.base import COLUMNS, Array
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, InputError, counted, nearest
-from railsim.files import TABLE_BYTES, is_file, read_bytes
+from railsim.files.access import TABLE_BYTES, is_file, read_bytes
 from railsim.text import LONGEST_FILE, shortened
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}

@@ -6,8 +6,8 @@ import numpy as np
 
 from railsim.definitions.base import Finite, Positive
 from railsim.definitions.excitations.base import Array, Displacement, Irregular
-from railsim.definitions.rounded_profile import RoundedProfile
-from railsim.definitions.section import Section
+from railsim.definitions.track.rounded_profile import RoundedProfile
+from railsim.definitions.track.section import Section
 
 Rails = Literal["left", "right", "both"]
 OTHER_RAIL: dict[str, Rails] = {"left": "right", "right": "left", "both": "both"}

@@ -15,9 +15,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from railsim.definitions.paths import descend, key_path
 from railsim.errors import Fault, InputError, argument_fault, nearest
-from railsim.files import DEFINITION_BYTES, is_file, read_text
+from railsim.files.access import DEFINITION_BYTES, is_file, read_text
+from railsim.files.key_paths import descend, key_path
 from railsim.text import shortened
 
 if TYPE_CHECKING:

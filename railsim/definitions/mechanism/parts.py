@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from railsim.definitions.base import Definition, Flag, Name
-from railsim.definitions.expressions import Expression
+from railsim.definitions.mechanism.expressions import Expression
 
 AUTO = "auto"
 

@@ -24,9 +24,9 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.elements import AnyElement
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.laws import Controller, Law, Signal
-from railsim.definitions.loads import LoadCase, LoadName
-from railsim.definitions.out_of_round import OutOfRound
+from railsim.definitions.vehicle.laws import Controller, Law, Signal
+from railsim.definitions.vehicle.loads import LoadCase, LoadName
+from railsim.definitions.vehicle.out_of_round import OutOfRound
 
 
 class Body(Definition):

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from railsim.definitions.alignment_rules import alignment_remarks
 from railsim.definitions.base import Remark
-from railsim.definitions.section import Section
-from railsim.definitions.track_tables import TrackElement, TrackTables
+from railsim.definitions.track.alignment_rules import alignment_remarks
+from railsim.definitions.track.section import Section
+from railsim.definitions.track.tables import TrackElement, TrackTables
 from railsim.errors import Fault
 
 # Ramps steeper than this are remarked on: exceptional limit of EN 13803 (2017) for the cant ramp.

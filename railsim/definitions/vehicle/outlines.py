@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.definitions.base import Vector
-from railsim.definitions.flatten import FlatBody, FlatVehicle
+from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle
 
 OVERHANG, WIDTH, FLOOR, ROOF = 3.2, 2.8, 1.1, 3.9
 """Of a car body: beyond its wheelsets, across, above the rail [m]."""
@@ -32,7 +32,7 @@ def body_boxes(flat: FlatVehicle) -> dict[str, Box]:
     Examples
     --------
     >>> from railsim.definitions.loading import load_vehicle
-    >>> from railsim.definitions.flatten import flatten
+    >>> from railsim.definitions.vehicle.flatten import flatten
     >>> boxes = body_boxes(flatten(load_vehicle("coach_manchester")))
     >>> list(boxes), boxes["carbody"].high[0]
     (['carbody', 'front.frame', 'rear.frame'], 13.98)

@@ -6,9 +6,9 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
-from railsim.definitions.expressions import Expression, evaluate
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_parts import Link, Polar, Prismatic, Slot
+from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.expressions import Expression, evaluate
+from railsim.definitions.mechanism.parts import Link, Polar, Prismatic, Slot
 from railsim.errors import Fault, InputError
 
 PARTS = ("length", "free_length", "stroke", "extended", "bore", "rod", "pin_to_pin", "end_length")

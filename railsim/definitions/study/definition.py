@@ -5,10 +5,10 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from railsim.definitions.analyses import Analysis, needs_speed
 from railsim.definitions.base import Count, Definition, Finite, Name, NonNegative, Positive, Text
-from railsim.definitions.design import Optimise
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.study.analyses import Analysis, needs_speed
+from railsim.definitions.study.design import Optimise
 from railsim.units import range_values
 
 Value = (

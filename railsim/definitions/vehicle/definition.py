@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from railsim.definitions.flatten import flatten, position_faults
-from railsim.definitions.laws import with_sources
-from railsim.definitions.names import name_faults
 from railsim.definitions.section_files import embed_wheel_sections
-from railsim.definitions.vehicle_tables import VehicleTables
+from railsim.definitions.vehicle.flatten import flatten, position_faults
+from railsim.definitions.vehicle.laws import with_sources
+from railsim.definitions.vehicle.names import name_faults
+from railsim.definitions.vehicle.tables import VehicleTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable
 from railsim.table import Column, Table

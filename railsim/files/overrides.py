@@ -12,9 +12,9 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from railsim.definitions.paths import descend, full_path, key_path
-from railsim.definitions.sources import OVERRIDE, Source, override_fault, replace_origin
 from railsim.errors import Fault, InputError
+from railsim.files.key_paths import descend, full_path, key_path
+from railsim.files.sources import OVERRIDE, Source, override_fault, replace_origin
 from railsim.text import shortened
 from railsim.units import number_with_unit
 

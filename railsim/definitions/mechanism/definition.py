@@ -14,7 +14,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from railsim.definitions.base import Count, Definition, Name, Remark, Text
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.mechanism_parts import (
+from railsim.definitions.mechanism.parts import (
     AUTO,
     ActuatorName,
     AirSpring,
@@ -397,13 +397,13 @@ class Mechanism(FileDefinition):
 
     def contradictions(self) -> list[Fault]:
         """Return what is wrong between the parts."""
-        from railsim.definitions.mechanism_faults import mechanism_faults  # of this definition
+        from railsim.definitions.mechanism.faults import mechanism_faults  # of this definition
 
         return mechanism_faults(self)
 
     def unusual(self) -> list[Remark]:
         """Return remarks on the mechanism."""
-        from railsim.definitions.mechanism_faults import mechanism_remarks
+        from railsim.definitions.mechanism.faults import mechanism_remarks
 
         return mechanism_remarks(self)
 

@@ -14,6 +14,8 @@ from railsim.errors import nearest
 
 AXES = ("x", "y", "z")
 LONGEST_KEY = 1000  # characters; the deepest key of a vehicle has some hundred
+NEW_MEMBERS: dict[str, str] = {}
+"""How a new member of a table begins, by the table's name; definitions add theirs."""
 
 
 def key_path(key: str) -> list[str]:
@@ -169,12 +171,8 @@ def _holds(keys: Sequence[str], path: Sequence[str]) -> bool:
 
 
 def _kinds(table: Sequence[str]) -> str:
-    """Beginning of a new force element, of which the kind has to be given."""
-    if not table or table[-1] != "elements":
-        return ""
-    from railsim.definitions.elements import KINDS
-
-    return f'kind="{"|".join(KINDS)}", '
+    """Beginning of a new member of a table, such as the kind that has to be given."""
+    return NEW_MEMBERS.get(table[-1], "") if table else ""
 
 
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:

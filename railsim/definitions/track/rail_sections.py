@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from railsim.definitions.base import Definition, Finite, Text
-from railsim.definitions.check_rail import OTHER
 from railsim.definitions.section_files import MOST_SECTIONS, read_sections
+from railsim.definitions.track.check_rail import OTHER
 from railsim.errors import Fault, InputError
-from railsim.files import is_file
+from railsim.files.access import is_file
 from railsim.text import LONGEST_FILE, shortened
 
 Coordinates = Annotated[tuple[Finite, ...], Field(min_length=8, max_length=2000)]

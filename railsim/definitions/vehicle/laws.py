@@ -21,7 +21,7 @@ from railsim.definitions.base import (
     Vector,
 )
 from railsim.errors import Fault, InputError
-from railsim.files import DEFINITION_BYTES, read_text
+from railsim.files.access import DEFINITION_BYTES, read_text
 
 
 class Law(Definition):

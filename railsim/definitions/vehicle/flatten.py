@@ -14,9 +14,9 @@ from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.elements.traction import AxleTorque
-from railsim.definitions.loads import load_faults, loaded
-from railsim.definitions.names import body_names, name_faults, resolve, sided_names
-from railsim.definitions.vehicle_tables import Group, Placement, VehicleTables, Wheelset
+from railsim.definitions.vehicle.loads import load_faults, loaded
+from railsim.definitions.vehicle.names import body_names, name_faults, resolve, sided_names
+from railsim.definitions.vehicle.tables import Group, Placement, VehicleTables, Wheelset
 from railsim.errors import Fault, InputError
 
 # Allowed difference between an axle's height and the wheel radius, and the like [m].

@@ -4,9 +4,9 @@ from typing import Any, ClassVar
 
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured_file import embed_measured
-from railsim.definitions.layout import curvature_sections, track_faults, track_remarks
-from railsim.definitions.rail_sections import embed_rail_sections
-from railsim.definitions.track_tables import TrackTables
+from railsim.definitions.track.layout import curvature_sections, track_faults, track_remarks
+from railsim.definitions.track.rail_sections import embed_rail_sections
+from railsim.definitions.track.tables import TrackTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable
 from railsim.table import Column, Table

@@ -24,11 +24,11 @@ from railsim.definitions.base import (
     pair,
     rises,
 )
-from railsim.definitions.check_rail import MOST_CHECK_RAILS, CheckRail
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.rail_sections import MOST_RANGES, RailSections
-from railsim.definitions.support import Support
+from railsim.definitions.track.check_rail import MOST_CHECK_RAILS, CheckRail
+from railsim.definitions.track.rail_sections import MOST_RANGES, RailSections
+from railsim.definitions.track.support import Support
 
 ArcLength = TypeVar("ArcLength", float, Any)
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000

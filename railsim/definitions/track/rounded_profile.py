@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from railsim.definitions.section import Section
+from railsim.definitions.track.section import Section
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from railsim.definitions.base import Definition, Finite, Flag, Name, Positive, Text
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.loads import LoadName
+from railsim.definitions.vehicle.loads import LoadName
 
 
 class Speed(Definition):

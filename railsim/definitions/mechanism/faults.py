@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.base import Remark
-from railsim.definitions.expressions import Expression
-from railsim.definitions.mechanism import RESULTS, Mechanism
-from railsim.definitions.mechanism_parts import AirSpring, Cam, Cylinder, GasSpring, Link, Reference
-from railsim.definitions.mechanism_values import (
+from railsim.definitions.mechanism.definition import RESULTS, Mechanism
+from railsim.definitions.mechanism.expressions import Expression
+from railsim.definitions.mechanism.parts import AirSpring, Cam, Cylinder, GasSpring, Link, Reference
+from railsim.definitions.mechanism.values import (
     ends,
     number,
     parameter_values,

@@ -1,0 +1,1 @@
+"""Mechanism files: `parts` and `values`, their `expressions`, and `faults` of the whole."""

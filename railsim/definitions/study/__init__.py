@@ -1,0 +1,1 @@
+"""Files of several runs: studies, their analyses and designs, scenarios of campaigns."""

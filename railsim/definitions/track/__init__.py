@@ -1,0 +1,1 @@
+"""Track files: `tables` as written, `layout` over arc length, `definition` what follows."""

@@ -1,0 +1,1 @@
+"""Vehicle files: `tables` as written, `flatten` to plain lists, `definition` what follows."""
