@@ -33,8 +33,9 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     """Draw a vehicle in three views with its elements.
 
     Bodies are crosses at their centres of gravity with the boxes of
-    `railsim.definitions.vehicle.outlines`, axleboxes squares, wheels circles or lines; every element is drawn between its points, with a thin line from each point to the body that it
-    is attached to.
+    `railsim.definitions.vehicle.outlines`, axleboxes squares, wheels circles or lines; every
+    element is drawn between its points, with a thin line from each point to the body that it is
+    attached to.
 
     Parameters
     ----------
