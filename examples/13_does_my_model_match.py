@@ -19,4 +19,5 @@ found = railsim.validate_model(measured, result)
 print(found)
 print(*found.remarks, sep="\n")
 
-save(scatter(found), "13_does_my_model_match.png", overwrite=True)
+figure = scatter(found)
+save(figure, "13_does_my_model_match.png", overwrite=True)

@@ -29,4 +29,5 @@ print(found.table())
 print(found.residual_table())
 print(*found.unidentified, *found.remarks, sep="\n")
 
-save(fits(found), "14_which_spring_is_soft.png", overwrite=True)
+figure = fits(found)
+save(figure, "14_which_spring_is_soft.png", overwrite=True)

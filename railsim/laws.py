@@ -130,10 +130,15 @@ def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
     compiled : bool
         Whether it is compiled; called as Python it is slower by far.
     """
-    lines = textwrap.dedent(inspect.getsource(function))
-    tree = ast.parse(lines)
-    definition = tree.body[0]
-    assert isinstance(definition, ast.FunctionDef)
+    name = getattr(function, "__name__", repr(function))
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+        (definition,) = tree.body
+    except (OSError, TypeError, ValueError, SyntaxError):
+        definition = None
+    if not isinstance(definition, ast.FunctionDef) or definition.name != name:
+        found, allowed = "its source cannot be read", "a function of a file, script or notebook"
+        raise InputError([Fault("law", name, found, allowed)])
     definition.decorator_list = []
     source = f"{KNOWN}\n\n{ast.unparse(tree)}\n"
     allow(source)

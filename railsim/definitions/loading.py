@@ -39,16 +39,16 @@ D = TypeVar("D", bound=FileDefinition)
 Overrides = Iterable[str] | str
 
 _HOMES = {
-    "railsim-vehicle/1": ("vehicle", "Vehicle"),
-    "railsim-track/1": ("track", "Track"),
+    "railsim-vehicle/1": ("vehicle.definition", "Vehicle"),
+    "railsim-track/1": ("track.definition", "Track"),
     "railsim-settings/1": ("settings", "Settings"),
     "railsim-spring/1": ("spring", "TrailingArmSuspension"),
-    "railsim-mechanism/1": ("mechanism", "Mechanism"),
+    "railsim-mechanism/1": ("mechanism.definition", "Mechanism"),
     "railsim-limits/1": ("limits", "RunningLimits"),
-    "railsim-scenario/1": ("scenario", "Scenario"),
+    "railsim-scenario/1": ("study.scenario", "Scenario"),
     "railsim-comfort-limits/1": ("limits", "ComfortLimits"),
     "railsim-published/1": ("published", "Published"),
-    "railsim-study/1": ("study", "Study"),
+    "railsim-study/1": ("study.definition", "Study"),
     "railsim-stationary-limits/1": ("limits", "StationaryLimits"),
     "railsim-wear-law/1": ("wear_law", "WearLawFile"),
     "railsim-wheel-limits/1": ("limits", "WheelLimits"),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
 from railsim.definitions.elements.base import two_sided
-from railsim.definitions.loading import load_track
+from railsim.definitions.loading import check_types, load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -175,6 +175,7 @@ def static_loads(
     59.9
     """
     track = load_track("straight") if track is None else track
+    check_types([vehicle], track)
     vehicle = permitted_part(vehicle)
     model = assemble(vehicle, track, settings or Settings(), profiles)
     balance = equilibrium(model, SLOW)

@@ -185,7 +185,7 @@ def test_unfinished_overwriting_keeps_the_old_file(tmp_path, written):
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ("run.h5", "exists.*--overwrite"),
+        ("run.h5", "exists.*overwrite"),
         (".", "is a folder"),
         ("missing/run.h5", "no folder"),
         ("run.h5/run.h5", "no folder"),

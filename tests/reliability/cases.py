@@ -1,13 +1,14 @@
 """How many cases the seeded suites try, and how a command is judged."""
 
 import os
-import resource
+import re
 import signal
 import sys
 import time
 import traceback
 from contextlib import contextmanager
 from itertools import pairwise
+from pathlib import Path
 
 from railsim.cli import main
 
@@ -39,12 +40,21 @@ def tried(normal: int, case) -> list:
 
 @contextmanager
 def bounded(what: str):
-    """Fail where the block takes longer than `SECONDS` of CPU time, or the process `MEGABYTES`."""
-    begin = time.process_time()
+    """Fail where the block takes longer than `SECONDS` of CPU time, or more than `MEGABYTES`.
+
+    What tests before it in the same process have left in memory is not the block's.
+    """
+    Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+    begin, memory = time.process_time(), _memory("VmRSS")
     yield
     assert time.process_time() - begin < SECONDS, f"{what}: a hang"
-    # in kB on Linux, the most of this process so far
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < MEGABYTES, f"{what}: memory"
+    assert _memory("VmHWM") - memory < MEGABYTES, f"{what}: memory"
+
+
+def _memory(key):
+    """Memory of this process, now (VmRSS) or at most (VmHWM) [MB]."""
+    status = Path("/proc/self/status").read_text()
+    return float(re.search(rf"^{key}:\s+(\d+) kB", status, re.MULTILINE)[1]) / 1e3
 
 
 @contextmanager
@@ -54,7 +64,8 @@ def stopped(what: str):
     A model far from all experience may have to be computed with a million steps a second: that
     takes its time, and is no hang for as long as the program can be told to stop.
     """
-    begin = time.process_time()
+    Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+    begin, memory = time.process_time(), _memory("VmRSS")
     heard, asked = [begin], []
 
     def look(*_):
@@ -73,7 +84,7 @@ def stopped(what: str):
     heard.append(time.process_time())
     longest = max(later - earlier for earlier, later in pairwise(heard))
     assert longest < SECONDS, f"{what}: deaf for {longest:.1f} s"
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < MEGABYTES, f"{what}: memory"
+    assert _memory("VmHWM") - memory < MEGABYTES, f"{what}: memory"
 
 
 def outcome(arguments, capsys, what, bound=bounded, allowed=(0, 2, 3)):

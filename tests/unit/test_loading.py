@@ -411,6 +411,6 @@ def test_any_file_is_recognised_by_its_format():
 def test_a_missing_element_is_told_with_the_way_to_add_it():
     with pytest.raises(InputError, match=r"no 'mine' in elements; it is empty; ") as caught:
         load_vehicle("coach_manchester", ["elements.mine.kind=bushing"])
-    assert 'elements.mine={kind="airspring|' in str(caught.value)
+    assert 'elements.mine={kind="actuator|airspring|' in str(caught.value)
     with pytest.raises(InputError, match=r"did you mean 'carbody'[?]$"):
         load_vehicle("coach_manchester", ["bodies.carbdy.mass=3"])
