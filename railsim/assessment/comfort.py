@@ -213,7 +213,8 @@ def motion_sickness_dose(a: Floats, rate: float) -> float:
     Examples
     --------
     >>> t = np.arange(0.0, 1000.0, 0.05)
-    >>> round(motion_sickness_dose(np.sin(2.0 * np.pi * 0.2 * t), 20.0) / np.sqrt(500.0), 2)
+    >>> dose = motion_sickness_dose(np.sin(2.0 * np.pi * 0.2 * t), 20.0)
+    >>> round(dose / 500.0**0.5, 2)
     0.99
     """
     return float(np.sqrt(np.sum(WF.weighted(a, rate) ** 2) / rate))

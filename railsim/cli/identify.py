@@ -93,7 +93,7 @@ def command(
 
     def progress(count: int) -> None:
         if not quiet and not as_json and sys.stderr.isatty():
-            click.echo(f"\r{count} runs simulated", nl=False, err=True)
+            sys.stderr.write(f"\r{count} runs simulated")
 
     found = identify(
         vehicle,

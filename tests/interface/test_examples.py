@@ -11,8 +11,23 @@ from generators import examples as GALLERY
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
 
+LONG = {  # ten seconds and more; what they show has tests of its own
+    "13_does_my_model_match",
+    "14_which_spring_is_soft",
+    "15_coach_as_recording_car",
+    "17_through_a_crossing",
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("script", GALLERY.SCRIPTS, ids=lambda script: script.stem)
+@pytest.mark.parametrize(
+    "script",
+    [
+        pytest.param(script, marks=[pytest.mark.further] if script.stem in LONG else [])
+        for script in GALLERY.SCRIPTS
+    ],
+    ids=lambda script: script.stem,
+)
 def test_example_runs_and_draws_its_picture(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     plt.switch_backend("Agg")

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -51,6 +52,9 @@ class Site(SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
+    """The manual as a site, that of `tests/check` where it has just been built."""
+    if built := os.environ.get("RAILSIM_SITE"):
+        return Path(built)
     folder = tmp_path_factory.mktemp("site")
     subprocess.run(["mkdocs", "build", "-q", "-d", folder], cwd=ROOT, check=True)
     return folder

@@ -133,6 +133,7 @@ def test_map_over_any_key_of_the_files(capsys, tmp_path):
 
 
 @pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.further
 def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
     """On given cones it is gamma (b0 + R gamma)/(b0 - r0 gamma) at all amplitudes but the largest.
 

@@ -93,6 +93,7 @@ def test_a_diagram_alone_tells_how_hunting_begins(name, kind):
     assert found.type == kind
 
 
+@pytest.mark.further
 def test_without_critical_speed_in_the_range_the_least_damped_modes_are_told():
     coach = load_vehicle("coach_manchester")
     found = critical_speed(coach, RIGID, methods=("linear",), low=10.0, high=20.0)

@@ -152,6 +152,7 @@ def test_constant_sections_are_plain_rail(wheel):
 HOW = {"start": 37.5, "until": 42.0}
 
 
+@pytest.mark.further
 def test_run_on_constant_sections_is_the_run_on_plain_track():
     plain = read_sections(LIST, "rail").points[0].tolist()
     contours = [{"s": s, "y": plain[0], "z": plain[1]} for s in (30.0, 45.0, 60.0)]
