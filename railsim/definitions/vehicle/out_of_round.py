@@ -35,7 +35,7 @@ class Harmonics(Uneven):
         tuple[tuple[Annotated[Finite, Field(ge=1, le=500)], Change, Finite], ...],
         Field(min_length=1, max_length=MOST_WAVES),
     ]
-    """Rows [order, amplitude, phase] [1, m, rad]"""
+    """Rows of order, amplitude [m] and phase [rad]"""
 
     @model_validator(mode="after")
     def _whole_orders(self) -> Self:
