@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from selection import LONG
 
 import railsim.contact.stored_table  # uses the class that the fixture replaces
 import railsim.contact.table
@@ -44,3 +45,11 @@ def small_contact_tables(monkeypatch):
 # a first call may compile, and the machine may be busy: time is no property
 settings.register_profile("railsim", deadline=None)
 settings.load_profile("railsim")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leave long tests to `tests/check --all`."""
+    for item in items:
+        if item.nodeid.removeprefix("tests/") in LONG:
+            item.add_marker(pytest.mark.further)
