@@ -92,7 +92,7 @@ def fmu(
             "step": step,
             "duration": conditions.get("duration"),
             "until": conditions.get("until"),
-            "inputs": _commands(vehicle, actuators, inputs),
+            "inputs": _commands(actuators, inputs),
             "outputs": _variables(result, signals, outputs),
         }
         variables = Path(folder) / VARIABLES
@@ -118,9 +118,7 @@ def _identifier(stem: str) -> str:
     return f"unit_{name}" if not name or name[0].isdigit() or keyword.iskeyword(name) else name
 
 
-def _commands(
-    vehicle: Vehicle, actuators: Sequence[str], wanted: Sequence[str] | None
-) -> list[dict[str, Any]]:
+def _commands(actuators: Sequence[str], wanted: Sequence[str] | None) -> list[dict[str, Any]]:
     wanted = actuators if wanted is None else wanted
     for name in wanted:
         if name not in actuators:

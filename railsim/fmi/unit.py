@@ -58,7 +58,7 @@ class Unit:
         self._values = {one["name"]: 0.0 for one in self._facts["outputs"]}
         self._status = "not begun"
         self._simulation: Simulation | None = None
-        self._time = 0.0
+        self._begin, self._time = 0.0, 0.0
         self._register()
 
     def _register(self) -> None:
@@ -122,9 +122,11 @@ class Unit:
         """Advance by a step of communication."""
         outcome, status = self._wrapper.Fmi3StepResult, self._wrapper.Fmi3Status
         run = self._run
-        if abs(run.time - current_time) > TIME_TOLERANCE * max(1.0, abs(current_time)):
+        if run.time == 0.0:  # the calling program's time at which the run begins
+            self._begin = self._time = current_time
+        if abs(self._time - current_time) > TIME_TOLERANCE * max(1.0, abs(current_time)):
             self.log(
-                f"asked for a step at {current_time} s, the run is at {run.time} s", status.error
+                f"asked for a step at {current_time} s, the run is at {self._time} s", status.error
             )
             return outcome(status.error)
         if not run.running:
@@ -156,7 +158,7 @@ class Unit:
     def _look(self) -> None:
         """Read the outputs."""
         run = self._run
-        self._time, self._status = run.time, run.status
+        self._time, self._status = self._begin + run.time, run.status
         if self._status not in ("running", "complete"):
             return  # the last values that could be computed stay
         for one in self._facts["outputs"]:
@@ -171,7 +173,7 @@ class Unit:
             "commands": dict(self._commands),
             "values": dict(self._values),
             "status": self._status,
-            "time": self._time,
+            "time": [self._begin, self._time],
             "motion": _text(state.motion),
             "counted": [_text(one) for one in state.counted],
             "grid": list(state.grid),
@@ -179,7 +181,7 @@ class Unit:
 
     def _set_fmu_state(self, saved: dict[str, Any]) -> None:
         self._commands, self._values = dict(saved["commands"]), dict(saved["values"])
-        self._status, self._time = saved["status"], saved["time"]
+        self._status, (self._begin, self._time) = saved["status"], saved["time"]
         counted = tuple(_array(one) for one in saved["counted"])
         self._run.state = SavedState(_array(saved["motion"]), counted, tuple(saved["grid"]))
 

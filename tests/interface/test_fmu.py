@@ -48,11 +48,11 @@ model = read_model_description(file)
 unit = FMU3Slave(guid=model.guid, unzipDirectory=extract(file), instanceName="unit",
                  modelIdentifier=model.coSimulation.modelIdentifier)
 unit.instantiate()
-unit.enterInitializationMode()
+unit.enterInitializationMode(startTime=3.0)
 unit.exitInitializationMode()
 outputs = [v for v in model.modelVariables if v.causality == "output"]
 references = [v.valueReference for v in outputs]
-rows, time, done = [[0.0, *unit.getFloat64(references)]], 0.0, False
+rows, time, done = [[3.0, *unit.getFloat64(references)]], 3.0, False
 while not done:
     _, done, *_ = unit.doStep(time, 0.02)
     time += 0.02
@@ -102,6 +102,7 @@ def test_the_unit_without_commands_is_the_run(unit, active, track):
     ran = subprocess.run([sys.executable, script, unit], capture_output=True, text=True, check=True)
     found = json.loads(ran.stdout.splitlines()[-1])
     rows = np.array(found["rows"])
+    rows[:, 0] -= 3.0  # the calling program's time at the beginning
     result = railsim.simulate(active, track, **WAY)
     at = np.searchsorted(result["time"], rows[:, 0] - 1e-9)
     body = result.bodies.index("carbody")
