@@ -66,16 +66,15 @@ def document(
     method: Sequence[str],
     **values: Any,
 ) -> str:
-    """Return the page as HTML; `values` go to the template."""
+    """Return the page as HTML; `values` go to the template, in place of lead and verdict too."""
+    lead = f"{source or 'no source given'}. Written by railsim {__version__}."
     return rendered(
         "railsim.report",
         "templates/document.html",
         title=title,
         styles=["templates/document.css"],
         schemes="light dark",
-        lead=f"{source or 'no source given'}. Written by railsim {__version__}.",
-        verdict=verdict(checks),
         sections=[s for s in sections if s.texts or s.tables or s.figures],
         method=method,
-        **values,
+        **{"lead": lead, "verdict": verdict(checks)} | values,
     )

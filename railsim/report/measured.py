@@ -4,10 +4,9 @@ from matplotlib.figure import Figure
 
 from railsim.assessment.model_comparison import FAIL, INCOMPLETE, ModelValidation
 from railsim.identification import Identified
-from railsim.page import rendered
 from railsim.plot import validation as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawn, Section, as_png, pictures
+from railsim.report.document import Drawn, Section, as_png, document, pictures
 from railsim.version import __version__
 
 CAPTIONS = {
@@ -36,18 +35,9 @@ def _page(
     title: str, verdict: tuple[str, bool], remarks: tuple[str, ...], sections: list[Section],
     method: tuple[str, ...],
 ) -> str:  # fmt: skip
-    return rendered(
-        "railsim.report",
-        "templates/document.html",
-        title=title,
-        styles=["templates/document.css"],
-        schemes="light dark",
-        lead=f"Written by railsim {__version__}.",
-        verdict={"text": verdict[0], "ok": verdict[1]},
-        remarks=remarks,
-        sections=[s for s in sections if s.texts or s.tables or s.figures],
-        method=method,
-    )
+    lead = f"Written by railsim {__version__}."
+    words = {"text": verdict[0], "ok": verdict[1]}
+    return document(title, None, (), sections, method, lead=lead, verdict=words, remarks=remarks)
 
 
 def _drawn(figures: dict[str, Figure]) -> list[Drawn]:
