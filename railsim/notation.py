@@ -419,6 +419,14 @@ REQUESTED = {
                 ("time", "element"),
                 "taken from the bodies",
             ),
+            _row(
+                "element_command",
+                "command of the element",
+                "u",
+                "N, N m, N s/m, N m s, m, rad",
+                ("time", "element"),
+                "behind its delay, before its lag; in its own unit, 0 where nothing is commanded",
+            ),
         ),
         *_requested(
             "frictional_power",
@@ -436,7 +444,7 @@ REQUESTED = {
             "drives",
             _row(
                 "axle_torque",
-                "torque of drives and brakes on the wheelset",
+                "torque of drives, brakes and actuators on the wheelset",
                 "M_d",
                 "kN m",
                 _AXLE,

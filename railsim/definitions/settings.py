@@ -132,7 +132,7 @@ class Outputs(Definition):
     frictional_power: Flag = False
     """Power that each wheel's contact turns into heat"""
     drives: Flag = False
-    """Torque of drives and brakes on each wheelset"""
+    """Torque of drives, brakes and actuators on each wheelset"""
     track: Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
 

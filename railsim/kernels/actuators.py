@@ -1,12 +1,15 @@
 """Forces that follow a command or a law of one's own, between two bodies.
 
 An element acts along the line between its points (tension positive), along an axis of body 1 or
-about one; its deflection x is the elongation, the displacement or the angle of body 2 against
-body 1, as of links and mounts (see `elements`).  With the command u and the rate x':
+about one, or about the axle of a wheelset; its deflection x is the elongation, the displacement or
+the angle of body 2 against body 1, as of links and mounts (see `elements`).  A wheelset's turn
+about its axle has a rate alone, negative in forward rolling: what is positive drives forwards.
+With the command u and the rate x':
 
 FORCE      F = u
 DAMPER     F = max(0, u) x'
 POSITION   F = k (x - u) + c x'
+BRAKE      F = max(0, u) x' r/v_0, at most max(0, u) to either side, r the wheel's radius
 OWN        F and the rates of its states by a law of one's own
 
 The force is held within its limit and within the power over |x'|, and fades out over the last part
@@ -17,8 +20,9 @@ the limit of its rate are an internal state (see `internal`).
 from math import isfinite, sqrt
 
 from railsim.kernels import compiled
+from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.own_laws import call_at
-from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, TIME, VELOCITY
+from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, RADIUS, TIME, VELOCITY
 from railsim.kernels.vectors import (
     add_at,
     cross,
@@ -37,10 +41,10 @@ from railsim.kernels.vectors import (
 # their way and how many of them; law and its block, first of its states and their number
 ACTION, MODE, LAG_STATE, COMMAND, QUEUE, SLOTS, LAW, BLOCK, OWN_STATE, OWN_STATES = range(10)
 WHICH_SIZE = 10
-# values of ACTION: the line, then three axes along which and three about which it acts
-LINE, ALONG, ABOUT = 0, 1, 4
+# values of ACTION: the line, three axes along which it acts, three about which, axle of body 2
+LINE, ALONG, ABOUT, AXLE = 0, 1, 4, 7
 # values of MODE
-BY_FORCE, BY_DAMPER, BY_POSITION, BY_LAW = range(4)
+BY_FORCE, BY_DAMPER, BY_POSITION, BY_LAW, BY_BRAKE = range(5)
 # columns of Actuators.row: points (6), length of the line [m], 1 or -1 where it is mirrored, limits
 # of force, power and stroke, stiffness, damping, delay
 LENGTH, SENSE, LIMIT, POWER, STROKE, STIFFNESS, DAMPING, DELAY = range(6, 14)
@@ -89,7 +93,7 @@ def send(actuators, memory, i, value, time):
 
 
 @compiled(python=False)
-def actuator_motion(system, work, i):
+def actuator_motion(system, work, state, i):
     """Deflection and rate of element `i`, axis in which it acts, arms on both bodies, distance."""
     acts, pose = system.actuators, work.pose
     one, two, action = acts.body[i, 0], acts.body[i, 1], acts.which[i, ACTION]
@@ -110,6 +114,10 @@ def actuator_motion(system, work, i):
         k = action - ALONG
         axis = sense * pose[one, k], sense * pose[one, 3 + k], sense * pose[one, 6 + k]
         return dot(axis, g), dot(axis, minus(w, cross(omega_1, g))), axis, a, b, g
+    if action == AXLE:
+        axis = pose[two, 1], pose[two, 4], pose[two, 7]
+        spin = state[6 * system.bodies.kind.shape[0] + 6 * two + 4]
+        return 0.0, spin - dot(axis, omega_1), axis, a, b, g
     k = action - ABOUT
     axis = sense * pose[one, k], sense * pose[one, 3 + k], sense * pose[one, 6 + k]
     # the antisymmetric part of R_1^T R_2, as of mounts
@@ -158,7 +166,7 @@ def actuator_force(system, work, state, i, x, rate):
     command = command_at(acts, work.memory, i, state[TIME])
     lag, mode = acts.which[i, LAG_STATE], acts.which[i, MODE]
     limit = acts.row[i, LIMIT]
-    if mode == BY_FORCE:
+    if mode in (BY_FORCE, BY_BRAKE):
         command = min(limit, max(-limit, command))
     if lag >= 0:
         work.drive[lag, 1] = command
@@ -169,17 +177,25 @@ def actuator_force(system, work, state, i, x, rate):
         force = max(0.0, command) * rate
     elif mode == BY_POSITION:
         force = acts.row[i, STIFFNESS] * (x - command) + acts.row[i, DAMPING] * rate
+    elif mode == BY_BRAKE:
+        rim = rate * system.bodies.row[acts.body[i, 1], RADIUS]
+        force = max(0.0, command) * min(1.0, max(-1.0, rim / BRAKES_FULLY))
     else:
         force = own_force(system, work, state, i, x, rate, command)
     return limited_force(acts, i, force, x, rate)
 
 
 @compiled(python=False)
-def actuator_forces(system, work, state):
-    """Add the forces of all these elements to `pose`; the first without a finite force, else -1."""
+def actuator_forces(system, work, state, on_axles):
+    """Add the forces of these elements to `pose`; the first without a finite force, else -1.
+
+    `on_axles`: those about axles alone, or all others.
+    """
     acts, pose = system.actuators, work.pose
     for i in range(acts.body.shape[0]):
-        x, rate, axis, a, b, g = actuator_motion(system, work, i)
+        if (acts.which[i, ACTION] == AXLE) != on_axles:
+            continue
+        x, rate, axis, a, b, g = actuator_motion(system, work, state, i)
         force = actuator_force(system, work, state, i, x, rate)
         if not isfinite(force):
             return i

@@ -8,9 +8,20 @@ resolution, and is known after its delay.  Everything that changes is in `Work.m
 from math import cos, floor, isfinite, log, pi, sqrt
 
 from railsim.kernels import compiled
-from railsim.kernels.actuators import EARLY, actuator_force, actuator_motion, send
+from railsim.kernels.actuators import (
+    ABOUT,
+    ACTION,
+    ALONG,
+    AXLE,
+    EARLY,
+    actuator_force,
+    actuator_motion,
+    command_at,
+    send,
+)
 from railsim.kernels.element_outputs import (
     ANGLE,
+    COMMAND,
     DEFLECTION,
     LINK,
     MOMENT,
@@ -112,11 +123,12 @@ def element_signal(system, work, state, i):
 
 @compiled(python=False)
 def actuator_output(system, work, state, index, e, out):
-    """Deflection, force, power and rate of an actuator or of an element with a law of one's own."""
-    x, rate, _, _, _, _ = actuator_motion(system, work, index)
+    """Deflection, force, power, rate and command of an actuator or of a law of one's own."""
+    x, rate, _, _, _, _ = actuator_motion(system, work, state, index)
     force = actuator_force(system, work, state, index, x, rate)
-    about = system.actuators.which[index, 0] - 4
-    along = max(0, system.actuators.which[index, 0] - 1)
+    action = system.actuators.which[index, ACTION]
+    about = 1 if action == AXLE else action - ABOUT
+    along = max(0, action - ALONG)
     if about >= 0:
         out[e, ANGLE + about], out[e, MOMENT + about] = x, force
         out[e, RATE + 3 + about] = rate
@@ -124,6 +136,7 @@ def actuator_output(system, work, state, index, e, out):
         out[e, DEFLECTION + along], out[e, ELEMENT_FORCE + along] = x, force
         out[e, RATE + along] = rate
     out[e, POWER] = force * rate
+    out[e, COMMAND] = command_at(system.actuators, work.memory, index, state[TIME])
 
 
 @compiled(python=False)

@@ -22,9 +22,9 @@ from railsim.kernels.vectors import dot, plus
 LINK, MOUNT = range(2)
 
 # columns: deflection x y z (a link's along its line in x), angles about x y z, forces, moments,
-# power taken from the bodies, rates of deflections and angles
-DEFLECTION, ANGLE, FORCE, MOMENT, POWER, RATE = 0, 3, 6, 9, 12, 13
-ELEMENT_COLUMNS = 19
+# power taken from the bodies, rates of deflections and angles, command that has arrived
+DEFLECTION, ANGLE, FORCE, MOMENT, POWER, RATE, COMMAND = 0, 3, 6, 9, 12, 13, 19
+ELEMENT_COLUMNS = 20
 
 
 @compiled(python=False)

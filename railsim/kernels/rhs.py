@@ -433,12 +433,16 @@ def mechanics(system, work, state, derivative, rails):
         friction_at_speed(system, work)
     mount_forces(system, work, inner)
     if system.actuators.body.shape[0] > 0:
-        where = actuator_forces(system, work, state)
+        where = actuator_forces(system, work, state, False)
         if where >= 0:
             return LAW_NOT_FINITE, where, 0
     hold_axleboxes(system, work, state)
     if system.loads.body.shape[0] > 0:
         load_forces(system, work, time, s)
+    if system.actuators.body.shape[0] > 0:
+        where = actuator_forces(system, work, state, True)
+        if where >= 0:
+            return LAW_NOT_FINITE, where, 0
     if system.drives.body.shape[0] > 0:
         add_axle_torques(system, work, state)
     if system.drive.mode == FREE:

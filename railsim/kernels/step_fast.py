@@ -7,6 +7,7 @@ smoothed accelerations and the last drives.  Elastic rails: see `support_step`.
 """
 
 from railsim.kernels import compiled
+from railsim.kernels.actuators import ACTION, AXLE
 from railsim.kernels.contact_columns import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
 from railsim.kernels.driving import table_value_slope
 from railsim.kernels.internal import advanced, hold_within, slides_together
@@ -187,6 +188,9 @@ def step_fast(system, work, state, derivative, decay, h):
             soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
             for e in range(system.drives.body.shape[0]):
                 if system.drives.body[e, 1] == b:
+                    spin = SMOOTHING
+            for e in range(system.actuators.body.shape[0]):
+                if system.actuators.which[e, ACTION] == AXLE and system.actuators.body[e, 1] == b:
                     spin = SMOOTHING
         d1 = (h + shift) * rate[q + 3] - (0.5 * h + shift) * before[q + 3]
         d2 = (h + shift) * rate[q + 4] - (0.5 * h + shift) * before[q + 4]

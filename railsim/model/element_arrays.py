@@ -33,6 +33,8 @@ from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.actuators import (
     ALONG,
+    AXLE,
+    BY_BRAKE,
     BY_DAMPER,
     BY_FORCE,
     BY_LAW,
@@ -67,6 +69,8 @@ Floats = NDArray[np.float64]
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}
 LAWS |= {"lag": LAG, "own": OWN}
 MODES = {"force": BY_FORCE, "damper": BY_DAMPER, "position": BY_POSITION, "law": BY_LAW}
+MODES["brake"] = BY_BRAKE
+ACTIONS = {"line": LINE, "axle": AXLE} | {axis: ALONG + k for k, axis in enumerate(AXES)}
 SLOT = 2.5e-4
 """Commands on their way to an actuator may follow each other by so much [s]."""
 
@@ -247,14 +251,13 @@ class ElementArrays:
         first = len(self.internal_rows)
         for _ in range(states):
             self._state(State("own", NOTHING))
-        action = LINE if line else ALONG + AXES.index(act.action)
         limits = (act.force_limit, act.power_limit, act.stroke)
         self.act_rows.append(
             {
                 "name": element.name,
                 "body": self._pair(element),
                 "which": (
-                    *(action, MODES[act.mode], lagging, command, queue, slots),
+                    *(ACTIONS[act.action], MODES[act.mode], lagging, command, queue, slots),
                     *(law, block, first, states),
                 ),
                 "row": (

@@ -13,6 +13,7 @@ from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import contact_columns as patch
 from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
+from railsim.kernels.actuators import ACTION, AXLE
 from railsim.kernels.contact_columns import (
     W_C_Y,
     W_C_Z,
@@ -276,7 +277,11 @@ class OutputPlan:
             for index, name in enumerate(names)
         }
         self.elements = _matching(self._asked.elements, list(known))
-        self._chosen = np.array([known[name] for name in self.elements], dtype=np.int64)
+        # torques of actuators about axles are recorded beyond the elements that are asked for
+        on_axles = np.flatnonzero(model.system.actuators.which[:, ACTION] == AXLE)
+        self._on_axles = on_axles if self._asked.drives else on_axles[:0]
+        chosen = [known[name] for name in self.elements]
+        self._chosen = np.array([*chosen, *((ACTUATOR, i) for i in self._on_axles)], dtype=np.int64)
         self.quantities = self._kept()
 
     def _kept(self) -> tuple[Quantity, ...]:
@@ -314,6 +319,8 @@ class OutputPlan:
             "check_rail": self._track_file.check_rail,
         }
         more = [q for q in REQUESTED.values() if asked[q.request]]
+        if not set(self.elements) & set(self._model.index.actuators):
+            more = [q for q in more if q.name != "element_command"]
         if self._readings_only:
             more = [q for q in more if q.request != "sensors" or q.name in READINGS]
         return (*QUANTITIES.values(), *more)
@@ -338,11 +345,21 @@ class OutputPlan:
         chosen = self._chosen.reshape(-1, 2)
         return empty_recorder(self._model, rows, chosen, self._asked.contact_patches)
 
+    def _axle_torques(self, recorder: Recorder, rows: int) -> Floats:
+        """Torques of drives and brakes, and those of actuators, by wheelset [N m]."""
+        torque = axle_torques(self._model, recorder.state[:rows])
+        system = self._model.system
+        wheelset = {int(body): w for w, body in enumerate(system.contact.body)}
+        moment = recorder.element[:rows, len(self.elements) :, element.MOMENT + 1]
+        for k, i in enumerate(self._on_axles):
+            torque[:, wheelset[system.actuators.body[i, 1]]] += moment[:, k]
+        return torque
+
     def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
         """Quantities of the first `rows` records by name."""
         values = dict(quantities(self._model, recorder, rows, Q0))
         if self.elements:
-            values |= _elements(recorder.element[:rows])
+            values |= _elements(recorder.element[:rows, : len(self.elements)])
         if self._sensors:
             read = readings(
                 self._sensors,
@@ -357,7 +374,7 @@ class OutputPlan:
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows], recorder.state[:rows, -1])
         if self._asked.drives:
-            values["axle_torque"] = axle_torques(self._model, recorder.state[:rows])
+            values["axle_torque"] = self._axle_torques(recorder, rows)
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
             deflection = rail_deflection(self._model, recorder.state[:rows])
@@ -415,6 +432,7 @@ def _elements(raw: Floats) -> dict[str, Floats]:
         "element_deflection": triples(element.DEFLECTION, element.ANGLE),
         "element_force": triples(element.FORCE, element.MOMENT),
         "element_power": raw[..., element.POWER],
+        "element_command": raw[..., element.COMMAND],
     }
 
 

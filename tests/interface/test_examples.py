@@ -16,6 +16,7 @@ LONG = {  # ten seconds and more; what they show has tests of its own
     "14_which_spring_is_soft",
     "15_coach_as_recording_car",
     "17_through_a_crossing",
+    "19_wheel_slide_protection",
 }
 
 

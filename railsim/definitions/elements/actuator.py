@@ -8,15 +8,16 @@ from railsim.definitions.base import NonNegative, Positive
 from railsim.definitions.elements.base import PointElement, Signs
 from railsim.definitions.elements.rows import AXES, Act
 
-Action = Literal["line", "x", "y", "z", "roll", "pitch", "yaw"]
+Action = Literal["line", "x", "y", "z", "roll", "pitch", "yaw", "axle"]
 
 
 class CommandedElement(PointElement):
-    """An element that acts along a line, along an axis of body 1 or about one."""
+    """An element that acts along a line, along an axis of body 1 or about one, or about an axle."""
 
     acts: Action = "line"
     """Along the `line` between the points, along `x`, `y`, `z` of body 1, or as a moment about them
-    (`roll`, `pitch`, `yaw`); positive: tension, body 1 pushed along the axis, body 2 against it"""
+    (`roll`, `pitch`, `yaw`); positive: tension, body 1 pushed along the axis, body 2 against it;
+    `axle`: a torque on the wheelset, body 2, forwards positive, without points"""
     lag: NonNegative = 0.0
     """Time constant of the first-order lag between command and effect [s]"""
     delay: NonNegative = 0.0
@@ -26,22 +27,29 @@ class CommandedElement(PointElement):
     force_limit: Positive | None = None
     """Largest force or moment [N or N m]"""
     power_limit: Positive | None = None
-    """Largest power |force x rate| [W]"""
+    """Largest power, that of force and rate of the deflection [W]"""
     stroke: Positive | None = None
     """Deflection to either side at which the force that pushes on outwards is gone [m or rad]"""
     _sense: float = PrivateAttr(1.0)
+
+    @property
+    def has_points(self) -> bool:
+        """Whether it acts at points."""
+        return self.acts != "axle"
 
     @model_validator(mode="after")
     def _what_belongs_together(self) -> Self:
         if self.rate_limit is not None and self.lag == 0.0:
             raise ValueError("'rate_limit' needs 'lag'")
+        if self.acts == "axle" and (self.sides or self.stroke):
+            raise ValueError("acts = \"axle\" has no 'sides' and no 'stroke'")
         if self.acts == "line" and (self.points is None or self.points[0] == self.points[1]):
             raise ValueError("acts = \"line\" needs two different 'points'")
         return self
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored placement, where one command has the mirrored effect."""
-        if self.acts == "line":
+        if self.acts in ("line", "axle"):
             return self
         k = AXES.index(self.acts)
         handed = signs[0] * signs[1] * signs[2] if k >= 3 else 1.0
@@ -65,12 +73,13 @@ class CommandedElement(PointElement):
 
 
 class Actuator(CommandedElement):
-    """A force, a damper or a position that follows a command during the run."""
+    """A force, a damper, a brake or a position that follows a command during the run."""
 
     kind: Literal["actuator"]
-    command: Literal["force", "damper", "position"] = "force"
+    command: Literal["force", "damper", "position", "brake"] = "force"
     """What is commanded: the `force` [N or N m]; the constant of a `damper` [N s/m or N m s]; the
-    deflection that spring and damper hold, `position` [m or rad]"""
+    deflection that spring and damper hold, `position` [m or rad]; the torque of a `brake` about an
+    axle, which acts against the rotation and vanishes with it [N m]"""
     stiffness: NonNegative = 0.0
     """Stiffness with which a position is held [N/m or N m/rad]"""
     damping: NonNegative = 0.0
@@ -82,6 +91,10 @@ class Actuator(CommandedElement):
             raise ValueError("'stiffness' belongs to command = \"position\" and only to it")
         if self.damping > 0.0 and self.command != "position":
             raise ValueError("'damping' belongs to command = \"position\"")
+        wrong = "position" if self.acts == "axle" else "brake"
+        if self.command == wrong:
+            other = "no" if wrong == "position" else "only"
+            raise ValueError(f'command = "{wrong}" has {other} acts = "axle"')
         return self
 
     def rows(self) -> list[Act]:

@@ -154,15 +154,21 @@ class PointElement(SidedElement):
 
     @model_validator(mode="after")
     def _one_way_of_giving_points(self) -> Self:
-        if (self.point is None) == (self.points is None):
+        if (self.point is None) == (self.points is None) and self.has_points:
             raise ValueError("either 'point' or 'points' is needed")
+        if not self.has_points and (self.point or self.points):
+            raise ValueError("it has no 'point' and no 'points'")
         return self
 
-    def end_points(self) -> tuple[Vector, Vector]:
-        """Points on body 1 and body 2 as written [m]."""
-        if self.points is not None:
+    @property
+    def has_points(self) -> bool:
+        """Whether it acts at points."""
+        return True
+
+    def end_points(self) -> tuple[Vector, Vector] | None:
+        """Points on body 1 and body 2 as written [m]; None where it acts at none."""
+        if self.points is not None or self.point is None:
             return self.points
-        assert self.point is not None  # by the validator above
         return self.point, self.point
 
 

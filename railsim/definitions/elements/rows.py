@@ -138,9 +138,10 @@ class Act:
     Attributes
     ----------
     action : str
-        ``line``, or one of `AXES` of body 1.
+        ``line``, one of `AXES` of body 1, or ``axle`` of body 2.
     mode : str
-        What the command is: ``force``, ``damper``, ``position``; ``law``: an argument of the law.
+        What the command is: ``force``, ``damper``, ``position``, ``brake``; ``law``: an argument
+        of the law.
     sense : float
         -1 where the axis is reversed.
     lag, delay, stiffness, damping : float
@@ -152,7 +153,7 @@ class Act:
     """
 
     action: str
-    mode: Literal["force", "damper", "position", "law"]
+    mode: Literal["force", "damper", "position", "law", "brake"]
     sense: float = 1.0
     lag: float = 0.0
     delay: float = 0.0

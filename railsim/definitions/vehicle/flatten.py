@@ -340,7 +340,7 @@ def _side_faults(group: Group, frame: _Frame) -> list[Fault]:
 def _torque_faults(group: Group, frame: _Frame, kinds: dict[str, str]) -> list[Fault]:
     faults = []
     for name, element in group.elements.items():
-        if not isinstance(element, AxleTorque):
+        if not isinstance(element, AxleTorque) and getattr(element, "acts", "") != "axle":
             continue
         ends = [resolve(body, frame.scope, None, kinds) or "" for body in element.bodies]
         found = [kinds[end] for end in ends]

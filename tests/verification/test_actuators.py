@@ -1,0 +1,192 @@
+"""Actuators: limits of power and stroke by hand, torques about axles, control of slip."""
+
+import numpy as np
+import pytest
+from rig import Rig
+from test_drives import MASS, RADIUS, TORQUE, WHEELSET, bogie, on_wheels, run, traction
+
+import railsim
+from railsim import laws
+from railsim.definitions.loading import load_track
+from railsim.definitions.mirror import mirrored_vehicle
+from railsim.kernels.actuators import COMMAND
+
+G = 9.80665
+LOADED = MASS + 2.0 * WHEELSET["mass"]  # kg, the whole bogie
+ROTATING = LOADED + 2.0 * WHEELSET["inertia"][1] / RADIUS**2
+
+
+def limited(command, deflection, rate, **limits):
+    """Force of an actuator along x that is given a command."""
+    rig = Rig(kind="actuator", acts="x", **limits)
+    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = command
+    return rig.force(0, deflection, rate)
+
+
+@pytest.mark.parametrize(
+    ("command", "rate", "force"),
+    [
+        (4e3, 0.0, 4e3),
+        (4e3, 0.2, 4e3),  # 800 W
+        (4e3, 0.5, 2e3),  # 1 kW over 0.5 m/s
+        (-4e3, 0.5, -2e3),
+        (4e3, -1.0, 1e3),
+        (9e3, 0.1, 5e3),  # by its largest force, 500 W
+    ],
+)
+def test_power_limits_the_force(command, rate, force):
+    """|F| <= P/|v|, taken or given."""
+    found = limited(command, 0.0, rate, power_limit=1e3, force_limit=5e3)
+    assert found == pytest.approx(force, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("command", "deflection", "force"),
+    [
+        (-4e3, 0.097, -4e3),
+        (-4e3, 0.099, -2e3),  # half of the last 2 % of the stroke is left
+        (-4e3, 0.1, 0.0),
+        (-4e3, 0.12, 0.0),
+        (4e3, 0.12, 4e3),  # back
+        (4e3, -0.099, 2e3),
+        (-4e3, -0.12, -4e3),
+    ],
+)
+def test_the_force_outwards_ends_with_the_stroke(command, deflection, force):
+    found = limited(command, deflection, 0.0, stroke=0.1)
+    assert found == pytest.approx(force, rel=1e-6, abs=1e-6)
+
+
+def on_axle(**changes):
+    return bogie({"kind": "actuator", "bodies": ["frame", "wheelset"], "acts": "axle", **changes})
+
+
+def commanded(vehicle, value, friction=0.4, speed=10.0, duration=3.0, **settings):
+    """Run with one command to all actuators from the begin on."""
+    outputs = {"elements": ["*.drive"], "drives": True, "contact_patches": True}
+    settings = railsim.Settings.model_validate({"outputs": outputs, **settings})
+    track = load_track("straight").replace(friction=(friction, friction))
+    how = {"speed": speed, "duration": duration, "settings": settings}
+    with railsim.Simulation(vehicle, track, **how) as sim:
+        for name in sim.actuators:
+            sim.set(name, value)
+        sim.run()
+        return sim.result()
+
+
+def test_a_torque_about_an_axle_is_that_of_a_drive():
+    """The same bits as the element of a given torque."""
+    expected = run(bogie(traction()), friction=0.4, duration=1.5)
+    found = commanded(on_axle(), TORQUE, duration=1.5)
+    for name in ("body_position", "Q", "xi_x", "axle_torque"):
+        assert np.array_equal(expected[name], found[name]), name
+    assert np.array_equal(found["element_force"][:, :2, 4], found["axle_torque"])
+    assert np.all(found["element_command"] == TORQUE)
+
+
+def test_a_commanded_brake_is_a_brake():
+    """It locks both wheelsets and holds them as the element of a given torque does.
+
+    On the way there torques differ by some percent: it counts the turn against the pitching frame.
+    """
+    drive = traction(kind="brake", torque_table=[[0.0, 20e3]])
+    expected = run(bogie(drive), friction=0.1, duration=1.5)
+    found = commanded(on_axle(command="brake"), 20e3, 0.1, duration=1.5)
+    spin = 10.0 / RADIUS - found["body_velocity"][-1, 1:, 4]
+    assert np.all(np.abs(spin) * RADIUS < 0.1)
+    assert found["axle_torque"][-1] == pytest.approx(expected["axle_torque"][-1], rel=2e-3)
+    assert found["axle_torque"][-1] == pytest.approx(on_wheels(found)[-1] * RADIUS, rel=0.01)
+
+
+def test_mirrored_vehicle_drives_forwards():
+    vehicle = on_axle()
+    found = [commanded(v, TORQUE, duration=1.0) for v in (vehicle, mirrored_vehicle(vehicle))]
+    assert np.allclose(on_wheels(found[0])[-1], on_wheels(found[1])[-1], rtol=1e-9)
+    assert np.all(on_wheels(found[0])[-1] > 0.99 * TORQUE / RADIUS)
+
+
+def test_limited_power_accelerates_by_the_root_of_time():
+    """v^2 = v_0^2 + 2 P t/m, m with the turning wheels; within 0.5 %: what creepage takes."""
+    power = 20e3
+    found = commanded(on_axle(power_limit=power), 50e3, drive={"mode": "free"}, duration=5.0)
+    assert np.all(found["element_command"] == 50e3)
+    assert found["element_power"][-1] == pytest.approx([-power] * 2)
+    time, speed = found["time"], np.gradient(found["distance"], found["time"])
+    gained = np.polyfit(time[100:-2], speed[100:-2] ** 2, 1)[0]
+    assert gained == pytest.approx(4.0 * power / ROTATING, rel=5e-3)
+
+
+def test_a_brake_by_a_damper_decays():
+    """Two eddy current brakes T = -c omega: v = v_0 exp(-2 c t/(m r^2))."""
+    c = 500.0
+    found = commanded(on_axle(command="damper"), c, drive={"mode": "free"})
+    time, speed = found["time"], np.gradient(found["distance"], found["time"])
+    decay = np.polyfit(time[100:-2], np.log(speed[100:-2]), 1)[0]
+    assert decay == pytest.approx(-2.0 * c / RADIUS**2 / ROTATING, rel=5e-3)
+
+
+@laws.controller
+def protection(time, axle, vehicle, target, fill, ahead, gain, memory):
+    sliding = vehicle - axle
+    coming = sliding + ahead * (sliding - memory[1]) / 0.01
+    left = target * vehicle - coming
+    change = fill if left > 0.5 * target * vehicle else min(fill, gain * left)
+    memory[0], memory[1] = max(0.0, memory[0] + 0.01 * change), sliding
+    return memory[0]
+
+
+def protected():
+    """Return the bogie with a brake and a controller for each axle."""
+    ends = ("front", "rear")
+    speeds = {
+        end: {"quantity": "wheel_speed", "wheelset": f"{end}.wheelset", "rate": 100.0}
+        for end in ends
+    }
+    values = {"target": 0.025, "fill": 10e3, "ahead": 0.1, "gain": 20e3}
+    return on_axle(command="brake", lag=0.04, rate_limit=60e3).replace(
+        laws={"protection": laws.law(protection)},
+        signals={**speeds, "vehicle": {"quantity": "speed", "rate": 100.0}},
+        controllers={
+            end: {
+                "law": "protection",
+                "period": 0.01,
+                "inputs": {"axle": end, "vehicle": "vehicle"},
+                "outputs": [f"{end}.drive"],
+                "parameters": values,
+                "memory": 2,
+            }
+            for end in ends
+        },
+    )
+
+
+def test_slide_protection_on_falling_friction():
+    """Slip between 1 and 3 % for 95 % of the braking time; no longer than by the static law.
+
+    No brake stops it in less than v^2/(2 mu g), this one within 25 % more: creep forces are less
+    than the friction, which falls by 6 % at a slip of 2.5 % of 20 m/s, and the brake is filled.
+    """
+    mu, begin, end = 0.1, 20.0, 4.0
+    law = traction(kind="brake", torque_table=[[0.0, 12e3]], demand_table=[[0.0, 0.0], [1.2, 1.0]])
+    track = load_track("straight").replace(
+        plan=[{"type": "STR", "length": 400.0}],
+        cant=[{"type": "CST", "length": 400.0, "cant": 0.0}],
+        friction=(mu, mu),
+        friction_falling={"rest": 0.4, "decay": 0.2},
+        third_body=(0.3, 0.1),
+        support={"preset": "rigid"},
+    )
+    distance, share = [], []
+    for vehicle in (protected(), bogie({**law, "slip_control": [0.01, 0.03]}), bogie(law)):
+        settings = {"drive": {"mode": "free"}, "creep_law": "polach", "output_rate": 50.0}
+        result = run(vehicle, track, begin, 19.0, **settings, outputs={})
+        speed = np.gradient(result["distance"], result["time"])
+        braking = speed > end
+        slip = result["xi_x"][braking, :, 0]
+        share.append(np.mean((slip > 0.01) & (slip < 0.03)))
+        distance.append(np.max(result["distance"][braking]))
+    assert share[0] > 0.95
+    assert distance[0] < distance[1]
+    least = (begin**2 - end**2) / (2.0 * mu * G)
+    assert least < distance[0] < 1.25 * least
+    assert distance[2] > 1.25 * distance[0]  # locked
