@@ -1,7 +1,7 @@
 """What a comparison of a model with a test has found: values of sections, differences, limits."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from railsim.assessment.criteria import FORCES, RIDE_BAND, ends, middle
 from railsim.assessment.signals import Band
-from railsim.definitions.limits import ValidationLimits
 from railsim.table import Amount, Column, Table
 
 Floats = NDArray[np.float64]
@@ -158,7 +157,8 @@ class ModelValidation:
     comparisons : tuple of Comparison
         Of the quantities that were measured.
     overlays : tuple of Overlay
-    limits : ValidationLimits
+    edition : str
+        Of the standard that the limits are from.
     remarks : tuple of str
     """
 
@@ -166,7 +166,7 @@ class ModelValidation:
     runs: tuple[str, ...]
     comparisons: tuple[Comparison, ...]
     overlays: tuple[Overlay, ...] = field(repr=False)
-    limits: ValidationLimits = field(repr=False)
+    edition: str
     remarks: tuple[str, ...] = ()
 
     @property
@@ -200,12 +200,8 @@ class ModelValidation:
 
     def section_table(self) -> Table:
         """Return all values, measured and simulated [SI]."""
-        rows = [
-            [p.quantity, p.run, p.place, p.begin, p.end, p.measured, p.simulated, p.difference]
-            for one in self.comparisons
-            for p in one.pairs
-        ]
-        words = ("quantity", "run", "place", "begin", "end", "measured", "simulated", "difference")
+        rows = [[*vars(p).values(), p.difference] for one in self.comparisons for p in one.pairs]
+        words = (*Pair.__dataclass_fields__, "difference")
         columns = [Column(name, format=".6g" if k > 2 else "") for k, name in enumerate(words)]
         return Table(columns, rows)
 
@@ -213,13 +209,14 @@ class ModelValidation:
         """Return the comparison as plain values, SI."""
         return {
             "vehicle": self.vehicle,
-            "edition": self.limits.edition,
+            "edition": self.edition,
             "runs": list(self.runs),
             "verdict": self.verdict,
             "quantities": [
                 {
                     "name": one.quantity.name,
                     "sections": one.sections,
+                    "least_sections": one.least,
                     "values": len(one.pairs),
                     "mean": one.mean,
                     "mean_limit": one.mean_limit,
@@ -232,6 +229,28 @@ class ModelValidation:
             "sections": self.section_table().records(),
             "remarks": list(self.remarks),
         }
+
+    @classmethod
+    def of(cls, record: Mapping[str, Any]) -> "ModelValidation":
+        """Return a comparison from its `record`: all but the channels over the arc length.
+
+        Raises
+        ------
+        KeyError, TypeError : the record of something else.
+        """
+        pairs: dict[str, list[Pair]] = {}
+        for row in record["sections"]:
+            own = {name: row[name] for name in Pair.__dataclass_fields__}
+            pairs.setdefault(row["quantity"], []).append(Pair(**own))
+        comparisons = tuple(
+            Comparison(
+                QUANTITIES[one["name"]], tuple(pairs[one["name"]]), one["limit"],
+                one["mean_limit"], one["least_sections"],
+            )
+            for one in record["quantities"]
+        )  # fmt: skip
+        names = record["vehicle"], tuple(record["runs"])
+        return cls(*names, comparisons, (), record["edition"], tuple(record["remarks"]))
 
     def __repr__(self) -> str:
         return f"{self.vehicle}: {self.verdict}\n{self.table()}"

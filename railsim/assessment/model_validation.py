@@ -113,7 +113,7 @@ def validate_model(
         remarks.append(f"limits of {limits.edition} not checked against the printed standard")
     return ModelValidation(
         found[0].vehicle().name, tuple(run.name for run in runs), tuple(comparisons),
-        tuple(overlays), limits, tuple(dict.fromkeys(remarks)),
+        tuple(overlays), limits.edition, tuple(dict.fromkeys(remarks)),
     )  # fmt: skip
 
 

@@ -39,11 +39,12 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Write one self-contained page about results or studies.
+    """Write one self-contained page about results, studies, comparisons with tests.
 
     Inputs, peaks, values against limits, curves to zoom, spread over the varied parameters of a
-    study, comparison with published values, failures and remarks.  The page needs no network; it
-    can be sent and printed.
+    study, comparison with published values, failures and remarks; folders that `validate-model`
+    and `identify` have written are sections of it.  The page needs no network; it can be sent and
+    printed.
 
     \b
     Example:
@@ -64,11 +65,21 @@ def write_report(
     curves: int = 8,
     assessments: "Sequence[Assessment]" = (),
 ) -> None:
-    """Write the page about result files and folders of studies, and assessments of a scenario."""
+    """Write the page about result files, folders of studies, and comparisons with tests.
+
+    `assessments` are those of a scenario.
+    """
     from railsim.cli.gathered import folder_of, gather
+    from railsim.report.measured import as_section, is_measured, measured_page, read_part
     from railsim.report.runs import page
     from railsim.report.spread import worst_runs
 
+    parts = [read_part(file) for file in files if is_measured(file)]
+    files = [file for file in files if not is_measured(file)]
+    if not files:
+        with whole_file(path) as partial:
+            partial.write_text(measured_page(parts, title), encoding="utf-8")
+        return
     found = gather(files)
     with_files = [record for record in found.records if record["name"] in found.paths]
     results = found.results(worst_runs(with_files, curves))
@@ -90,6 +101,7 @@ def write_report(
         found.inputs,
         used,
         assessments,
+        [as_section(part, number) for number, part in enumerate(parts, start=1)],
     )
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")

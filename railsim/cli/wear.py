@@ -1,6 +1,5 @@
 """``railsim wear``, ``railsim rail-wear``: profiles over distance or tonnage as they wear."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -21,10 +20,7 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from railsim.cli.analysis import Folder
-    from railsim.profiles import Profile
     from railsim.studies.wear_loop import WearStep
 
 RECORD, PICTURE, STEPS = "wear.json", "wear.png", "steps"
@@ -236,13 +232,15 @@ def _write(
     folder: "Folder", of: Wearing, record: Mapping[str, Any], found: "list[WearStep]"
 ) -> None:
     """Write record, profiles and, of wheels, the picture of what was done."""
+    from railsim.profiles import save_profile
+
     folder.write_json(RECORD, record)
     if folder.path is None:
         return
     for done in found:
         for side, worn in done.worn_profiles.items():
             name = _file_name(of, done.distance + done.length, side)
-            folder.written.append(_write_profile(folder.path / name, worn))
+            folder.written.append(save_profile(worn, folder.path / name))
     if "rows" in record:
         from railsim.plot.wear import wear_figure
 
@@ -272,17 +270,6 @@ def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
         allowed = f"the {whole} divided by a whole number from 1 to {MOST_STEPS}"
         raise InputError([Fault("--step", "", found, allowed)])
     return steps
-
-
-def _write_profile(path: "Path", profile: "Profile") -> "Path":
-    """Write a profile so that it can stand in a vehicle or track file."""
-    from railsim.files.access import whole_file
-
-    lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
-    lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]
-    with whole_file(path) as partial:
-        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 def _show(of: Wearing, source: str, rows: "Mapping[str, list[dict[str, float | None]]]") -> None:

@@ -32,6 +32,7 @@ COARSE, FINE = 0.1, 3e-5  # of the sum of squares; of it and of the coordinates
 FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
 SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
+CLOSE, MOST_TIMES = 0.1, 4  # standard deviations; times that derivatives are taken at the solution
 PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
 ALONG = 20.0  # m, within which the place of a run is looked for
@@ -145,6 +146,9 @@ def _solved(problem: Problem, loss: str) -> Identified:
             remarks.append(f"The search has not settled after {MOST_STEPS} steps.")
         if known or not _weigh(problem, x, stated=stated):
             break
+    x, change = _with_own_derivatives(problem, x, bounds, loss)
+    if change > CLOSE:
+        remarks.append(f"The last step changed a parameter by {change:.2g} standard deviations.")
     remarks += _suspicions(problem, x, problem.series(x), clocks=True)
     remarks += [f"{one.run.name}: {words}" for one in problem.runs
                 for words in one.measurement.remarks]  # fmt: skip
@@ -158,10 +162,10 @@ def _least(
     from scipy.optimize import least_squares
 
     def vector(z: Floats) -> Floats:
-        return problem.vector(z - 1.0)
+        return problem.tried(z - 1.0)
 
     def jacobian(z: Floats) -> Floats:
-        return problem.jacobian(z - 1.0)
+        return problem.derivatives_near(z - 1.0)
 
     # about 1, so that the first region of trust has the size of the parameters
     found = least_squares(
@@ -178,6 +182,41 @@ def _least(
         max_nfev=MOST_STEPS,
     )
     return np.asarray(found.x) - 1.0, bool(found.success)
+
+
+def _with_own_derivatives(
+    problem: Problem, x: Floats, bounds: Floats, loss: str
+) -> tuple[Floats, float]:
+    """Return coordinates found with derivatives at the solution itself.
+
+    Returns
+    -------
+    x : Floats
+    change : float
+        The last change of a parameter in standard deviations.
+    """
+    change = np.inf
+    for _ in range(MOST_TIMES):
+        jacobian = problem.derivatives_at(x)
+        before, (x, _) = x, _least(problem, x, bounds, loss, FINE)
+        deviations = np.sqrt(np.diag(_covariance(problem, x, jacobian)[0]))
+        change = float(np.max(np.abs(x - before) / deviations))
+        if change < CLOSE:
+            break
+    return x, change
+
+
+def _covariance(problem: Problem, x: Floats, jacobian: Floats) -> tuple[Floats, float]:
+    """Return the covariance of the coordinates, and by how much residuals above noise raise it."""
+    vector = problem.vector(x)
+    data = len(vector) - len(problem.before(x))
+    square = float(np.sum(vector[:data] ** 2)) / max(1, data - problem.size)
+    # what the noise that is stated does not explain is taken as noise too
+    inflation = max(1.0, square)
+    _, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    with np.errstate(divide="ignore"):
+        inverse = np.where(singular > 1e-10 * singular[0], 1.0 / singular, 1e6)
+    return inflation * (right.T * inverse**2) @ right, inflation
 
 
 def _by_a_part(problem: Problem, x: Floats, bounds: Floats, loss: str) -> Floats:
@@ -259,16 +298,9 @@ def _rms(x: Floats) -> float:
 
 def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> Identified:
     count = problem.count
-    vector, jacobian = problem.vector(x), problem.jacobian(x)
-    data = len(vector) - len(problem._before(x))
-    square = float(np.sum(vector[:data] ** 2)) / max(1, data - problem.size)
-    # what the noise that is stated does not explain is taken as noise too
-    inflation = max(1.0, square)
-    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
-    del left
-    with np.errstate(divide="ignore"):
-        inverse = np.where(singular > 1e-10 * singular[0], 1.0 / singular, 1e6)
-    covariance = inflation * (right.T * inverse**2) @ right
+    jacobian = problem.derivatives_near(x)
+    covariance, inflation = _covariance(problem, x, jacobian)
+    data = len(jacobian) - len(problem.before(x))
     channels = []
     residuals = problem.residuals(x)
     after = problem.series(x)

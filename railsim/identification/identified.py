@@ -1,5 +1,6 @@
 """What an identification has found: values, how well they are known, and the residuals."""
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.files.access import check_file, whole_file
-from railsim.identification.parameters import TRACK, Parameter, present, scaled
+from railsim.identification.parameters import TRACK, Parameter, blended, present, scaled
+from railsim.profiles import save_profile
+from railsim.profiles.used import used_profiles
 from railsim.table import Column, Table
 
 Floats = NDArray[np.float64]
@@ -189,54 +192,22 @@ class Identified:
 
     def table(self) -> Table:
         """Return values, standard deviations and intervals by parameter."""
-        rows: list[list[object]] = []
-        for k, (parameter, factor) in enumerate(zip(self.parameters, self.factors, strict=True)):
-            low, high = self.intervals[k]
-            value: object = None
-            if parameter.keys and not parameter.keys[0].startswith(TRACK):
-                now = self._values[".".join(present(self.vehicle, parameter.keys[0])[0])]
-                value = now if not isinstance(now, list) else None
-            share = 100.0 * self.deviations[k]
-            shown = [None if v is None or not np.isfinite(v) else float(v) for v in (low, high)]
-            rows.append([parameter.name, value, float(factor), float(share), *shown])
-        return Table(
-            [
-                Column("parameter"),
-                Column("value", "value (SI)", format=".5g"),
-                Column("factor", "factor on the file", format=".4f"),
-                Column("deviation", "standard deviation (%)", format=".2f"),
-                Column("low", "95 % from", format=".4f"),
-                Column("high", "to", format=".4f"),
-            ],
-            rows,
-        )
+        return parameter_table(self.record())
 
     def correlation_table(self) -> Table:
         """Return the correlation matrix."""
-        names = [parameter.name for parameter in self.parameters]
-        columns = [Column("parameter"), *(Column(name, format=".2f") for name in names)]
-        rows = [[name, *map(float, row)] for name, row in zip(names, self.correlation, strict=True)]
-        return Table(columns, rows)
+        return correlation_table(self.record())
 
     def residual_table(self) -> Table:
         """Return the residuals by channel: rms before and after, level, whiteness."""
-        rows: list[list[object]] = []
-        for one in self.channels:
-            levels = [_share(one.measured, x) for x in (one.before, one.after)]
-            white = "" if not np.isfinite(one.probability) else "yes" if one.is_white else "no"
-            rows.append([one.run, one.name, *levels, one.level, one.probability, white])
-        return Table(
-            [
-                Column("run"),
-                Column("channel"),
-                Column("before", "before (% of rms)", format=".1f"),
-                Column("after", "after (% of rms)", format=".1f"),
-                Column("level", "residual over noise", format=".2f"),
-                Column("probability", "probability of white", format=".2g"),
-                Column("white"),
-            ],
-            rows,
-        )
+        return residual_table(self.record())
+
+    def _value(self, parameter: Parameter) -> float | None:
+        """Return the identified value of a parameter of one number."""
+        if not parameter.keys or parameter.keys[0].startswith(TRACK):
+            return None
+        value = self._values[".".join(present(self.vehicle, parameter.keys[0])[0])]
+        return None if isinstance(value, list) else float(value)
 
     def record(self) -> dict[str, Any]:
         """Return everything but the series as plain values."""
@@ -246,6 +217,7 @@ class Identified:
                 {
                     "name": p.name,
                     "keys": list(p.keys),
+                    "value": self._value(p),
                     "factor": float(f),
                     "standard_deviation": float(d),
                     "interval": [float(a), float(b)],
@@ -260,7 +232,18 @@ class Identified:
             "singular_values": self.singular_values.tolist(),
             "combinations": self.combinations.tolist(),
             "unidentified": list(self.unidentified),
-            "channels": self.residual_table().records(),
+            "channels": [
+                {
+                    "run": one.run,
+                    "channel": one.name,
+                    "before": _share(one.measured, one.before),
+                    "after": _share(one.measured, one.after),
+                    "level": one.level,
+                    "probability": one.probability,
+                    "white": one.is_white if np.isfinite(one.probability) else None,
+                }
+                for one in self.channels
+            ],
             "places": [dict(vars(place)) for place in self.places],
             "form": self.form,
             "band": list(self.band),
@@ -288,16 +271,34 @@ class Identified:
         """
         path = Path(path)
         check_file(path, overwrite=overwrite, endings=[".toml"])
+        files: dict[str, tuple[str, str]] = {}
+        for parameter, x, spread in zip(self.parameters, self.x, self.deviations, strict=True):
+            if parameter.is_share:
+                first, second = parameter.profiles
+                file = path.with_name(f"{path.stem}_wheel{len(files) + 1}.csv")
+                save_profile(blended(first, second, float(x)), file)
+                files[first] = file.name, f"[I] {x:.3g} +- {spread:.2g} of the way to {second}"
         with whole_file(path) as partial:
-            partial.write_text(self._file(path, base), encoding="utf-8")
+            partial.write_text(self._file(path, base, files), encoding="utf-8")
         return path
 
-    def _file(self, path: Path, base: str | Path | None) -> str:
+    def _file(
+        self, path: Path, base: str | Path | None, files: Mapping[str, tuple[str, str]]
+    ) -> str:
+        """Return the text; `files` and remarks of the identified profiles by the original's."""
         runs = ", ".join(dict.fromkeys(one.run for one in self.channels))
         head = [f"# Identified from {runs}: [I] identified by least squares, with the standard",
                 "# deviation of the value."]  # fmt: skip
+        shares = zip(self.parameters, self.factors, self.deviations, strict=True)
+        head += [
+            f"# Of the track: {parameter.name} x {factor:.4g} +- {100 * spread:.2g} %."
+            for parameter, factor, spread in shares
+            if any(key.startswith(TRACK) for key in parameter.keys)
+        ]
+        wheels = _wheels(self.vehicle, files)
         if base is None:
-            return "\n".join([*head, self.fitted.to_toml()])
+            vehicle = self.fitted.with_values(wheels) if wheels else self.fitted
+            return "\n".join([*head, vehicle.to_toml()])
         known = Path(base)
         if known.suffix == ".toml":
             base = os.path.relpath(known.resolve(), path.resolve().parent)
@@ -316,9 +317,70 @@ class Identified:
                     f"{written}  # [I] {keys[-1] if keys != whole else ''} +- {100 * spread:.2g} %"
                 )
                 tables.setdefault(".".join(whole[:-1]), []).append(" ".join(mark.split()))
+        marks = "; ".join(mark for _, mark in files.values())
+        for key, names in wheels.items():
+            table, _, last = key.rpartition(".")
+            tables.setdefault(table, []).append(f"{last} = {json.dumps(names)}  # {marks}")
         for table, entries in tables.items():
             lines += [f"[{table}]" if table else "", *_merged(entries), ""]
         return "\n".join(lines)
+
+
+def _wheels(vehicle: Vehicle, files: Mapping[str, tuple[str, str]]) -> dict[str, list[str]]:
+    """Return the profiles of both wheels by key, where one of them is replaced."""
+    found: dict[str, list[str]] = {}
+    for key, name, _ in used_profiles(vehicle):
+        found.setdefault(key, []).append(name)
+    return {
+        key: [files[name][0] if name in files else name for name in (names[0], names[-1])]
+        for key, names in found.items()
+        if files.keys() & {*names}
+    }
+
+
+def parameter_table(record: Mapping[str, Any]) -> Table:
+    """Return values, standard deviations and intervals of the record of an identification."""
+    rows = []
+    for one in record["parameters"]:
+        ends = [x if x is not None and np.isfinite(x) else None for x in one["interval"]]
+        share = 100.0 * one["standard_deviation"]
+        rows.append([one["name"], one["value"], one["factor"], share, *ends])
+    return Table(
+        [
+            Column("parameter"),
+            Column("value", "value (SI)", format=".5g"),
+            Column("factor", "factor on the file", format=".4f"),
+            Column("deviation", "standard deviation (%)", format=".2f"),
+            Column("low", "95 % from", format=".4f"),
+            Column("high", "to", format=".4f"),
+        ],
+        rows,
+    )
+
+
+def correlation_table(record: Mapping[str, Any]) -> Table:
+    """Return the correlation matrix of the record of an identification."""
+    names = [one["name"] for one in record["parameters"]]
+    columns = [Column("parameter"), *(Column(name, format=".2f") for name in names)]
+    pairs = zip(names, record["correlation"], strict=True)
+    return Table(columns, [[name, *row] for name, row in pairs])
+
+
+def residual_table(record: Mapping[str, Any]) -> Table:
+    """Return the residuals by channel of the record of an identification."""
+    words = {True: "yes", False: "no", None: ""}
+    return Table(
+        [
+            Column("run"),
+            Column("channel"),
+            Column("before", "before (% of rms)", format=".1f"),
+            Column("after", "after (% of rms)", format=".1f"),
+            Column("level", "residual over noise", format=".2f"),
+            Column("probability", "probability of white", format=".2g"),
+            Column("white"),
+        ],
+        [{**one, "white": words[one["white"]]} for one in record["channels"]],
+    )
 
 
 def _merged(entries: list[str]) -> list[str]:

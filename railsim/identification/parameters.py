@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.files.key_paths import descend, full_path, key_path
 from railsim.profiles import Profile, load_profile
+from railsim.profiles.used import used_profiles
 
 Floats = NDArray[np.float64]
 TRACK, WHEEL = "track.", "wheel:"
@@ -126,6 +127,10 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
     for text in texts:
         try:
             one = _parsed(text) if isinstance(text, str) else text
+            used = [name for _, name, _ in used_profiles(vehicle)]
+            if one.is_share and one.profiles[0] not in used:
+                words = f"{vehicle.name} has no wheels with '{one.profiles[0]}'"
+                raise ValueError(words, nearest(one.profiles[0], used))
             for key in one.keys:
                 kind, own = _side(key)
                 path, value = present({"vehicle": vehicle, "track": track}[kind], own)
@@ -136,8 +141,8 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
             found.append(one)
         except (KeyError, ValueError) as error:
             shown = text if isinstance(text, str) else text.name
-            words = [*map(str, error.args), ""][:2]
-            faults.append(argument_fault("parameters", shown, *words))
+            told = [*map(str, error.args), ""][:2]
+            faults.append(argument_fault("parameters", shown, *told))
         except InputError as error:
             faults += error.faults
     names = [one.name for one in found]

@@ -2,8 +2,9 @@
 
 Each coordinate is that of a parameter, followed by the shift [m] and stretch [1] of each run's
 arc length where its place on the track is sought too.  A derivative is a forward difference of two
-simulated runs; those to the place come from the splines of one.  Evaluations are kept in a folder,
-if one is given, so that an identification that was interrupted goes on where it was.
+simulated runs; those to the place come from the splines of one.  They change slowly, so that those
+of a point serve its neighbourhood (chord method).  Evaluations are kept in a folder, if one is
+given, so that an identification that was interrupted goes on where it was.
 """
 
 import hashlib
@@ -22,8 +23,9 @@ from railsim.identification.runs import Prepared
 from railsim.identification.variants import Task, Workers
 
 Floats = NDArray[np.float64]
-STEP = 3e-3  # of a coordinate, for differences: sticking and cells of the contact are not smooth
+STEP = 0.03  # of a coordinate, for differences: sticking and cells of the contact are not smooth
 STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
+NEAR = 0.03  # change of a coordinate up to which derivatives serve
 LARGEST_KEPT = 2_000_000_000  # bytes
 
 
@@ -60,6 +62,7 @@ class Problem:
     simulations: int = 0
     _inputs: str = ""
     _last: dict[str, Floats] = field(default_factory=dict)
+    _derived: Floats | None = None  # where the derivatives were taken
 
     def __post_init__(self) -> None:
         digest = hashlib.sha256()
@@ -109,19 +112,40 @@ class Problem:
         bases = self._bases(x)
         return [values[: len(one.names)] for values, one in zip(bases, self.runs, strict=True)]
 
-    def _bases(self, x: Floats) -> list[Floats]:
+    def _bases(self, x: Floats, *, ahead: bool = False) -> list[Floats]:
         """Return the simulated channels, with their slopes below them where places are sought.
 
-        With several workers the variants for the derivatives are simulated in the same call: of
-        almost every step of the search they are wanted next.
+        With `ahead` the variants for the derivatives are simulated in the same call.
         """
         wanted = [(x, k, self.place) for k in range(len(self.runs))]
-        if self.workers.count > 1 and not self._is_known(wanted):
+        if ahead and any(self._kept(*one) is None for one in wanted):
             wanted += self._variants(x)[0]
         return self._evaluated(wanted)[: len(self.runs)]
 
-    def _is_known(self, wanted: "Sequence[tuple[Floats, int, bool]]") -> bool:
-        return all(self._kept(*one) is not None for one in wanted)
+    def tried(self, x: Floats) -> Floats:
+        """Return `vector` at a step of the search.
+
+        With several workers the variants for the derivatives are simulated in the same call, where
+        those of an earlier step do not serve: after almost every step they are wanted next.
+        """
+        self._bases(x, ahead=self.workers.count > 1 and not self._is_near(x))
+        return self.vector(x)
+
+    def _is_near(self, x: Floats) -> bool:
+        own = slice(self.count)
+        at = self._derived
+        return at is not None and bool(np.max(np.abs(x[own] - at[own])) <= NEAR)
+
+    def derivatives_near(self, x: Floats) -> Floats:
+        """Return derivatives of `vector` at a point near by, if they are known."""
+        if self._derived is None or not self._is_near(x):
+            self._derived = x.copy()
+        return self.jacobian(self._derived)
+
+    def derivatives_at(self, x: Floats) -> Floats:
+        """Return derivatives of `vector` at a point, which then serve its neighbourhood."""
+        self._derived = x.copy()
+        return self.jacobian(x)
 
     def _variants(self, x: Floats) -> tuple[list[tuple[Floats, int, bool]], list[float]]:
         """Return what is simulated for the derivatives, and the step of each parameter."""
@@ -152,14 +176,16 @@ class Problem:
             for run, weights in zip(self.residuals(x), self.weights, strict=True)
             for row, weight in zip(run, weights, strict=True)
         ]
-        return np.concatenate([*rows, self._before(x)])
+        return np.concatenate([*rows, self.before(x)])
 
-    def _before(self, x: Floats) -> Floats:
+    def before(self, x: Floats) -> Floats:
+        """Return the weighted residuals of what was known before."""
         known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
         return np.array([-x[k] / (self.parameters[k].spread or 1.0) for k in known])
 
     def jacobian(self, x: Floats) -> Floats:
         """Return the derivatives of `vector`, float64[residual, coordinate]."""
+        self._bases(x, ahead=True)
         base = self.series(x)
         wanted, steps = self._variants(x)
         series = self._evaluated(wanted)
@@ -195,7 +221,7 @@ class Problem:
                 strict=True,
             )
             rows += [-weight * (b - a) / step for weight, a, b in pairs]
-        return np.concatenate([*rows, np.zeros(len(self._before(np.zeros(self.size))))])
+        return np.concatenate([*rows, np.zeros(len(self.before(np.zeros(self.size))))])
 
     def _evaluated(self, wanted: Sequence[tuple[Floats, int, bool]]) -> list[Floats]:
         """Return series of (coordinates, number of the run, slope or not)."""
@@ -230,10 +256,13 @@ class Problem:
         return self.folder / f"{self._name(x, k, slope)}.bin"
 
     def _kept(self, x: Floats, k: int, slope: bool) -> Floats | None:
-        known = self._last.get(self._name(x, k, slope))
+        name = self._name(x, k, slope)
         path = self._path(x, k, slope)
-        if known is not None or path is None or not path.is_file():
-            return known
+        if name in self._last:
+            self._last[name] = self._last.pop(name)  # the last one that is forgotten
+            return self._last[name]
+        if path is None or not path.is_file():
+            return None
         rows, instants = self.runs[k].measured.shape
         shape = (2 * rows if slope else rows, instants)
         data = read_bytes(path, LARGEST_KEPT)

@@ -12,15 +12,16 @@ module        job
 Read `profile` first: it states the frames.
 """
 
+import json
 from pathlib import Path
 
 from railsim.errors import Fault, InputError, nearest
-from railsim.files.access import is_file
+from railsim.files.access import is_file, whole_file
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
 from railsim.text import LONGEST_FILE, shortened
 
-__all__ = ["Profile", "load_profile"]
+__all__ = ["Profile", "load_profile", "save_profile"]
 
 
 def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
@@ -74,3 +75,17 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
             [Fault(name_or_path, "", f"this is a {profile.kind} profile", f"give a {kind} profile")]
         )
     return profile
+
+
+def save_profile(profile: Profile, path: Path) -> Path:
+    """Write a profile as a CSV file that can stand in a vehicle or track file; return its path.
+
+    Raises
+    ------
+    InputError : the file cannot be written.
+    """
+    lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
+    lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]
+    with whole_file(path) as partial:
+        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path

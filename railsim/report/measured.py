@@ -1,14 +1,28 @@
 """Pages about a model against a test, and about an identification."""
 
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.assessment.model_comparison import FAIL, INCOMPLETE, ModelValidation
+from railsim.errors import Fault, InputError
+from railsim.files.access import read_bytes
 from railsim.identification import Identified
+from railsim.identification.identified import correlation_table, parameter_table, residual_table
 from railsim.plot import validation as plots
 from railsim.plot.style import styled
+from railsim.report import tables
 from railsim.report.document import Drawn, Section, as_png, document, pictures
 from railsim.version import __version__
 
+RECORDS = ("model_validation.json", "identified.json")
+LARGEST_RECORD, LARGEST_PICTURE = 200_000_000, 20_000_000  # bytes
+PNG = b"\x89PNG\r\n\x1a\n"
 CAPTIONS = {
     "scatter": "Simulated over measured section values; dashed the limit of the mean, dotted twice "
     "that of the standard deviation.",
@@ -31,44 +45,82 @@ IDENTIFICATION = (
 )
 
 
-def _page(
-    title: str, verdict: tuple[str, bool], remarks: tuple[str, ...], sections: list[Section],
-    method: tuple[str, ...],
-) -> str:  # fmt: skip
-    lead = f"Written by railsim {__version__}."
-    words = {"text": verdict[0], "ok": verdict[1]}
-    return document(title, None, (), sections, method, lead=lead, verdict=words, remarks=remarks)
+@dataclass(frozen=True)
+class Part:
+    """What a page says about one comparison or identification."""
+
+    title: str
+    verdict: str
+    ok: bool
+    remarks: Sequence[str]
+    sections: Sequence[Section]
+    method: Sequence[str]
 
 
-def _drawn(figures: dict[str, Figure]) -> list[Drawn]:
+def measured_page(parts: Sequence[Part], title: str | None = None) -> str:
+    """Return the page about comparisons of models with tests, and identifications."""
+    alone = len(parts) == 1
+    sections = []
+    for part in parts:
+        head = [] if alone else [Section(part.title, [part.verdict, *part.remarks])]
+        sections += [*head, *part.sections]
+    words = {"text": " ".join(p.verdict if alone else f"{p.title}: {p.verdict}" for p in parts),
+             "ok": all(part.ok for part in parts)}  # fmt: skip
+    return document(
+        title or "; ".join(part.title for part in parts), None, (), sections,
+        list(dict.fromkeys(text for part in parts for text in part.method)),
+        lead=f"Written by railsim {__version__}.", verdict=words,
+        remarks=parts[0].remarks if alone else (),
+    )  # fmt: skip
+
+
+def as_section(part: Part, number: int) -> tables.Section:
+    """Return a section of the page about runs; tables after the first are folded."""
+    found = tables.Section(f"measured{number}", part.title, [part.verdict, *part.remarks])
+    for section in part.sections:
+        found.texts += section.texts
+        found.drawings += [
+            tables.Drawing(
+                "",
+                drawn.caption,
+                Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">').format(
+                    drawn.caption, drawn.width, drawn.png
+                ),
+            )
+            for drawn in section.figures
+        ]
+        found.details += [tables.of_values(table, section.title) for table in section.tables]
+    found.tables, found.details = found.details[:1], found.details[1:]
+    return found
+
+
+def _drawn(figures: Mapping[str, Figure]) -> list[Drawn]:
     with styled():
         drawn = {name: as_png(figure) for name, figure in figures.items()}
     return pictures(drawn, CAPTIONS, drawn)
 
 
 def validation_figures(found: ModelValidation) -> dict[str, Figure]:
-    """Return the pictures of a comparison by their names."""
+    """Return the pictures of a comparison by their names; those of channels where it has them."""
     with styled():
-        return {
-            "scatter": plots.scatter(found),
-            "differences": plots.differences(found),
-            "overlays": plots.overlays(found),
-            "spectra": plots.spectra(found),
-        }
+        figures = {"scatter": plots.scatter(found), "differences": plots.differences(found)}
+        if found.overlays:
+            figures |= {"overlays": plots.overlays(found), "spectra": plots.spectra(found)}
+    return figures
 
 
-def validation_page(found: ModelValidation) -> str:
-    """Return the page about a model against a test."""
+def of_validation(found: ModelValidation, more: Sequence[Drawn] = ()) -> Part:
+    """Return what a page says about a model against a test; `more` pictures at the end."""
     words = {FAIL: "The model does not match the test.", INCOMPLETE: "Too few sections."}
     text = words.get(found.verdict, "The model matches the test within all limits.")
     sections = [
         Section("Differences and limits", tables=[found.table()]),
-        Section("Pictures", figures=_drawn(validation_figures(found))),
+        Section("Pictures", figures=[*_drawn(validation_figures(found)), *more]),
         Section("Values of the sections (SI)", tables=[found.section_table()]),
     ]
     title = f"{found.vehicle} against {', '.join(found.runs)}"
-    return _page(title, (text, found.verdict != FAIL), found.remarks, sections,
-                 (*VALIDATION, found.limits.edition))  # fmt: skip
+    return Part(title, text, found.verdict != FAIL, found.remarks, sections,
+                (*VALIDATION, found.edition))  # fmt: skip
 
 
 def identification_figures(found: Identified) -> dict[str, Figure]:
@@ -77,19 +129,70 @@ def identification_figures(found: Identified) -> dict[str, Figure]:
         return {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
 
 
-def identification_page(found: Identified) -> str:
-    """Return the page about an identification."""
-    coloured = [one.name for one in found.channels if not one.is_white]
-    good = not coloured and not found.unidentified
+def of_identification(record: Mapping[str, Any], figures: list[Drawn]) -> Part:
+    """Return what a page says about an identification, by its record."""
+    unidentified = record["unidentified"]
+    coloured = [one["channel"] for one in record["channels"] if one["white"] is False]
     text = "All parameters are identified; the residuals are white."
-    if found.unidentified:
+    if unidentified:
         text = "Not all parameters can be told apart."
     elif coloured:
         text = f"The residuals of {', '.join(coloured)} are not white: the model lacks something."
+    parameters = [parameter_table(record), correlation_table(record)]
     sections = [
-        Section("Parameters", found.unidentified, [found.table(), found.correlation_table()]),
-        Section("Residuals", tables=[found.residual_table()]),
-        Section("Pictures", figures=_drawn(identification_figures(found))),
+        Section("Parameters", unidentified, parameters),
+        Section("Residuals", tables=[residual_table(record)]),
+        Section("Pictures", figures=figures),
     ]
-    title = f"{found.vehicle.name}: identified parameters"
-    return _page(title, (text, good), found.remarks, sections, IDENTIFICATION)
+    title = f"{record['vehicle']}: identified parameters"
+    good = not coloured and not unidentified
+    return Part(title, text, good, record["remarks"], sections, IDENTIFICATION)
+
+
+def validation_page(found: ModelValidation) -> str:
+    """Return the page about a model against a test."""
+    return measured_page([of_validation(found)])
+
+
+def identification_page(found: Identified) -> str:
+    """Return the page about an identification."""
+    return measured_page([of_identification(found.record(), _drawn(identification_figures(found)))])
+
+
+def is_measured(file: str | Path) -> bool:
+    """Return whether a file or folder is one of `railsim validate-model` or `identify`."""
+    return _record_of(Path(file)) is not None
+
+
+def _record_of(path: Path) -> Path | None:
+    if path.name in RECORDS and path.is_file():
+        return path
+    return next((path / name for name in RECORDS if (path / name).is_file()), None)
+
+
+def read_part(file: str | Path) -> Part:
+    """Return what was found by `railsim validate-model` or `identify`, by the folder it wrote.
+
+    Raises
+    ------
+    InputError : a record that cannot be read, or is none.
+    """
+    path = _record_of(Path(file))
+    if path is None:
+        raise InputError([Fault(str(file), "", "no record", " or ".join(RECORDS))])
+    try:
+        record = json.loads(read_bytes(path, LARGEST_RECORD))
+        if path.name == RECORDS[0]:
+            return of_validation(ModelValidation.of(record), _pictures(path.parent, "overlays"))
+        return of_identification(record, _pictures(path.parent, "fits", "residuals"))
+    except (ValueError, KeyError, TypeError) as error:
+        words = f"{type(error).__name__}: {error}"[:100]
+        allowed = "the file as `validate-model` or `identify` has written it"
+        raise InputError([Fault(str(path), "", words, allowed)]) from None
+
+
+def _pictures(folder: Path, *names: str) -> list[Drawn]:
+    """Return pictures beside a record, those that are there."""
+    files = {name: folder / f"{name}.png" for name in names}
+    drawn = {n: read_bytes(f, LARGEST_PICTURE) for n, f in files.items() if f.is_file()}
+    return pictures({n: x for n, x in drawn.items() if x[:8] == PNG}, CAPTIONS, names)

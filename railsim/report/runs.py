@@ -50,6 +50,7 @@ def page(
     inputs: Mapping[str, Any] | None = None,
     used: Sequence[Used] = (),
     assessments: Sequence[Assessment] = (),
+    measured: Sequence[Section] = (),
 ) -> str:
     """Return the page as HTML.
 
@@ -72,6 +73,8 @@ def page(
         What runs without results used, as the files are now.
     assessments : sequence of Assessment
         Those of a scenario; comfort, wear and safety are shown in sections of their own.
+    measured : sequence of Section
+        Comparisons with tests and identifications.
     """
     found = groups(results)
     cells = cells_of(found)
@@ -93,6 +96,7 @@ def page(
         sections.append(spread)
     if published := _published(results):
         sections.append(published)
+    sections += measured
     sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs or {}))
     sections.append(_remarks(records, remarks))
     return rendered(

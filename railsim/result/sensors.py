@@ -5,7 +5,7 @@ fixed to; the rest value of its z axis, -g, is taken out.  On canted track, or w
 its y axis so reads a_y - g sin(cant angle + roll): the uncompensated lateral acceleration.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -168,40 +168,39 @@ def readings(
     roll_rate : float64[time, sensor]
         Absolute roll velocity of the body [rad/s].
     """
-    n = len(motion["distance"])
-    acceleration = np.zeros((n, len(placed), 3))
-    roll_rate = np.zeros((n, len(placed)))
-    known: dict[str, tuple[Floats, Floats, Floats]] = {}
-    for number, sensor in enumerate(placed.values()):
-        if sensor.body not in known:
-            known[sensor.body] = _of_body(sensor, motion, bodies, alignment, speed)
-        linear, omega, angular = known[sensor.body]
-        arm = np.array(sensor.arm)
-        of_point = np.cross(angular, arm) + np.cross(omega, np.cross(omega, arm))
-        acceleration[:, number] = linear + of_point
-        roll_rate[:, number] = omega[:, 0]
-    return acceleration, roll_rate
+    named = tuple(dict.fromkeys((sensor.body, sensor.axlebox) for sensor in placed.values()))
+    first = {key: next(s for s in placed.values() if (s.body, s.axlebox) == key) for key in named}
+    linear, omega, angular = _of_bodies([*first.values()], motion, bodies, alignment, speed)
+    which = [named.index((sensor.body, sensor.axlebox)) for sensor in placed.values()]
+    arm = np.array([sensor.arm for sensor in placed.values()]).reshape(-1, 3)
+    turning = omega[:, which]
+    of_point = _cross(angular[:, which], arm) + _cross(turning, _cross(turning, arm))
+    return linear[:, which] + of_point, turning[..., 0]
 
 
-def _of_body(
-    sensor: Sensor,
+def _of_bodies(
+    sensors: Sequence[Sensor],
     motion: Mapping[str, Floats],
     bodies: tuple[str, ...],
     alignment: Alignment,
     speed: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """Reading at the centre of gravity, angular velocity and acceleration, all in body axes."""
-    b = bodies.index(sensor.body)
+    """Reading at the centre of gravity, angular velocity and acceleration, all in body axes.
+
+    Each float64[time, body, 3], of the bodies of some sensors.
+    """
+    b = [bodies.index(sensor.body) for sensor in sensors]
     position = motion["body_position"][:, b]
     rates = motion["body_velocity"][:, b]
     absolute = motion["body_acceleration"][:, b]
-    s = motion["distance"] + sensor.offset + position[:, 0]
+    offset = np.array([sensor.offset for sensor in sensors])
+    s = motion["distance"][:, None] + offset + position[..., 0]
     cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
     kappa = alignment.curvature(s)
     down = np.stack(
         [-np.sin(grade), np.sin(cant) * np.cos(grade), np.cos(cant) * np.cos(grade)], axis=-1
     )
-    turning = speed[:, None] * np.stack(
+    turning = speed[:, None, None] * np.stack(
         [
             alignment.cant_angle_rate(s),
             alignment.grade_angle_rate(s) + kappa * np.sin(cant),
@@ -209,11 +208,22 @@ def _of_body(
         ],
         axis=-1,
     )
-    roll, pitch, yaw = _attitude(sensor, position)
-    linear = absolute[:, :3] - GRAVITY * _into_body(down, roll, pitch, yaw)
-    linear[:, 2] += GRAVITY
-    omega = _turning(sensor, rates) + _into_body(turning, roll, pitch, yaw)
-    return linear, omega, _turning(sensor, absolute)
+    # an axlebox does not spin with its wheelset
+    spins = np.array([not sensor.axlebox for sensor in sensors])
+    roll, pitch, yaw = position[..., 3], np.where(spins, position[..., 4], 0.0), position[..., 5]
+    linear = absolute[..., :3] - GRAVITY * _into_body(down, roll, pitch, yaw)
+    linear[..., 2] += GRAVITY
+    own, angular = np.array(rates[..., 3:]), np.array(absolute[..., 3:])
+    own[..., 1] = np.where(spins, own[..., 1], 0.0)
+    angular[..., 1] = np.where(spins, angular[..., 1], 0.0)
+    return linear, own + _into_body(turning, roll, pitch, yaw), angular
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Vector product along the last axis; `numpy.cross` takes three times as long."""
+    x, y, z = (a[..., k] for k in range(3))
+    u, v, w = (b[..., k] for k in range(3))
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
 def _attitude(sensor: Sensor, position: Floats) -> tuple[Floats, Floats, Floats]:
@@ -241,7 +251,7 @@ def _out_of_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Fl
 
 def _into_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
     """Components in body axes of a vector in track axes: C^T v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
-    x, y, z = vector.T
+    x, y, z = (vector[..., k] for k in range(3))
     x, y = _turned(x, y, -yaw)
     y, z = _turned(y, z, -roll)
     z, x = _turned(z, x, -pitch)

@@ -249,6 +249,11 @@ def test_the_command_writes_vehicle_page_and_json(found, tmp_path):
     assert [p["name"] for p in record["parameters"]] == list(FACTORS)
     assert "Identified" in (out / "identified.toml").read_text()
     assert "white" in (out / "report.html").read_text()
+    page = tmp_path / "page.html"
+    CliRunner().invoke(command_line, ["report", str(out), "--out", str(page)],
+                       standalone_mode=False, catch_exceptions=False)  # fmt: skip
+    # all that the page of the command says
+    assert page.read_text() == (out / "report.html").read_text()
     assert not (out / "evaluations").exists()
 
 

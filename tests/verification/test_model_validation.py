@@ -163,6 +163,15 @@ def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
     page = (tmp_path / "out" / "report.html").read_text()
     assert "does not match the test" in page
     assert len(list((tmp_path / "out").iterdir())) == 5
+    # the report of both together: a section with the same table
+    more = ["report", str(run), str(tmp_path / "out"), "--out", str(tmp_path / "both.html")]
+    CliRunner().invoke(command_line, more, standalone_mode=False, catch_exceptions=False)
+    both = (tmp_path / "both.html").read_text()
+    for words in ("does not match the test", "Differences and limits", "Along the track"):
+        assert words in both
+    (tmp_path / "out" / "model_validation.json").write_text('{"vehicle": "none"}')
+    again = CliRunner().invoke(command_line, [*more, "--overwrite"], standalone_mode=False)
+    assert "as `validate-model` or `identify` has written it" in str(again.exception)
 
 
 def test_bad_input_is_one_line(measured, right, tmp_path):

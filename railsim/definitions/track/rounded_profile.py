@@ -53,11 +53,14 @@ class RoundedProfile:
             (slope / 6.0, value / 2.0, once, twice),
         )
         self._half_window = 0.5 * rounding
+        self._is_zero = not sections
 
     def _plain(self, times: int, s: ArrayLike) -> Array:
         """Derivative (-1), value (0), integral (1) or double integral (2) before rounding."""
         # scipy's PPoly does this too, but its package takes a quarter of a second to import
         at = _array(s)
+        if self._is_zero:
+            return np.zeros_like(at)
         piece = np.clip(np.searchsorted(self._knots, at, side="right") - 1, 0, None)
         u = at - self._knots[piece]
         highest, *others = self._pieces[times + 1]
@@ -68,6 +71,8 @@ class RoundedProfile:
 
     def _mean(self, times: int, s: ArrayLike) -> Array:
         at, h = _array(s), self._half_window
+        if self._is_zero:
+            return np.zeros_like(at)
         mean: Array = (self._plain(times, at + h) - self._plain(times, at - h)) / (2.0 * h)
         return mean
 
