@@ -11,12 +11,14 @@ from generators import examples as GALLERY
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
 
-LONG = {  # ten seconds and more; what they show has tests of its own
+LONG = {  # some seconds and more; what they show has tests of its own
     "13_does_my_model_match",
     "14_which_spring_is_soft",
     "15_coach_as_recording_car",
     "17_through_a_crossing",
     "19_wheel_slide_protection",
+    "20_speed_control",
+    "21_active_steering",
 }
 
 
