@@ -25,8 +25,10 @@ from railsim.assessment.model_comparison import (
 from railsim.assessment.sections import TestSection, section_length, track_sections
 from railsim.assessment.signals import OUTWARDS, Band, Signal
 from railsim.definitions.limits import RunningLimits, ValidationLimits
-from railsim.definitions.loading import load_running_limits, load_validation_limits
+from railsim.definitions.loading import load_running_limits, load_track, load_validation_limits
+from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.measurement import Measurement, load_measurement
@@ -43,6 +45,7 @@ LIKE = 50.0  # 1/s, at which signs and clocks are compared
 START = 3.0  # s after the start of a run that are not compared
 UNKNOWN = 0.01  # share of a section that a gap may take
 ALONG = 30.0  # m
+SAME_SPEED = 0.02  # share by which the speeds of one run may differ
 SERVICE = Service(admissible_speed=60.0, cant_deficiency=0.15)
 """Where the vehicle states none: only the length of the sections depends on the speed."""
 
@@ -117,6 +120,75 @@ def validate_model(
     )  # fmt: skip
 
 
+def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> list[Result]:
+    """Return for each measured run the result on its track, at its speed (2 %) and in its load.
+
+    Parameters
+    ----------
+    measured : sequence of Measurement
+    results : mapping of str to Result
+        By names, such as those of a study.
+
+    Raises
+    ------
+    InputError : runs without a result of this kind, or with several.
+    """
+    found: list[Result] = []
+    faults = []
+    for run in measured:
+        name = run.definition.track
+        track = None if name is None else load_track(name)
+        speed = float(np.mean(run.speed))
+        fits = {
+            name: result
+            for name, result in results.items()
+            if not _contradictions(run, result, track)
+        }
+        if len(fits) == 1:
+            found += fits.values()
+            continue
+        words = f"{len(fits)} results" + (f": {', '.join([*fits][:5])}" if fits else "")
+        on = "any track" if track is None else f"track '{track.name}'"
+        allowed = f"one on {on} at {speed:.1f} m/s in load '{run.definition.load or DESIGN}'; " + (
+            "name the file" if fits else f"there are {', '.join([*results][:5]) or 'none'}"
+        )
+        faults.append(Fault(run.name, "", words, allowed))
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _contradictions(run: Measurement, result: Result, track: Track | None) -> list[str]:
+    """Return in what a result is not that of a measured run."""
+    found = []
+    if track is not None and not _alike(result.track(), track):
+        found.append(f"simulated on another track, '{result.track().name}'")
+    speed = float(np.mean(run.speed))
+    inside = run.part(float(result["distance"][0]), float(result["distance"][-1]))
+    if len(inside.speed):
+        speed = float(np.mean(inside.speed))
+    time, distance = result["time"], result["distance"]
+    own = float((distance[-1] - distance[0]) / (time[-1] - time[0]))
+    if abs(own - speed) > SAME_SPEED * speed:
+        found.append(f"measured at {speed:.1f} m/s, simulated at {own:.1f} m/s")
+    loads = run.definition.load or DESIGN, result.vehicle().load or DESIGN
+    if loads[0] != loads[1]:
+        found.append(f"measured in load '{loads[0]}', simulated in '{loads[1]}'")
+    return found
+
+
+def _alike(first: Track, second: Track) -> bool:
+    """Return whether two tracks have one course, one gauge and the same irregularities."""
+
+    def course(track: Track) -> list[object]:
+        rows = [one.model_dump() for one in track.irregularities]
+        # a file counts by its name: the folder may be another by now
+        named = [{k: Path(v).name if k == "file" else v for k, v in row.items()} for row in rows]
+        return [track.plan, track.cant, track.vertical, track.gauge, named]
+
+    return course(first) == course(second)
+
+
 @dataclass(eq=False)
 class _Run:
     """A measured run and its simulation; values at the places of the measured ones."""
@@ -149,6 +221,8 @@ class _Run:
         if faults:
             raise InputError(faults)
         moved, remarks = _placed(run, distance, simulated_there)
+        on = run.definition.track
+        remarks += _contradictions(run, result, None if on is None else load_track(on))
         begin = float(np.interp(time[0] + START, time, distance))
         part = moved.part(begin, float(distance[-1]))
         if len(part.time) < 10:

@@ -47,11 +47,13 @@ def command(
     """Compare simulated with measured runs, section by section (EN 14363, Annex T).
 
     One result for each measured run, in the same order; or a folder of results called as the
-    measurement files; without results the runs are simulated.
+    measurement files; or a study, of which the run on the same track at the same speed and load is
+    taken for each.  Without results the runs are simulated.
 
     \b
     Example:
       railsim validate-model run12.toml run12.h5 --out comparison
+      railsim validate-model run12.toml run13.toml study/
     """  # noqa: D301 - click reads the escape
     from railsim.assessment.model_validation import validate_model
     from railsim.cli import DONE, LIMIT_EXCEEDED
@@ -104,16 +106,13 @@ def _results(
         return [simulated_run(run, vehicle) for run in runs]
     if vehicle is not None:
         raise InputError([Fault("--vehicle", "", "given together with results", "leave one out")])
-    if len(files) == 1 and os.path.isdir(files[0]):
-        paths = [Path(files[0]) / f"{Path(name).stem}.h5" for name in names]
-        if len(names) == 1 and not paths[0].is_file():
-            inside = sorted(Path(files[0]).glob("*.h5"))
-            paths = inside if len(inside) == 1 else paths
-        missing = [path for path in paths if not path.is_file()]
-        if missing:
-            raise InputError(
-                Fault(str(path), "", "no such result", "results called as the measurement files")
-                for path in missing
-            )
+    if len(files) > 1 or not os.path.isdir(files[0]):
+        return [open_run(Path(file)) for file in files]
+    paths = [Path(files[0]) / f"{Path(name).stem}.h5" for name in names]
+    if all(path.is_file() for path in paths):
         return [open_run(path) for path in paths]
-    return [open_run(Path(file)) for file in files]
+    from railsim.assessment.model_validation import matching
+    from railsim.cli.gathered import gather
+
+    gathered = gather(files)
+    return matching(runs, gathered.results(list(gathered.paths)))

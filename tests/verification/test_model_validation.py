@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import railsim
 from railsim.assessment.model_comparison import QUANTITIES, Comparison, Pair
+from railsim.assessment.model_validation import matching
 from railsim.cli import railsim as command_line
 
 FOLDER = Path(__file__).parents[2] / "examples" / "measured_run"
@@ -172,6 +173,31 @@ def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
     (tmp_path / "out" / "model_validation.json").write_text('{"vehicle": "none"}')
     again = CliRunner().invoke(command_line, [*more, "--overwrite"], standalone_mode=False)
     assert "as `validate-model` or `identify` has written it" in str(again.exception)
+
+
+def test_a_study_gives_the_result_on_the_same_track_in_the_same_load(measured, right, tmp_path):
+    other = simulated(railsim.load_vehicle("coach_25t", ["load=laden"]), 100.0)
+    assert matching([measured], {"laden": other, "right": right}) == [right]
+    cases = (({"laden": other}, "0 results"), ({"a": right, "b": right}, "2 results: a, b"))
+    for results, words in cases:
+        with pytest.raises(railsim.InputError, match=words):
+            matching([measured], results)
+    for name, result in (("run_001", other), ("run_002", right)):
+        result.to_hdf5(tmp_path / f"{name}.h5")
+    arguments = ["validate-model", str(FOLDER / "coach_25t_run.toml"), str(tmp_path), "--json"]
+    done = CliRunner().invoke(command_line, arguments, standalone_mode=False)
+    assert json.loads(done.output)["verdict"] == "pass"
+
+
+def test_a_result_of_another_speed_load_or_track_is_said(measured, right):
+    definition = measured.definition.replace(load="laden", track="curve_r500")
+    run = railsim.Measurement(
+        definition, measured.time, measured.distance, 1.1 * measured.speed, measured.channels
+    )
+    said = "\n".join(railsim.validate_model(run, right).remarks)
+    assert "measured in load 'laden', simulated in 'design'" in said
+    assert "measured at 28.6 m/s, simulated at 26.0 m/s" in said
+    assert "simulated on another track, 'Line of the measured run'" in said
 
 
 def test_bad_input_is_one_line(measured, right, tmp_path):
