@@ -114,6 +114,8 @@ class Quantity:
         --------
         >>> QUANTITIES["body_position"].component("yaw").shown_unit
         'mrad'
+        >>> REQUESTED["element_force"].component("pitch").symbol
+        'M_y'
         """
         rotation = COMPONENTS.index(name) >= 3
 
@@ -121,6 +123,8 @@ class Quantity:
             return units.split(", ")[-1 if rotation else 0]
 
         symbol = {"roll": r"\varphi", "pitch": r"\theta", "yaw": r"\psi"}.get(name, name)
+        if self.name == "element_force":
+            symbol = f"{'M' if rotation else 'F'}_{'xyz'[COMPONENTS.index(name) % 3]}"
         dots = {"body_velocity": r"\dot ", "body_acceleration": r"\ddot "}.get(self.name, "")
         return replace(
             self,
@@ -423,9 +427,9 @@ REQUESTED = {
                 "element_command",
                 "command of the element",
                 "u",
-                "N, N m, N s/m, N m s, m, rad",
+                "SI",
                 ("time", "element"),
-                "behind its delay, before its lag; in its own unit, 0 where nothing is commanded",
+                "behind its delay, before its lag; 0 where nothing is commanded",
             ),
         ),
         *_requested(

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError, argument_fault
-from railsim.notation import QUANTITIES, Quantity
+from railsim.notation import QUANTITIES, REQUESTED, Quantity
 from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels
 from railsim.plot.style import (
     DISTINCT,
@@ -183,7 +183,7 @@ def _draw(
 
 def unit_label(quantity: Quantity) -> str:
     """Return symbol and shown unit, for a vertical axis."""
-    if quantity.name not in QUANTITIES:  # from a file of others, perhaps
+    if quantity.name not in {*QUANTITIES, *REQUESTED}:  # from a file of others, perhaps
         return unformatted(f"{quantity.symbol} ({quantity.shown_unit})")
     symbol = f"${quantity.symbol}$ " if quantity.symbol else ""
     unit = quantity.shown_unit.replace("s2", "s²")

@@ -13,6 +13,7 @@ import railsim
 from railsim import laws
 from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.kernels.actuators import COMMAND
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -130,6 +131,21 @@ def test_a_brake_by_a_damper_decays():
     assert decay == pytest.approx(-2.0 * c / RADIUS**2 / ROTATING, rel=5e-3)
 
 
+@laws.force_element
+def eddy(rate, c):
+    return c * rate
+
+
+def test_a_law_about_an_axle_is_an_element():
+    """The torque of a damper; a law acts before the begin already, a command does not."""
+    own = on_axle(kind="law", law="eddy", parameters={"c": 500.0})
+    own = own.replace(laws={"eddy": laws.law(eddy)})
+    how = {"friction": 0.4, "duration": 0.5, "drive": {"mode": "free"}}
+    expected, found = commanded(on_axle(command="damper"), 500.0, **how), commanded(own, 0.0, **how)
+    assert np.all(found["axle_torque"] < -0.9 * 500.0 * 10.0 / RADIUS)
+    assert found["axle_torque"][-1] == pytest.approx(expected["axle_torque"][-1], rel=2e-3)
+
+
 @laws.controller
 def protection(time, axle, vehicle, target, fill, ahead, gain, memory):
     sliding = vehicle - axle
@@ -231,3 +247,20 @@ def test_steered_wheelsets_are_radial_at_a_gain_of_one(example):
     assert np.argmin(total) == one
     assert np.argmin(outer) == one
     assert total[one] < 0.1 * total[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        ({"bodies": ["wheelset", "frame"]}, "first the body that takes the reaction"),
+        ({"point": [0.0, 0.0, 0.0]}, "acts at no point"),
+        ({"sides": "both"}, "no 'sides' and no 'stroke'"),
+        ({"stroke": 0.1}, "no 'sides' and no 'stroke'"),
+        ({"command": "position", "stiffness": 1e6}, 'has no acts = "axle"'),
+        ({"acts": "yaw", "point": [0.0, 0.0, -0.5], "command": "brake"}, 'has only acts = "axle"'),
+    ],
+)
+def test_faults_are_named(change, found):
+    with pytest.raises((ValueError, railsim.InputError), match=found) as caught:
+        flatten(on_axle(**change))
+    assert "drive" in str(caught.value)

@@ -157,7 +157,7 @@ class PointElement(SidedElement):
         if (self.point is None) == (self.points is None) and self.has_points:
             raise ValueError("either 'point' or 'points' is needed")
         if not self.has_points and (self.point or self.points):
-            raise ValueError("it has no 'point' and no 'points'")
+            raise ValueError("it acts at no point: 'point' and 'points' mean nothing")
         return self
 
     @property
