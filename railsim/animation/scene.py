@@ -17,7 +17,7 @@ from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.track.alignment import Alignment
-from railsim.track.irregularity import displacement
+from railsim.track.irregularity import shown_displacement
 
 FRAMES = 600
 TRACK_STEP = 1.0  # m
@@ -161,7 +161,7 @@ def _poses(result: Result, rows: Array) -> Array:
     if "wheelset_lateral" in result and "wheelset_roll" in result:
         pose[:, wheelsets, 1] = result["wheelset_lateral"][rows]
         pose[:, wheelsets, 3] = result["wheelset_roll"][rows]
-    irregularity = displacement(result.track())
+    irregularity = shown_displacement(result.track())
     if irregularity is not None and "wheelset_distance" in result:
         at = result["wheelset_distance"][rows]
         _, z_left, _, z_right = irregularity(at.ravel())[0]

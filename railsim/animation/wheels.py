@@ -8,7 +8,7 @@ from railsim.contact.curves import rail_curve, tape_circle_position
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.result import Result
 from railsim.result.data import Array
-from railsim.track.irregularity import displacement
+from railsim.track.irregularity import shown_displacement
 
 Section = Mapping[str, Array]
 POINTS = 150  # of a profile
@@ -101,7 +101,7 @@ def seats(
         z of the wheelset's centre, and by how much the rails stand further apart [m].
     """
     found = np.zeros((len(rows), len(profiles), 2))
-    moved = displacement(result.track())
+    moved = shown_displacement(result.track())
     for w, pair in enumerate(profiles):
         wider = np.zeros(len(rows))
         if moved is not None and "wheelset_distance" in result:

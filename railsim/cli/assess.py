@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Speed, echo, output_options, print_json, show
+from railsim.cli.common import Speed, allow_code_option, echo, output_options, print_json, show
 from railsim.files.access import check_folder, make_folder, whole_file
 from railsim.text import counted_remarks, spreadsheet_cell
 
@@ -55,6 +55,7 @@ FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sect
 @click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
 @click.option("--out", metavar="DIR", help="Folder for assessment.json, .csv and .png.")
 @output_options
+@allow_code_option
 def command(
     files: tuple[str, ...],
     standard: str,

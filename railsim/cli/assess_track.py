@@ -2,7 +2,7 @@
 
 import click
 
-from railsim.cli.common import echo, names_of, output_options, print_json, show
+from railsim.cli.common import code_options, echo, names_of, output_options, print_json, show
 from railsim.cli.progress import progress_bar
 from railsim.cli.study import ManyValues
 
@@ -21,6 +21,7 @@ SHOWN = 40
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes; default all.")
 @click.option("--resume", is_flag=True, help="Go on where this folder was left.")
 @output_options
+@code_options
 def command(
     recording: str,
     vehicles: tuple[str, ...],

@@ -83,6 +83,7 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
 
 def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["Remark"]:
     """Return what is allowed but unusual in a definition, and in a vehicle's `supports` at rest."""
+    from railsim.definitions.base import Remark
     from railsim.definitions.track.definition import Track
     from railsim.definitions.vehicle.definition import Vehicle
 
@@ -92,11 +93,15 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
 
         found = [*found, *vehicle_remarks(definition, supports=supports)]
     if isinstance(definition, Track):
-        from railsim.definitions.base import Remark
         from railsim.track.irregularity import measured_remarks
 
         texts = measured_remarks(definition)
         found = [*found, *(Remark("irregularities", text) for text in texts)]
+    if isinstance(definition, Vehicle | Track):
+        from railsim.laws.permission import refused
+
+        left_out = "not executed here: left out of pictures and of the vehicle at rest"
+        found = [*found, *(Remark(f"laws.{name}", left_out) for name in refused(definition))]
     return found
 
 
@@ -119,7 +124,7 @@ load_option = click.option(
 
 def _allow_code(ctx: click.Context, param: click.Parameter, given: bool) -> None:
     if given:
-        from railsim.laws import allow
+        from railsim.laws.permission import allow
 
         allow()
 
@@ -127,9 +132,11 @@ def _allow_code(ctx: click.Context, param: click.Parameter, given: bool) -> None
 def _allow_files(ctx: click.Context, param: click.Parameter, files: tuple[str, ...]) -> None:
     if files:
         from railsim.files.access import DEFINITION_BYTES, read_text
-        from railsim.laws import allow
+        from railsim.files.sources import library_files
+        from railsim.laws.permission import allow
 
-        allow(*(read_text(file, DEFINITION_BYTES) for file in files))
+        named = library_files("law")
+        allow(*(read_text(named.get(file, Path(file)), DEFINITION_BYTES) for file in files))
 
 
 allow_code_option = click.option(
@@ -149,7 +156,7 @@ def code_options(function: F) -> F:
         metavar="FILE",
         expose_value=False,
         callback=_allow_files,
-        help="Execute the laws of this file; may be given several times.",
+        help="Execute the laws of this file, or of this name; may be given several times.",
     )
     return allow_code_option(files(function))
 

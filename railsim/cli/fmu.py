@@ -6,6 +6,7 @@ import click
 
 from railsim.cli.common import (
     Speed,
+    code_options,
     load_option,
     names_of,
     output_options,
@@ -29,6 +30,7 @@ from railsim.cli.common import (
 @click.option("--settings", metavar="F", help="Settings file.")
 @set_option
 @output_options
+@code_options
 def command(
     vehicle: str,
     track: str,

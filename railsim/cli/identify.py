@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from railsim.cli.common import echo, names_of, output_options, print_json, show
+from railsim.cli.common import code_options, echo, names_of, output_options, print_json, show
 from railsim.errors import Fault, InputError
 from railsim.files.access import check_folder, make_folder, write_folder
 
@@ -61,6 +61,7 @@ KEPT = "evaluations"
     "interrupted identification goes on from what it has kept there.",
 )
 @output_options
+@code_options
 def command(
     vehicle: str,
     measured: tuple[str, ...],

@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from railsim.cli.analysis import Folder
-from railsim.cli.common import names_of, output_options
+from railsim.cli.common import code_options, names_of, output_options
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -27,6 +27,7 @@ FILES = ("irregularity.json", "irregularity.png")
               help="Replace one value of MEASURED; may be given several times.")  # fmt: skip
 @click.option("--out", metavar="DIR", help="Folder for recording, track, estimates, forces.")
 @output_options
+@code_options
 def command(
     measured: str,
     vehicle: str | None,

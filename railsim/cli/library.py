@@ -1,5 +1,6 @@
 """``railsim list``: what vehicles, tracks, profiles and design files there are."""
 
+import ast
 import re
 from collections import Counter
 from functools import cache
@@ -10,7 +11,7 @@ import click
 
 from railsim.cli.common import json_option, overwrite_option, print_json, show
 
-PROFILES = "profiles"
+PROFILES, LAWS = "profiles", "laws"
 # Letters of source quality beside a number, as the shipped files explain them: read, re-entered,
 # computed, from memory, assumed; a short name of the source may follow, [D G].
 MARK = re.compile(r"\[(D|R|C|I|M|A|assumed)(?: \w+)?\]")
@@ -37,7 +38,7 @@ def _kinds() -> dict[str, str]:
 @overwrite_option
 @json_option
 def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: bool) -> None:
-    """List everything that can be given by its bare name: vehicles, tracks, profiles, springs ...
+    """List everything that can be given by its bare name: vehicles, tracks, profiles, laws ...
 
     Besides railsim's own files, the list contains those of the folders in the environment variable
     RAILSIM_PATH and of installed packages with an entry point `railsim.library`.
@@ -49,7 +50,7 @@ def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: 
     from railsim.errors import Fault, InputError, nearest
     from railsim.table import Column, Table
 
-    known = [*_kinds(), PROFILES]
+    known = [*_kinds(), PROFILES, LAWS]
     wrong = [kind for kind in kinds if kind not in known]
     if wrong:
         raise InputError(Fault("list", "", f"no kind '{k}'", nearest(k, known)) for k in wrong)
@@ -86,6 +87,11 @@ def _entries(kind: str) -> list[dict[str, Any]]:
         ]
     from railsim.files.sources import library_files
 
+    if kind == LAWS:
+        return [
+            {"kind": kind, "name": name, "title": _first_line(path), "trust": "", "file": str(path)}
+            for name, path in library_files("law").items()
+        ]
     word = _kinds()[kind]
     return [
         {
@@ -97,6 +103,17 @@ def _entries(kind: str) -> list[dict[str, Any]]:
         }
         for name, path in library_files(word).items()
     ]
+
+
+def _first_line(path: Path) -> str:
+    """Return the first line of the text that a Python file begins with; nothing is executed."""
+    from railsim.files.access import DEFINITION_BYTES, read_text
+
+    try:
+        words = ast.get_docstring(ast.parse(read_text(path, DEFINITION_BYTES)))
+    except (SyntaxError, ValueError) as error:
+        return f"no Python: {error}"
+    return (words or "").partition("\n")[0]
 
 
 def _title(data: dict[str, Any]) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import echo, names_of, output_options, print_json, show
+from railsim.cli.common import code_options, echo, names_of, output_options, print_json, show
 from railsim.files.access import RESULTS, check_folder, write_folder
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ FILES = ("model_validation.json", "sections.csv", "report.html", "scatter.png", 
 @click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
 @click.option("--out", metavar="DIR", help="Folder for JSON, CSV, pictures and a page.")
 @output_options
+@code_options
 def command(
     files: tuple[str, ...],
     vehicle: str | None,

@@ -119,6 +119,7 @@ def command(
 @settings_option
 @set_option
 @output_options
+@allow_code_option
 def rails(
     track: str,
     traffic: tuple[tuple[str, float, float], ...],

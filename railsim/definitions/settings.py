@@ -17,7 +17,7 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.creep_law import CreepLawName
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.vehicle.laws import Law, LawUse, with_sources
+from railsim.definitions.vehicle.laws import Law, LawUse, OwnOutput, with_sources
 from railsim.errors import Fault
 
 SpeedRows = Annotated[tuple[tuple[Finite, Speed], ...], Field(min_length=1), rises("first column")]
@@ -135,6 +135,8 @@ class Outputs(Definition):
     """Torque of drives, brakes and actuators on each wheelset"""
     track: Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
+    own: dict[Name, OwnOutput] | None = None
+    """Quantities by laws of one's own, by name"""
 
 
 class Settings(FileDefinition):

@@ -35,6 +35,8 @@ FOLDERS = {
     "study": "studies",
     "measurement": "examples/measured_run",
 }
+LAWS = "laws"
+"""Folder of a library with Python files of laws."""
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
 
@@ -95,8 +97,8 @@ class Source:
 
 def shipped_folder(kind: str) -> Path:
     """Return the folder of the vehicles or tracks that come with railsim."""
-    installed = PACKAGE / "shipped" / FOLDERS[kind]
-    return installed if installed.is_dir() else PACKAGE.parent / FOLDERS[kind]
+    installed, folder = PACKAGE / "shipped", FOLDERS.get(kind, LAWS)
+    return (installed if installed.is_dir() else PACKAGE.parent) / folder
 
 
 def library_folders(kind: str) -> Iterator[Path]:
@@ -104,16 +106,17 @@ def library_folders(kind: str) -> Iterator[Path]:
 
     Those of the environment variable `RAILSIM_PATH`, those that come with railsim, and those of
     installed packages that declare an entry point of the group `railsim.library`.  Each library has
-    the layout of railsim's own: `vehicles/`, `vehicles/springs/`, `tracks/`.
+    the layout of railsim's own: `vehicles/`, `vehicles/springs/`, `tracks/`; and laws in `laws/`.
     """
+    inside = FOLDERS.get(kind, LAWS)
     for folder in filter(None, os.environ.get("RAILSIM_PATH", "").split(os.pathsep)):
-        yield Path(folder) / FOLDERS[kind]
+        yield Path(folder) / inside
     yield shipped_folder(kind)
     for entry in _installed_libraries(tuple(sys.path)):  # last: it takes some 50 ms
         library = entry.load()
         # a module stands for the folder that holds it
         root = Path(library.__file__).parent if hasattr(library, "__file__") else Path(library)
-        yield root / FOLDERS[kind]
+        yield root / inside
 
 
 @cache
@@ -128,7 +131,7 @@ def library_files(kind: str) -> dict[str, Path]:
     """Return the files of the libraries by their bare names; the first of each name is used."""
     files: dict[str, Path] = {}
     for folder in library_folders(kind):
-        for path in sorted(folder.glob("*.toml")):
+        for path in sorted(folder.glob("*.toml" if kind in FOLDERS else "*.py")):
             files.setdefault(path.stem, path)
     return dict(sorted(files.items()))
 

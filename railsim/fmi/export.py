@@ -10,6 +10,7 @@ from typing import Any
 
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError, argument_fault, nearest, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
@@ -92,8 +93,8 @@ def fmu(
             "step": step,
             "duration": conditions.get("duration"),
             "until": conditions.get("until"),
-            "inputs": _commands(actuators, inputs),
-            "outputs": _variables(result, signals, outputs),
+            "inputs": _commands(vehicle, actuators, inputs),
+            "outputs": _variables(vehicle, result, signals, outputs),
         }
         variables = Path(folder) / VARIABLES
         variables.write_text(json.dumps(facts, indent=1), encoding="utf-8")
@@ -118,27 +119,35 @@ def _identifier(stem: str) -> str:
     return f"unit_{name}" if not name or name[0].isdigit() or keyword.iskeyword(name) else name
 
 
-def _commands(actuators: Sequence[str], wanted: Sequence[str] | None) -> list[dict[str, Any]]:
+def _commands(
+    vehicle: Vehicle, actuators: Sequence[str], wanted: Sequence[str] | None
+) -> list[dict[str, Any]]:
+    elements = {element.name: element.definition for element in flatten(vehicle).elements}
     wanted = actuators if wanted is None else wanted
     for name in wanted:
         if name not in actuators:
             allowed = nearest(name, actuators) if actuators else "the vehicle has none"
             raise InputError([argument_fault("inputs", "", f"no actuator '{name}'", allowed)])
     return [
-        {"name": name, "start": 0.0, "unit": "", "description": f"command of actuator {name}"}
+        {
+            "name": name,
+            "start": 0.0,
+            "unit": getattr(elements[name], "command_unit", ""),  # a law knows its own
+            "description": f"command of actuator {name}",
+        }
         for name in wanted
     ]
 
 
 def _variables(
-    result: Result, signals: Sequence[str], wanted: Sequence[str]
+    vehicle: Vehicle, result: Result, signals: Sequence[str], wanted: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Return name, quantity, place in its array, unit and words of every output."""
     found: dict[str, dict[str, Any]] = {}
     for selection in wanted:
         if selection in signals:
-            words = f"signal {selection}"
-            found[selection] = _variable(selection, selection, [], "", words)
+            words, unit = f"signal {selection}", (vehicle.signals or {})[selection].unit
+            found[selection] = _variable(selection, selection, [], unit, words)
             continue
         quantity = selection.partition(":")[0]
         for panel in panels(result, [selection]):

@@ -114,7 +114,8 @@ class Unit:
             )
         inputs = open_run(self._folder / INPUTS).inputs()
         inputs |= {"duration": self._facts["duration"], "until": self._facts["until"]}
-        self._simulation = Simulation(**inputs, record=False)
+        # whoever loads a unit executes its code: the wrapper is Python too
+        self._simulation = Simulation(**inputs, record=False, allow_code=True)
         self._command()
         self._look()
 
@@ -174,16 +175,13 @@ class Unit:
             "values": dict(self._values),
             "status": self._status,
             "time": [self._begin, self._time],
-            "motion": _text(state.motion),
-            "counted": [_text(one) for one in state.counted],
-            "grid": list(state.grid),
+            "state": _saved(state),
         }
 
     def _set_fmu_state(self, saved: dict[str, Any]) -> None:
         self._commands, self._values = dict(saved["commands"]), dict(saved["values"])
         self._status, (self._begin, self._time) = saved["status"], saved["time"]
-        counted = tuple(_array(one) for one in saved["counted"])
-        self._run.state = SavedState(_array(saved["motion"]), counted, tuple(saved["grid"]))
+        self._run.state = _restored(saved["state"])
 
 
 def exponents(unit: str) -> dict[str, int]:
@@ -205,6 +203,22 @@ def exponents(unit: str) -> dict[str, int]:
                 times = int(power or 1) * (-1 if place else 1)
                 found[base] = found.get(base, 0) + times * exponent
     return found
+
+
+def _saved(state: SavedState) -> dict[str, Any]:
+    """Return a state as JSON holds it."""
+    return {
+        "motion": _text(state.motion),
+        "counted": [_text(one) for one in state.counted],
+        "grid": list(state.grid),
+        "begun": state.begun and _saved(state.begun),
+    }
+
+
+def _restored(saved: dict[str, Any]) -> SavedState:
+    counted = tuple(_array(one) for one in saved["counted"])
+    begun = saved["begun"] and _restored(saved["begun"])
+    return SavedState(_array(saved["motion"]), counted, tuple(saved["grid"]), begun)
 
 
 def _text(array: Any) -> list[Any]:

@@ -11,7 +11,7 @@ from railsim.kernels.creep import OWN
 from railsim.kernels.own_laws import CREEP_GIVES, CREEP_TAKES, FRICTION_GIVES, FRICTION_TAKES
 from railsim.kernels.patches import CreepLaw
 from railsim.kernels.system import Contact
-from railsim.laws import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
+from railsim.laws.binding import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
 
 
 def settings_creep_law(settings: Settings, track: Track) -> CreepLaw:

@@ -18,7 +18,7 @@ from railsim.kernels import controllers as kernel
 from railsim.kernels import element_outputs as element
 from railsim.kernels.commands import Controllers, Signals
 from railsim.kernels.contact_columns import W_Q, W_Y
-from railsim.laws import Takes, bind
+from railsim.laws.binding import Takes, bind
 from railsim.model.assembly import Model
 from railsim.model.element_arrays import LawBlocks
 

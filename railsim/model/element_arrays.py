@@ -63,7 +63,7 @@ from railsim.kernels.system import (
     falling_friction,
     mount_laws,
 )
-from railsim.laws import FORCE_ELEMENT, Bound, bind
+from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
 
 Floats = NDArray[np.float64]
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}

@@ -21,11 +21,12 @@ from railsim.definitions.track.layout import (
     track_remarks,
 )
 from railsim.definitions.track.section import Section
+from railsim.laws.permission import refused
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, shade, spans, styled
 from railsim.result.data import Array
 from railsim.text import unformatted
 from railsim.track.alignment import Alignment
-from railsim.track.irregularity import displacement
+from railsim.track.irregularity import shown_displacement
 
 KINDS = {"STR": ("straight", "0.35"), "CLO": ("transition", "#d99000"), "CIR": ("curve", "#004a80")}
 RESOLUTION = 16000
@@ -133,7 +134,9 @@ def _alignment_rows(track: Track, alignment: Alignment, s: Array) -> list[_Row]:
 
 def _rail_rows(track: Track, s: Array) -> list[_Row]:
     """Displacements of the rails by irregularities, and the gauge where it changes."""
-    moved = displacement(track)
+    moved, without = shown_displacement(track), ""
+    if names := refused(track):
+        without = f", without the law {', '.join(names)}"
     if moved is None:
         return []
     y_left, z_left, y_right, z_right = 1e3 * moved(s)[0]
@@ -142,12 +145,12 @@ def _rail_rows(track: Track, s: Array) -> list[_Row]:
     if track.irregularities:
         rows = [
             _Row(
-                "Lateral displacement of the rails, positive to the right",
+                f"Lateral displacement of the rails, positive to the right{without}",
                 "$y$ (mm)",
                 {"left": y_left, "right": y_right},
             ),
             _Row(
-                "Vertical displacement of the rails, positive downwards",
+                f"Vertical displacement of the rails, positive downwards{without}",
                 "$z$ (mm)",
                 {"left": z_left, "right": z_right},
             ),

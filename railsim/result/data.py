@@ -321,6 +321,7 @@ class Result:
         """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
         facts = self._attributes
         states: Mapping[str, Array] = self._groups.get("state", {})
+        before = {"end": states.get("start"), "memory": states.get("start_memory")}
         return {
             "vehicle": self.vehicle(),
             "track": self.track(),
@@ -330,7 +331,7 @@ class Result:
             "duration": facts.get("requested_duration"),
             "until": facts.get("requested_until"),
             "profiles": self.profiles,
-            "resume": states.get("start"),
+            "resume": before if "start" in states else None,
         }
 
     def plot(

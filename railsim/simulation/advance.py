@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
 from railsim.errors import RailsimError
-from railsim.kernels.controllers import START
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
@@ -63,11 +62,14 @@ class SavedState:
         What steps count and remember beside it: commands, samples, memory of laws, extremes.
     grid : tuple
         Where it is on the grid of steps.
+    begun : SavedState, optional
+        Begin of the step of the grid of which a part has been taken.
     """
 
     motion: Floats
     counted: tuple[NDArray[Any], ...]
     grid: tuple[Any, ...]
+    begun: "SavedState | None" = None
 
 
 class _Before(NamedTuple):
@@ -95,6 +97,8 @@ class Preparation:
         Step and output interval at any speed.
     evaluation : float
         Time from which on peaks are evaluated [s].
+    memory : float64[...]
+        Commands, samples and memory of laws at the beginning, see `railsim.kernels.system.Own`.
     fresh : bool
         Whether nothing was before the initial state.
     remarks : tuple of str
@@ -107,6 +111,7 @@ class Preparation:
     end_time: float
     end_distance: float
     steps: StepChoice
+    memory: Floats
     evaluation: float = 0.0
     fresh: bool = True
     remarks: tuple[str, ...] = ()
@@ -193,8 +198,7 @@ class Run:
         self.extremes: Floats = no_extremes(wheelsets)
         self.evaluated: Floats = no_extremes(wheelsets)
         self.unloaded: Floats = np.zeros((wheelsets, 2))
-        self.memory: Floats = self.prepared.model.system.own.memory.copy()
-        self.memory[START] = self.state[TIME]
+        self.memory: Floats = self.prepared.memory.copy()
         self.swings.begin(self.plan.coordinates)
 
 
@@ -370,7 +374,9 @@ class Convoy:
     def last_record(self) -> tuple[int, int, int]:
         """Record the state at the end: status, where, number of records."""
         self.due = False
+        memory = self.work.memory.copy()  # a run that goes on from here samples this instant itself
         status, where, _, rows = self.call(1.0, 0, 0, 1, closing=1)
+        self.work.memory[:] = memory
         return status, where, rows
 
     def call(
@@ -416,6 +422,7 @@ class Convoy:
                 chunk = run.plan.chunk(records, rows, run.prepared.balance.Q0)
                 run.swings.append(thinned(chunk))
                 run.sink.append(chunk)
+                run.stopped = run.stopped or chunk.wrong
             except Exception as error:
                 run.error = error
 

@@ -1,8 +1,10 @@
 """What the runs of one call have in common, checked: speed, start, end, the state to go on from."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +19,25 @@ from railsim.units import speed_in_si
 
 Floats = NDArray[np.float64]
 SPEED_RANGE = (0.5, 150.0)  # m/s
+STATES = ("end", "memory")
+"""Of a result's group `state`, what a run goes on from."""
 # settings that a continued run may have of its own; it has no start and no initial disturbance
 OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial", "start_state")
+
+
+class TakenUp(NamedTuple):
+    """What a run goes on from.
+
+    Attributes
+    ----------
+    motion : float64[n_state]
+        See `railsim.kernels.system`.
+    memory : float64[...], optional
+        Commands, samples and memory of laws; None where nothing of it is known.
+    """
+
+    motion: Floats
+    memory: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -112,8 +131,11 @@ def check_range(
 
 
 def state_before(
-    vehicle: Vehicle, track: Track, settings: Settings, resume: Result | Floats
-) -> Floats:
+    vehicle: Vehicle,
+    track: Track,
+    settings: Settings,
+    resume: Result | Mapping[str, Floats] | Floats,
+) -> TakenUp:
     """State with which a run goes on from another one.
 
     Raises
@@ -123,12 +145,15 @@ def state_before(
         not give what an undisturbed run gives.
     """
     if not isinstance(resume, Result):
-        values = np.asarray(resume)
-        if values.dtype.kind != "f" or values.ndim != 1 or not np.isfinite(values).all():
+        states = resume if isinstance(resume, Mapping) else {"end": resume}
+        values = [np.asarray(states[key]) for key in STATES if states.get(key) is not None]
+        if not values or any(
+            one.dtype.kind != "f" or one.ndim != 1 or not np.isfinite(one).all() for one in values
+        ):
             found = "not finite numbers in a row"
-            allowed = 'a result, or its state: result.groups["state"]["end"]'
+            allowed = 'a result, or its states: result.groups["state"]'
             raise InputError([argument_fault("resume", "", found, allowed, "--continue")])
-        return values.astype(float)
+        return TakenUp(*(one.astype(float) for one in values))
     faults = []
     if "end" not in resume.groups.get("state", {}):
         faults.append(
@@ -165,7 +190,7 @@ def state_before(
     ]
     if faults:
         raise InputError(faults)
-    return np.array(resume.groups["state"]["end"])
+    return state_before(vehicle, track, settings, resume.groups["state"])
 
 
 def own_speed(before: Floats, speed: float | str | None, start: float) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from railsim.model.assembly import Model
 from railsim.result import Result
 from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run
-from railsim.simulation.conditions import Inputs
+from railsim.simulation.conditions import Inputs, TakenUp
 from railsim.simulation.outputs import run_extremes
 from railsim.simulation.remarks import beyond_experience, run_remarks
 from railsim.simulation.sampling import low_pass_remark
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
 
 
-def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Result:
+def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> Result:
     """Close a run: its result, with all facts about it."""
     began = time.perf_counter()
     prepared, settings = run.prepared, inputs.settings
@@ -72,7 +72,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         prepared.model.profiles,
         {
             "state": {"end": run.state}
-            | ({} if before is None else {"start": before})
+            | ({} if before is None else {"start": before.motion, "start_memory": prepared.memory})
             | ({"memory": run.memory} if len(run.memory) > 1 else {}),
             # of quantities that are stored filtered the peaks are those of what is stored
             **(

@@ -39,6 +39,7 @@ from railsim.model.time_step import empty_recorder
 from railsim.model.work import smooth_planes
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
+from railsim.simulation.own_outputs import OwnOutputs
 from railsim.track.alignment import alignment_of
 from railsim.track.irregularity import displacement
 
@@ -218,13 +219,21 @@ def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
     return found
 
 
-class _Chunk(Mapping[str, Floats]):
-    """Quantities by name, some of them worked out when asked for: summaries need few of them."""
+class Chunk(Mapping[str, Floats]):
+    """Quantities by name, some of them worked out when asked for: summaries need few of them.
+
+    Attributes
+    ----------
+    wrong : str
+        Which law of one's own has given no number, see `OwnOutputs`; or empty.
+    """
 
     def __init__(
-        self, values: dict[str, Floats], later: Mapping[str, Callable[[], Floats]]
+        self, values: dict[str, Floats], later: Mapping[str, Callable[[], Floats]], own: OwnOutputs
     ) -> None:
         self._values, self._later = values, later
+        found, self.wrong = own.values(self)
+        values |= found
 
     def __getitem__(self, name: str) -> Floats:
         if name not in self._values:
@@ -282,7 +291,8 @@ class OutputPlan:
         self._on_axles = on_axles if self._asked.drives else on_axles[:0]
         chosen = [known[name] for name in self.elements]
         self._chosen = np.array([*chosen, *((ACTUATOR, i) for i in self._on_axles)], dtype=np.int64)
-        self.quantities = self._kept()
+        self._own = OwnOutputs(settings, self._known(), self.coordinates)
+        self.quantities = (*self._kept(), *self._own.quantities)
 
     def _kept(self) -> tuple[Quantity, ...]:
         """All quantities of the result: of the usual ones those that are asked for."""
@@ -355,7 +365,7 @@ class OutputPlan:
             torque[:, wheelset[system.actuators.body[i, 1]]] += moment[:, k]
         return torque
 
-    def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
+    def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Chunk:
         """Quantities of the first `rows` records by name."""
         values = dict(quantities(self._model, recorder, rows, Q0))
         if self.elements:
@@ -393,7 +403,7 @@ class OutputPlan:
             "curvature": lambda: self._alignment.curvature(distance),
             "cant": lambda: self._alignment.cant(distance),
         }
-        return _Chunk(values, later)
+        return Chunk(values, later, self._own)
 
     def _track(self, distance: Floats) -> dict[str, Floats]:
         rails = np.zeros((4, *distance.shape))

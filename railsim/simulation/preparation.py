@@ -13,8 +13,9 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
+from railsim.kernels.controllers import START
 from railsim.kernels.system import TIME
-from railsim.model.assembly import Model, SharedTables, assemble
+from railsim.model.assembly import SharedTables, assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import stored_equilibrium
 from railsim.model.plausibility import vehicle_remarks
@@ -24,7 +25,7 @@ from railsim.result import Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.simulation.advance import Preparation, Run
 from railsim.simulation.auxiliary_track import Progress as SettlingProgress
-from railsim.simulation.conditions import Inputs
+from railsim.simulation.conditions import Inputs, TakenUp
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.outputs import OutputPlan, run_extremes
 from railsim.simulation.run_in import start_state
@@ -49,7 +50,7 @@ def prepare(
     until: float | None = None,
     profiles: Mapping[str, Profile] | None = None,
     shared: SharedTables | None = None,
-    before: Floats | None = None,
+    before: TakenUp | None = None,
     *,
     on_judgement: SettlingProgress | None = None,
     on_run_in: SettlingProgress | None = None,
@@ -84,15 +85,21 @@ def prepare(
         )
         remarks += disturb(model, balance.Q0, settings, state)
     else:
-        state = _taken_up(model, before)
+        state = _taken_up(before.motion, model.n_state)
+    model = with_control(model, vehicle, settings)
+    memory = model.system.own.memory.copy()
+    memory[START] = state[TIME]
+    if before is not None and before.memory is not None:
+        memory = _taken_up(before.memory, len(memory))
     prepared = Preparation(
-        with_control(model, vehicle, settings),
+        model,
         balance,
         state,
         end_time=math.inf if duration is None else float(state[TIME]) + duration,
         end_distance=track.length if until is None else until,
         steps=steps,
         fresh=before is None,
+        memory=memory,
         remarks=tuple(remarks),
     )
     return replace(prepared, evaluation=_evaluation(prepared, settings))
@@ -109,20 +116,11 @@ def _evaluation(prepared: Preparation, settings: Settings) -> float:
     return begin + asked
 
 
-def _taken_up(model: Model, before: Floats) -> Floats:
-    """State `before` in which a run goes on."""
-    if before.shape != (model.n_state,):
-        raise InputError(
-            [
-                argument_fault(
-                    "resume",
-                    "",
-                    f"a state of {before.size} values",
-                    f"{model.n_state} values, those of this vehicle",
-                    "--continue",
-                )
-            ]
-        )
+def _taken_up(before: Floats, length: int) -> Floats:
+    """Return values with which a run goes on, of which there have to be so many."""
+    if len(before) != length:
+        found, allowed = f"a state of {before.size} values", f"{length}, those of this vehicle"
+        raise InputError([argument_fault("resume", "", found, allowed, "--continue")])
     return before.copy()
 
 
@@ -131,7 +129,7 @@ def begin(
     inputs: Inputs,
     sink: Sink,
     profiles: Mapping[str, Profile] | None,
-    before: Floats | None,
+    before: TakenUp | None,
     shared: SharedTables,
     fraction: RunProgress,
 ) -> Run:

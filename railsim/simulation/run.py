@@ -35,7 +35,7 @@ def simulate(
     sink: Sink | None = None,
     progress: Progress | None = None,
     profiles: Mapping[str, Profile] | None = None,
-    resume: Result | Floats | None = None,
+    resume: Result | Mapping[str, Floats] | Floats | None = None,
     allow_code: bool = False,
 ) -> Result:
     """Run one vehicle over one track.
@@ -60,10 +60,10 @@ def simulate(
         Called repeatedly with the finished fraction.
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
-    resume : Result or float64[n_state], optional
+    resume : Result, mapping or float64[n_state], optional
         A result of the same vehicle, track and settings (outputs apart) whose end is the beginning
-        of this run, or the state itself (``result.groups["state"]["end"]``); either gives speed and
-        start.
+        of this run, or its states ``result.groups["state"]``, or of these ``end`` alone: then
+        controllers and delays begin anew.  Either gives speed and start.
     allow_code : bool
         Execute the laws of one's own that the files name, see `railsim.laws`.
 

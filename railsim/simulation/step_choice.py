@@ -200,10 +200,11 @@ def with_class_friction(model: Model) -> Model:
 def inputs_hash(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> str:
     """Return a hash of all that a model was made of, except for the friction of its track."""
     digest = hashlib.sha256()
+    apart = {"outputs"} if settings.own_creep_law or settings.own_friction else {"outputs", "laws"}
     texts = (
         vehicle.to_toml(),
         track.model_dump_json(exclude={"friction", "friction_table"}),
-        settings.to_toml(),
+        settings.model_dump_json(exclude=apart),
     )
     for part in (*texts, *sorted(model.profiles)):
         digest.update(part.encode())

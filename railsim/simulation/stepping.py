@@ -1,15 +1,14 @@
 """`Simulation`: a run that is taken step by step, read and acted on in between.
 
-It is the loop of `simulate` on the same grid of steps: what ends within a step of the grid divides
-that one, and the next call begins with what is left of it.
+It is the loop of `simulate` on the same grid of steps.  A call that ends within a step of the grid
+takes a part of it; the next one takes the whole step from its begin, so that the run keeps its
+bits, or where a command has come in between goes on with what is left of it.
 """
 
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -20,19 +19,18 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault, nearest
-from railsim.kernels.actuators import send
+from railsim.kernels.actuators import COMMAND, send
 from railsim.kernels.compiler import entry
 from railsim.kernels.controllers import BASE, VALUE
-from railsim.kernels.recording import Recorder
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import ARC_LENGTH, SPEED, TIME, Work
+from railsim.kernels.system import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.laws import allowed
 from railsim.model.assembly import SharedTables
 from railsim.model.time_step import divide_strikes
 from railsim.model.uneven_wheels import longest_part
 from railsim.model.work import work_arrays
-from railsim.notation import QUANTITIES, REQUESTED
+from railsim.notation import REQUESTED
 from railsim.profiles import Profile
 from railsim.result import Hdf5Sink, MemorySink, Result, Sink
 from railsim.simulation.advance import COUNTED, ROUND_OFF, ROWS, STEPS, Convoy, SavedState
@@ -47,14 +45,6 @@ Floats = NDArray[np.float64]
 NEVER = 1 << 40
 SHORTEST = 1e-12  # s
 SHARE = 1e-3  # of a step: what is shorter is made up for by the next one
-
-
-@dataclass(frozen=True, eq=False)
-class _Probe:
-    """Where a state is evaluated beside the loop."""
-
-    work: Work
-    recorder: Recorder
 
 
 class Simulation:
@@ -102,14 +92,14 @@ class Simulation:
         sink: Sink | None = None,
         progress: Progress | None = None,
         profiles: Mapping[str, Profile] | None = None,
-        resume: Result | Floats | None = None,
+        resume: Result | Mapping[str, Floats] | Floats | None = None,
         allow_code: bool = False,
     ) -> None:
         check_types([vehicle], track)
         settings = settings or Settings()
         before = None if resume is None else state_before(vehicle, track, settings, resume)
         if before is not None:
-            speed, start = own_speed(before, speed, start)
+            speed, start = own_speed(before.motion, speed, start)
         inputs = Inputs.checked(track, settings, speed, start, duration, until)
         self._fraction = RunProgress(progress, 1, inputs)
         self._fraction.next_run()
@@ -132,8 +122,9 @@ class Simulation:
         self._prepared_for, self._longest = math.nan, math.inf
         self._closed: Result | None = None
         self._loop: Any = None
+        self._begun: SavedState | None = None
         self._seen: Mapping[str, Floats] | None = None
-        self._probe: Any = None
+        self._probe: Any = None  # work arrays and recorder where a state is evaluated
 
     @property
     def time(self) -> float:
@@ -193,16 +184,15 @@ class Simulation:
         InputError : the run has ended, or `dt` is no positive time.
         """
         if not self.running:
-            raise InputError(
-                [argument_fault("step", "", self._ended_because(), "a new Simulation")]
-            )
+            fault = argument_fault("step", "", self._ended_because(), "a new Simulation")
+            raise InputError([fault])
         if dt is None:
             dt = self._missing or self._next()
         elif not 0.0 < dt < math.inf:  # NaN is not
             raise InputError([argument_fault("dt", "", f"found {dt} s", "a positive time")])
         begin = time.thread_time()
         self._seen = None
-        left = float(dt) + self._behind
+        left = float(dt) + self._taken_back() + self._behind
         while left > SHARE * self._length and self.running:
             whole = self._next()
             if self._run.ended:
@@ -212,6 +202,15 @@ class Simulation:
         self._run.cpu_time += time.thread_time() - begin
         self._raise_error()
         return self.running
+
+    def _taken_back(self) -> float:
+        """Take back the part of a step, where nothing has changed since it was begun; its time."""
+        if self._begun is None:
+            return 0.0
+        now, behind = self.time, self._behind
+        self.state = self._begun
+        self._behind = behind
+        return now - self.time
 
     def run(self, until: float | None = None, *, duration: float | None = None) -> bool:
         """Advance to an arc length [m] or by a time [s], else to the end; whether it goes on."""
@@ -278,6 +277,7 @@ class Simulation:
             return taken
         steps = int(most / whole * (1.0 + ROUND_OFF) + SHARE)
         if steps == 0:
+            self._begun = self.state
             self._call(most, self._phase, 1, every)
             self._missing, convoy.due = whole - most, False
             return most
@@ -357,18 +357,20 @@ class Simulation:
         """
         names = self.actuators
         if actuator not in names:
+            found = f"no actuator '{actuator}'"
             allowed = nearest(actuator, names) if names else "the vehicle has none"
-            fault = argument_fault("actuator", "", f"no actuator '{actuator}'", allowed)
-            raise InputError([fault])
+            raise InputError([argument_fault("actuator", "", found, allowed)])
         if not math.isfinite(value):
             raise InputError([argument_fault("value", "", f"found {value}", "a finite number")])
         convoy, number = self._convoy, names.index(actuator)
         memory = convoy.work.memory
+        if value == memory[convoy.system.actuators.which[number, COMMAND]]:
+            return
         plain = getattr(send, "py_func", send)
         if not plain(convoy.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
             raise InputError([argument_fault("actuator", actuator, found, "fewer commands")])
-        self._seen = None
+        self._seen = self._begun = None
 
     def set_rails(self, displacement: Floats, velocity: Floats) -> None:
         """Displace the rails under the wheels, as another program's bridge or track does.
@@ -384,8 +386,10 @@ class Simulation:
             fault = argument_fault("set_rails", "", "a track with a support", "rigid rails")
             raise InputError([fault])
         motion = self._convoy.work.rail_motion
+        before = motion.copy()
         motion[..., :2], motion[..., 2:] = displacement, velocity
-        self._seen = None
+        if not np.array_equal(motion, before):
+            self._seen = self._begun = None
 
     def read(self, name: str) -> Any:
         """Return the present value of a signal, or of a quantity of the result [SI].
@@ -396,22 +400,18 @@ class Simulation:
         ------
         InputError : there is nothing of this name.
         """
-        index = self._run.prepared.model.index
+        signals = self._run.prepared.model.index.signals
         values = self._present()
-        if name in index.signals:
-            base = self._convoy.system.signals.which[index.signals.index(name), BASE]
-            return float(self._probe.work.memory[base + VALUE])
-        if name in QUANTITIES or name in REQUESTED:
-            try:
-                value = np.asarray(values[name])
-            except KeyError:
-                fault = argument_fault(
-                    "name", "", f"'{name}' is not output", "ask for it in settings.outputs"
-                )
-                raise InputError([fault]) from None
+        if name in signals:
+            base = self._convoy.system.signals.which[signals.index(name), BASE]
+            return float(self._probe[0].memory[base + VALUE])
+        if name in values:
+            value = np.asarray(values[name])
             return float(value[0]) if value.ndim == 1 else value[0].copy()
-        allowed = nearest(name, self.readable)
-        raise InputError([argument_fault("name", "", f"nothing is called '{name}'", allowed)])
+        found, allowed = f"nothing is called '{name}'", nearest(name, self.readable)
+        if name in REQUESTED:
+            found, allowed = f"'{name}' is not output", "ask for it in settings.outputs"
+        raise InputError([argument_fault("name", "", found, allowed)])
 
     def _present(self) -> Mapping[str, Floats]:
         """Quantities at the present state, evaluated beside the loop."""
@@ -419,18 +419,18 @@ class Simulation:
             return self._seen
         convoy, run, length = self._convoy, self._run, self.step_length
         if self._probe is None:
-            self._probe = _Probe(work_arrays(convoy.system), run.plan.recorder(1))
-        probe, state = self._probe, convoy.state.copy()
-        probe.work.memory[:] = convoy.work.memory
-        probe.work.rail_motion[:] = convoy.work.rail_motion
-        divide_strikes(probe.work, convoy.scheme, length, self._longest)
+            self._probe = work_arrays(convoy.system), run.plan.recorder(1)
+        (work, recorder), state = self._probe, convoy.state.copy()
+        work.memory[:] = convoy.work.memory
+        work.rail_motion[:] = convoy.work.rail_motion
+        divide_strikes(work, convoy.scheme, length, self._longest)
         status, where, _, _ = time_loop(
             convoy.system,
-            probe.work,
+            work,
             state,
             np.zeros_like(state),
             convoy.stages,
-            probe.recorder,
+            recorder,
             convoy.scheme,
             length,
             Chunk(0, 0, 1, int(convoy.fresh), 1),
@@ -438,7 +438,7 @@ class Simulation:
         if status != RUNNING:
             run.status, run.where = status, where
             raise InputError([argument_fault("read", "", self._ended_because(), "")])
-        self._seen = run.plan.chunk(probe.recorder, 1, run.prepared.balance.Q0)
+        self._seen = run.plan.chunk(recorder, 1, run.prepared.balance.Q0)
         return self._seen
 
     # states
@@ -446,12 +446,14 @@ class Simulation:
     @property
     def state(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        convoy = self._convoy
+        convoy, run = self._convoy, self._run
         grid = (self._phase, self._missing, self._behind, self._length, self._every, self._goal)
+        here = (convoy.fresh, convoy.due, convoy.evaluates, run.status, run.where)
         return SavedState(
             convoy.state.copy(),
             tuple(getattr(convoy.work, name).copy() for name in (*COUNTED, "rail_motion")),
-            (*grid, convoy.fresh, convoy.due, convoy.evaluates, self._run.status, self._run.where),
+            (*grid, *here, float(convoy.derivative[SPEED])),
+            self._begun,
         )
 
     @state.setter
@@ -461,19 +463,18 @@ class Simulation:
             found = f"a state of {saved.motion.size} values"
             allowed = f"{convoy.state.size} values, those of this vehicle and track"
             raise InputError([argument_fault("state", "", found, allowed)])
-        kept = convoy.ensemble.recorder.state[: self._rows, TIME]
-        rows = int(np.searchsorted(kept, saved.motion[TIME] - SHORTEST))
+        recorded = convoy.ensemble.recorder.state[: self._rows, TIME]
         if self._records and saved.motion[TIME] < self._written + SHORTEST:
             found = "an instant before what is recorded already"
             raise InputError([argument_fault("state", "", found, "record=False")])
-        self._rows = min(rows, self._rows)
+        self._rows = int(np.searchsorted(recorded, saved.motion[TIME] - SHORTEST))
         convoy.state[:] = saved.motion
         for name, values in zip((*COUNTED, "rail_motion"), saved.counted, strict=True):
             getattr(convoy.work, name)[...] = values
         *grid, convoy.fresh, convoy.due, convoy.evaluates = saved.grid[:9]
         self._phase, self._missing, self._behind, self._length, self._every, self._goal = grid
-        self._run.status, self._run.where = saved.grid[9:]
-        self._seen = None
+        self._run.status, self._run.where, convoy.derivative[SPEED] = saved.grid[9:]
+        self._seen, self._begun = None, saved.begun
 
     def result(self) -> Result:
         """End the run where it is, and return its result."""
@@ -492,9 +493,7 @@ class Simulation:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: object, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None and self._closed is None:
             self.result()
         self._sink.abort()

@@ -9,18 +9,37 @@ from itertools import pairwise
 import numpy as np
 
 from railsim.definitions.excitations.base import Array, Displacement
+from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import Measured, largest_between_rows
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
+from railsim.errors import Fault, InputError, nearest
+from railsim.laws.binding import EXCITATION, bind
+from railsim.laws.permission import permitted_part
 
 # Largest displacement between the rows over that at the rows, from which on it is remarked on.
 BEYOND_ROWS = 1.05
+LARGEST = 0.5  # m; of a law of one's own
+
+
+def shown_displacement(track: Track) -> Displacement | None:
+    """Return the displacement for pictures, without laws that are not permitted."""
+    return displacement(permitted_part(track)) or (_nothing if track.irregularities else None)
+
+
+def _nothing(s: Array) -> tuple[Array, Array]:
+    return np.zeros((4, *s.shape)), np.zeros((4, *s.shape))
 
 
 def displacement(track: Track) -> Displacement | None:
     """Sum of all displacements of a track's rails, None where there are none."""
-    parts = [part.displacement(track.length) for part in track.irregularities]
+    parts = [
+        _by_law(part, f"irregularities.{k}", track)
+        if isinstance(part, ByLaw)
+        else part.displacement(track.length)
+        for k, part in enumerate(track.irregularities)
+    ]
     if track.gauge_widening is not None:
         parts.append(_widening(track))
     if not parts:
@@ -31,6 +50,26 @@ def displacement(track: Track) -> Displacement | None:
         return np.sum(values, axis=0), np.sum(rates, axis=0)
 
     return total
+
+
+def _by_law(part: ByLaw, key: str, track: Track) -> Displacement:
+    """Return what a law of one's own gives; InputError where it is not permitted or not finite."""
+    laws = track.laws or {}
+    if part.law not in laws:
+        allowed = nearest(part.law, laws) if laws else "there is none"
+        raise InputError([Fault("track", f"{key}.law", f"no law '{part.law}'", allowed)])
+    bound = bind(part.law, laws[part.law], EXCITATION)
+    values = bound.parameters(f"{key}.parameters", part.parameters)
+
+    def value(s: Array) -> Array:
+        found: Array = bound.values(s[:, None], values)
+        wrong = np.flatnonzero(~(np.abs(part.factor * found) <= LARGEST))
+        if wrong.size:
+            words = f"the law '{part.law}' gives {found[wrong[0]]:g} m at s = {s[wrong[0]]:.6g} m"
+            raise InputError([Fault("track", key, words, f"a number within {LARGEST:g} m")])
+        return found
+
+    return part.displacement_by(value, track.length)
 
 
 def shortest_length(track: Track) -> float:

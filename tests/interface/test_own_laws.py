@@ -9,6 +9,7 @@ import railsim
 from railsim import laws
 from railsim.description.rest import describe_statics
 from railsim.errors import InputError
+from railsim.laws import binding
 
 SOURCE = """
 from math import nan
@@ -152,6 +153,24 @@ def test_a_controller_steps_as_it_runs(coach, track):
     assert np.array_equal(again.read("element_force"), whole["element_force"][at])
 
 
+def test_a_continued_run_has_the_bits_of_an_unbroken_one(coach, track):
+    """Memory of a controller, commands under way, lag of the actuator, samples with noise."""
+    laws.allow()
+    sensor = {"rate": 150.0, "delay": 0.02, "noise": 0.01, "resolution": 1e-4}
+    vehicle = skyhook(coach, **sensor).with_values(
+        {"elements.push.lag": 0.05, "elements.push.delay": 0.013}
+    )
+    way = WAY | {"until": None}
+    whole = railsim.simulate(vehicle, track, **way, duration=0.6)
+    first = railsim.simulate(vehicle, track, **way, duration=0.3)
+    second = railsim.simulate(vehicle, track, settings=SETTINGS, resume=first, duration=0.3)
+    again = railsim.simulate(**second.inputs())
+    assert np.max(np.abs(second["element_force"])) > 100.0
+    for name in ("element_force", "Q", "body_position"):
+        assert np.array_equal(second[name], whole[name][-len(second[name]) :])
+        assert np.array_equal(second[name], again[name])
+
+
 def test_signals_are_sampled_late_and_in_steps(coach, track):
     """Sample k is the value at k T, known after the delay; noise has its deviation."""
     plain = skyhook(coach)
@@ -211,7 +230,7 @@ def test_nothing_is_executed_without_permission(coach, track, capsys, monkeypatc
     with pytest.raises(InputError, match=r"'damper' is code of mine.py.*--allow-code"):
         railsim.simulate(vehicle, track, **WAY)
     assert "executed" not in capsys.readouterr().out
-    laws._bound.clear()
+    binding._bound.clear()
     laws.allow(SOURCE)
     railsim.Simulation(vehicle, track, **WAY)
     assert "executed" in capsys.readouterr().out

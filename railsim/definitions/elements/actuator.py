@@ -97,6 +97,14 @@ class Actuator(CommandedElement):
             raise ValueError(f'command = "{wrong}" has {other} acts = "axle"')
         return self
 
+    @property
+    def command_unit(self) -> str:
+        """SI unit of its command."""
+        linear = self.acts not in ("roll", "pitch", "yaw")
+        return {"force": ("N m", "N"), "damper": ("N m s/rad", "N s/m"), "position": ("rad", "m")}[
+            self.command
+        ][linear]
+
     def rows(self) -> list[Act]:
         """One actuator."""
         return [self.act(mode=self.command, stiffness=self.stiffness, damping=self.damping)]

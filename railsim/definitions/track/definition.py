@@ -7,6 +7,7 @@ from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.track.layout import curvature_sections, track_faults, track_remarks
 from railsim.definitions.track.rail_sections import embed_rail_sections
 from railsim.definitions.track.tables import TrackTables
+from railsim.definitions.vehicle.laws import with_sources
 from railsim.errors import Fault
 from railsim.plottable import Plottable
 from railsim.table import Column, Table
@@ -20,8 +21,8 @@ class Track(TrackTables, Plottable):
 
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:
-        """Put the rows of measured irregularities and sections of rails into the tables."""
-        return embed_measured(tables) + embed_rail_sections(tables)
+        """Put measured irregularities, sections of rails and sources of laws into the tables."""
+        return embed_measured(tables) + embed_rail_sections(tables) + with_sources(tables)
 
     def contradictions(self) -> list[Fault]:
         """Return where the elements do not fit together."""

@@ -14,6 +14,7 @@ from railsim.definitions.base import (
     Definition,
     Finite,
     Flag,
+    Name,
     NonNegative,
     NonNegativePair,
     Speed,
@@ -29,6 +30,7 @@ from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.track.check_rail import MOST_CHECK_RAILS, CheckRail
 from railsim.definitions.track.rail_sections import MOST_RANGES, RailSections
 from railsim.definitions.track.support import Support
+from railsim.definitions.vehicle.laws import Law
 
 ArcLength = TypeVar("ArcLength", float, Any)
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
@@ -240,6 +242,8 @@ class TrackTables(FileDefinition):
 
     irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
     """Displacements of the rails from their ideal positions; they add up"""
+    laws: dict[Name, Law] | None = None
+    """Laws of one's own by name: Python functions, executed by permission alone"""
     sections: tuple[RailSections, ...] = Field(default=(), max_length=MOST_RANGES)
     """Ranges in which the section of a rail changes, such as crossings"""
     check_rail: tuple[CheckRail, ...] = Field(default=(), max_length=MOST_CHECK_RAILS)

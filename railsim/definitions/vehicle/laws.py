@@ -4,7 +4,8 @@ A law's file is read and kept with the definition as its source: results carry i
 told apart by it, and workers get it.  Nothing is executed here (see `railsim.laws`).
 """
 
-from collections.abc import Mapping
+import ast
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -20,15 +21,16 @@ from railsim.definitions.base import (
     Text,
     Vector,
 )
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, nearest
 from railsim.files.access import DEFINITION_BYTES, read_text
+from railsim.files.sources import library_files
 
 
 class Law(Definition):
     """A Python function that is compiled when a run begins, by permission of the user alone."""
 
     file: Text | None = None
-    """Python file with the function"""
+    """Python file with the function, or the name of a law of a library"""
     function: Name | None = None
     """Name of the function; by default that of the law"""
     source: Text | None = None
@@ -52,9 +54,21 @@ class LawUse(Definition):
     """Values of the function's further arguments, by name"""
 
 
+class OwnOutput(LawUse):
+    """A quantity of the result by a law of one's own, of other quantities at the same instant."""
+
+    inputs: dict[Name, Text] = Field(default_factory=dict)
+    """Arguments of the function: to each a quantity with the labels wanted, such as `Q:1:left`"""
+    unit: Text = "1"
+    """SI unit of what it gives"""
+    words: Text | None = None
+    """Words for axes and tables; by default its name"""
+
+
 BODY_SIGNALS = ("displacement", "velocity", "acceleration", "angle", "angular_velocity")
 ELEMENT_SIGNALS = ("deflection", "rate", "force", "power")
 WHEEL_SIGNALS = ("wheel_speed", "Q", "Y")
+ANGLES = ("roll", "pitch", "yaw")
 TRACK_SIGNALS = ("curvature", "cant_angle")
 
 
@@ -95,6 +109,17 @@ class Signal(Definition):
     resolution: NonNegative = 0.0
     """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
 
+    @property
+    def unit(self) -> str:
+        """SI unit of what is measured."""
+        of_element = ("rad", "rad/s", "N m", "W") if self.axis in ANGLES else ("m", "m/s", "N", "W")
+        return {
+            **dict(zip(BODY_SIGNALS, ("m", "m/s", "m/s2", "rad", "rad/s"), strict=True)),
+            **dict(zip(ELEMENT_SIGNALS, of_element, strict=True)),
+            **{"wheel_speed": "m/s", "Q": "N", "Y": "N", "curvature": "1/m", "cant_angle": "rad"},
+            **{"speed": "m/s", "speed_change": "m/s2", "distance": "m", "time": "s"},
+        }[self.quantity]
+
     @model_validator(mode="after")
     def _what_belongs_together(self) -> Self:
         needs = {"body": BODY_SIGNALS, "element": ELEMENT_SIGNALS, "wheelset": WHEEL_SIGNALS}
@@ -106,7 +131,7 @@ class Signal(Definition):
         if self.quantity in BODY_SIGNALS and self.axis is None:
             raise ValueError(f"{self.quantity} needs 'axis'")
         linear = self.quantity in BODY_SIGNALS[:3]
-        if linear and self.axis in ("roll", "pitch", "yaw"):
+        if linear and self.axis in ANGLES:
             raise ValueError(f"the axis of {self.quantity} is x, y or z")
         if not linear and self.quantity in BODY_SIGNALS and self.axis in ("x", "y", "z"):
             raise ValueError(f"the axis of {self.quantity} is roll, pitch or yaw")
@@ -134,14 +159,48 @@ class Controller(Definition):
 
 
 def with_sources(tables: dict[str, Any]) -> list[Fault]:
-    """Put the texts of laws' files into the plain tables; the faults of reading them."""
+    """Put the texts of laws' files into the plain tables; the faults of reading them.
+
+    A law that is used and has no table of its own, or whose `file` is a bare name, is that of a
+    library: the function of this name in ``laws/NAME.py``.
+    """
     faults: list[Fault] = []
-    laws = tables.get("laws")
-    for name, law in laws.items() if isinstance(laws, Mapping) else ():
+    laws = tables.setdefault("laws", {})
+    for key, name in _used(tables) if isinstance(laws, dict) else ():
+        if name not in laws:
+            if name in library_files("law"):
+                laws[name] = {"file": name}
+            else:
+                known = [*laws, *library_files("law")]
+                allowed = f"a table laws.{name}" + (f"; {nearest(name, known)}" if known else "")
+                faults.append(Fault("", key, f"no law '{name}'", allowed))
+    for name, law in laws.items() if isinstance(laws, dict) else ():
         if not isinstance(law, dict) or not isinstance(law.get("file"), str) or "source" in law:
             continue
+        path = library_files("law").get(law["file"], Path(law["file"]))
         try:
-            law["source"] = read_text(Path(law["file"]), DEFINITION_BYTES)
+            if path.suffix != ".py":
+                found = f"found '{law['file']}'"
+                raise InputError([Fault("", "", found, "a file .py, or the name of a library's")])
+            law["source"] = read_text(path, DEFINITION_BYTES)
+            ast.parse(law["source"])
+            law["file"] = path.name  # results are the same from whatever folder
         except InputError as error:
-            faults += [Fault("", f"laws.{name}.file", f"{f}", "") for f in error.faults]
+            key = f"laws.{name}.file"
+            faults += [Fault("", key, " ".join(filter(None, (f.file, f.found))), f.allowed)
+                       for f in error.faults]  # fmt: skip
+        except (SyntaxError, ValueError) as error:
+            faults.append(Fault("", f"laws.{name}.file", f"{path} is no Python: {error}", ""))
+    if not laws:
+        del tables["laws"]
     return faults
+
+
+def _used(node: Any, at: str = "") -> Iterator[tuple[str, str]]:
+    """Yield key and name of every law that is used in plain tables."""
+    for key, value in node.items() if isinstance(node, dict) else enumerate(node):
+        place = f"{at}.{key}" if at else str(key)
+        if key == "law" and isinstance(value, str):
+            yield place, value
+        elif isinstance(value, dict | list) and place != "laws":
+            yield from _used(value, place)

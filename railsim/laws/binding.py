@@ -1,151 +1,32 @@
-"""Laws of one's own: Python functions of floats, compiled alone and called by the time loop.
+"""From the text of a law to an address that the time loop calls; the loop is not compiled again.
 
-A law is executed only with permission: `allow` or `allowed` (`allow_code=True`, ``--allow-code``,
-``--law FILE``).  What it is compiled to stands at an address that the time loop calls; the loop
-itself is not compiled again.
+A law has one argument there: the address of its block of numbers, first what it gives, then what
+it is given (see `railsim.kernels.own_laws`).
 """
 
 import ast
 import ctypes
-import hashlib
 import inspect
 import linecache
 import logging
 import math
 import os
-import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, InputError
+from railsim.laws.permission import digest, is_allowed
 
-F = TypeVar("F", bound=Callable[..., Any])
-PERMITTED = "RAILSIM_LAWS"
-"""Environment variable with the hashes of permitted sources, for worker processes."""
-ALL = "all"
-KNOWN = "import math\nfrom math import *\n\nimport numpy as np"
-"""What a function that is given in Python knows beside its arguments."""
 MEMORY = "memory"
 KIND = "railsim_law"
 _LOG = logging.getLogger(__name__)
 _bound: dict[tuple[str, ...], "Bound"] = {}
-
-
-def force_element(function: F) -> F:
-    """Mark a function as the law of a force element."""
-    return _marked(function, "force_element")
-
-
-def creep_law(function: F) -> F:
-    """Mark a function as a creep law."""
-    return _marked(function, "creep_law")
-
-
-def friction_law(function: F) -> F:
-    """Mark a function as a law of friction over the slip velocity."""
-    return _marked(function, "friction_law")
-
-
-def controller(function: F) -> F:
-    """Mark a function as a controller."""
-    return _marked(function, "controller")
-
-
-def _marked(function: F, kind: str) -> F:
-    setattr(function, KIND, kind)
-    return function
-
-
-# permission ---------------------------------------------------------------------------------------
-
-
-def digest(source: str) -> str:
-    """Return the hash by which a source is known."""
-    return hashlib.sha256(source.encode()).hexdigest()
-
-
-def allow(*sources: str) -> None:
-    """Permit these sources, or all without any, in this process and those that it starts."""
-    known = [digest(source) for source in sources] or [ALL]
-    present = [one for one in os.environ.get(PERMITTED, "").split(",") if one]
-    os.environ[PERMITTED] = ",".join(dict.fromkeys([*present, *known]))
-
-
-@contextmanager
-def allowed(everything: bool) -> Iterator[None]:
-    """Permit all sources within a block, or change nothing."""
-    before = os.environ.get(PERMITTED)
-    if everything:
-        allow()
-    try:
-        yield
-    finally:
-        if before is None:
-            os.environ.pop(PERMITTED, None)
-        else:
-            os.environ[PERMITTED] = before
-
-
-def is_allowed(source: str) -> bool:
-    """Whether a source may be executed."""
-    known = os.environ.get(PERMITTED, "").split(",")
-    return ALL in known or digest(source) in known
-
-
-def permitted_part(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle without elements whose law is not permitted, to be looked at."""
-    if all(is_allowed(one.source or "") for one in (vehicle.laws or {}).values()):
-        return vehicle
-
-    def stripped(group: dict[str, Any]) -> dict[str, Any]:
-        kept = {n: e for n, e in group.get("elements", {}).items() if e["kind"] != "law"}
-        inner = {n: stripped(a) for n, a in group.get("assemblies", {}).items()}
-        return {**group, "elements": kept, "assemblies": inner}
-
-    tables = stripped(vehicle.model_dump(exclude_none=True))
-    return vehicle.replace(
-        elements=tables["elements"],
-        assemblies=tables["assemblies"],
-        signals=None,
-        controllers=None,
-        laws=None,
-    )
-
-
-def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
-    """Return the law of a function that is written in Python, permitted as it is given here.
-
-    Parameters
-    ----------
-    function : callable
-        Its source has to be readable: of a module, a script or a notebook.  It knows the
-        functions of `math`, numpy as ``np`` and nothing else beside its arguments.
-    compiled : bool
-        Whether it is compiled; called as Python it is slower by far.
-    """
-    name = getattr(function, "__name__", repr(function))
-    try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-        (definition,) = tree.body
-    except (OSError, TypeError, ValueError, SyntaxError):
-        definition = None
-    if not isinstance(definition, ast.FunctionDef) or definition.name != name:
-        found, allowed = "its source cannot be read", "a function of a file, script or notebook"
-        raise InputError([Fault("law", name, found, allowed)])
-    definition.decorator_list = []
-    source = f"{KNOWN}\n\n{ast.unparse(tree)}\n"
-    allow(source)
-    return Law(function=definition.name, source=source, compiled=compiled)
-
-
-# binding ------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -180,6 +61,7 @@ CREEP_LAW = Takes(
     gives=(2, 3),
 )
 FRICTION_LAW = Takes("a friction law", ("slip", "speed"))
+EXCITATION = Takes("an excitation", ("s",))
 
 
 @dataclass(frozen=True)
@@ -208,6 +90,28 @@ class Bound:
     further: tuple[str, ...]
     defaults: Mapping[str, float]
     kept: tuple[Any, ...]
+
+    def values(self, given: NDArray[np.float64], parameters: Sequence[float]) -> Any:
+        """What a law of one value gives, called beside the loop.
+
+        Parameters
+        ----------
+        given : float64[n, number of its arguments]
+        parameters : sequence of float
+            As `parameters` returns them.
+
+        Returns
+        -------
+        float64[n]
+        """
+        n, k = given.shape
+        block, found = np.array([0.0] * (1 + k) + list(parameters)), np.empty(n)
+        function, place = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self.address), block.ctypes.data
+        for row in range(n):
+            block[1 : 1 + k] = given[row]
+            function(place)
+            found[row] = block[0]
+        return found
 
     def parameters(self, key: str, given: Mapping[str, float]) -> list[float]:
         """Values of its parameters in their order.

@@ -1,0 +1,90 @@
+"""An irregularity by a law of one's own."""
+
+from collections.abc import Callable
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import Finite, Name, NonNegative
+from railsim.definitions.excitations.base import (
+    MIRROR,
+    SHARES,
+    Array,
+    Channel,
+    Displacement,
+    Irregular,
+    faded,
+)
+
+PER_WAVE = 200  # differences of the rate over the shortest wave; error 3e-8 of it
+
+
+class ByLaw(Irregular):
+    """What a law of one's own gives over the arc length."""
+
+    type: Literal["law"]
+    law: Name
+    """Name of the law in the table `laws`, or of a library"""
+    channel: Channel = "vertical"
+    """Which of the four irregularities: both rails to the right or down, the left rail higher, or
+    the rails apart"""
+    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    """Values of the function's further arguments, by name"""
+    factor: Finite = 1.0
+    """Factor of what it gives [1]"""
+    shortest: Annotated[Finite, Field(ge=0.2, le=1000.0)]
+    """Shortest wavelength in it [m]"""
+    begin: Finite = 0.0
+    """Arc length where it begins [m]"""
+    end: Finite | None = None
+    """Arc length where it ends [m]; by default that of the plan"""
+    fade: NonNegative = 10.0
+    """Length over which it fades in and out within its ends [m]"""
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if self.end is not None and self.end <= self.begin:
+            raise ValueError("'end' must lie behind 'begin'")
+        return self
+
+    def mirrored(self) -> Self:
+        """Return the mirror image: what goes to the right or rises on the left is turned round."""
+        return self.model_copy(update={"factor": MIRROR[self.channel] * self.factor})
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.begin, length if self.end is None else self.end
+
+    def resolution(self) -> float:
+        """Return a sixteenth of the shortest wavelength [m]."""
+        return self.shortest / 16.0
+
+    def summary(self) -> str:
+        """Return channel and law."""
+        return f"{self.channel} by the law '{self.law}'"
+
+    def displacement(self, length: float) -> Displacement:
+        """Refuse: a definition executes nothing, see `railsim.track.irregularity`."""
+        raise NotImplementedError
+
+    def displacement_by(self, function: Callable[[Array], Array], length: float) -> Displacement:
+        """Return how it moves the rails, its rate by central differences of order 4.
+
+        Parameters
+        ----------
+        function : callable
+            What the law gives at some arc lengths [m].
+        length : float
+            Length of the track's plan [m].
+        """
+        h, (begin, end) = self.shortest / PER_WAVE, self.extent(length)
+        shares = self.factor * np.array(SHARES[self.channel])[:, None]
+        if self.channel == "cross_level":
+            shares *= 0.5  # each rail has half of the difference
+
+        def moved(s: Array) -> tuple[Array, Array]:
+            at = {k: function(np.clip(s + k * h, begin, end)) for k in (-2, -1, 0, 1, 2)}
+            return shares * at[0], shares * (8.0 * (at[1] - at[-1]) - at[2] + at[-2]) / (12.0 * h)
+
+        return faded(moved, begin, end, self.fade)

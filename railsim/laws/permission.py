@@ -1,0 +1,77 @@
+"""Permission to execute laws: of which sources, in this process and those that it starts."""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+
+D = TypeVar("D", Vehicle, Track)
+PERMITTED = "RAILSIM_LAWS"
+"""Environment variable with the hashes of permitted sources, for worker processes."""
+ALL = "all"
+
+
+def digest(source: str) -> str:
+    """Return the hash by which a source is known."""
+    return hashlib.sha256(source.encode()).hexdigest()
+
+
+def allow(*sources: str) -> None:
+    """Permit these sources, or all without any, in this process and those that it starts."""
+    known = [digest(source) for source in sources] or [ALL]
+    present = [one for one in os.environ.get(PERMITTED, "").split(",") if one]
+    os.environ[PERMITTED] = ",".join(dict.fromkeys([*present, *known]))
+
+
+@contextmanager
+def allowed(everything: bool) -> Iterator[None]:
+    """Permit all sources within a block, or change nothing."""
+    before = os.environ.get(PERMITTED)
+    if everything:
+        allow()
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(PERMITTED, None)
+        else:
+            os.environ[PERMITTED] = before
+
+
+def is_allowed(source: str) -> bool:
+    """Whether a source may be executed."""
+    known = os.environ.get(PERMITTED, "").split(",")
+    return ALL in known or digest(source) in known
+
+
+def refused(definition: Vehicle | Track) -> list[str]:
+    """Return the names of its laws that are not permitted."""
+    laws = (definition.laws or {}).items()
+    return [name for name, one in laws if not is_allowed(one.source or "")]
+
+
+def permitted_part(definition: D) -> D:
+    """Return a vehicle or track without what a law that is not permitted does, to be looked at."""
+    if not refused(definition):
+        return definition
+    if isinstance(definition, Track):
+        kept = [part for part in definition.irregularities if part.type != "law"]
+        return definition.replace(irregularities=kept, laws=None)
+
+    def stripped(group: dict[str, Any]) -> dict[str, Any]:
+        kept = {n: e for n, e in group.get("elements", {}).items() if e["kind"] != "law"}
+        inner = {n: stripped(a) for n, a in group.get("assemblies", {}).items()}
+        return {**group, "elements": kept, "assemblies": inner}
+
+    tables = stripped(definition.model_dump(exclude_none=True))
+    return definition.replace(
+        elements=tables["elements"],
+        assemblies=tables["assemblies"],
+        signals=None,
+        controllers=None,
+        laws=None,
+    )
