@@ -1,6 +1,7 @@
 """Units of FMI 3.0: written, run by FMPy in a process of its own, and as controller of a run."""
 
 import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -15,7 +16,7 @@ from railsim.errors import InputError
 from railsim.fmi import Controller, fmu
 
 pytest.importorskip("pythonfmu3", reason="no PythonFMU3")
-pytest.importorskip("fmpy", reason="no FMPy")
+validate_fmu = pytest.importorskip("fmpy.validation", reason="no FMPy").validate_fmu
 
 WAY = {"speed": 20.0, "start": 300.0, "until": 330.0}
 OUTPUTS = ["Q:1", "wheelset_lateral:1", "body_acceleration:carbody:y"]
@@ -125,6 +126,8 @@ def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
         contents = [archive.read(n) for n in archive.namelist() if n.startswith("resources/")]
     assert f"Python that has railsim {railsim.__version__}" in description.replace("\n", " ")
     assert '<BaseUnit kg="1" m="1" s="-2"/>' in description
+    assert re.search('<Float64 name="push"[^>]* unit="N"/>', description)
+    assert validate_fmu(str(unit)) == []
     assert not any(str(unit.parent).encode() in content for content in contents)
 
 

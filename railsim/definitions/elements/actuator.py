@@ -100,10 +100,9 @@ class Actuator(CommandedElement):
     @property
     def command_unit(self) -> str:
         """SI unit of its command."""
-        linear = self.acts not in ("roll", "pitch", "yaw")
-        return {"force": ("N m", "N"), "damper": ("N m s/rad", "N s/m"), "position": ("rad", "m")}[
-            self.command
-        ][linear]
+        turning = {"damper": "N m s/rad", "position": "rad"}.get(self.command, "N m")
+        linear = {"damper": "N s/m", "position": "m"}.get(self.command, "N")
+        return turning if self.acts in ("roll", "pitch", "yaw", "axle") else linear
 
     def rows(self) -> list[Act]:
         """One actuator."""
