@@ -33,6 +33,46 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_stability_commands.py::test_linear_critical_speed",
+        "interface/test_examples.py::"
+        "test_example_runs_and_draws_its_picture[16_how_loud_is_this_flat]",
+        "interface/test_examples.py::test_example_runs_and_draws_its_picture[12_tilting]",
+        "interface/test_examples.py::"
+        "test_example_runs_and_draws_its_picture[10_study_friction_speed]",
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[whole.py]",
+        "interface/test_mechanism.py::test_a_motion_is_written_with_every_link_and_actuator",
+        "interface/test_manual.py::test_tables_of_the_curving_study_are_up_to_date[flexicoil]",
+        "interface/test_check_step.py::test_check_in_json_is_the_difference_of_two_runs",
+        "interface/test_simulation.py::test_changing_speed_has_the_same_bits[0.25-drive0]",
+        "interface/test_simulation.py::test_changing_speed_has_the_same_bits[None-drive0]",
+        "interface/test_simulation.py::test_changing_speed_has_the_same_bits[None-drive1]",
+        "interface/test_wear.py::test_straight_above_the_critical_speed_is_a_remark[30.0-False]",
+        "verification/test_critical_speed.py::test_critical_speed_over_amplitude_and_its_smallest",
+        "verification/test_model_validation.py::"
+        "test_the_command_writes_its_files_and_fails_on_request",
+        "verification/test_identification.py::"
+        "test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white",
+        "verification/test_compliant_rails.py::"
+        "test_what_lateral_compliance_of_the_rails_costs[coach_flexicoil-7.1-1.5]",
+        "verification/test_ensemble.py::"
+        "test_one_speed_table_and_outputs_in_equal_steps_of_distance",
+        "verification/test_ensemble.py::test_runge_kutta",
+        "verification/test_ensemble.py::test_the_one_that_finds_no_step_on_the_way_fails_by_itself",
+        "verification/test_linear_contact.py::"
+        "test_a_run_from_the_modes_own_shape_decays_with_its_damping[6.0-coach_manchester]",
+        "verification/test_hollow_wheels.py::"
+        "test_coach_on_hollow_wheels_runs_the_same_with_half_the_step[0.0025-0.025-ballasted-250.0-20.0]",
+        "verification/test_rail_wear.py::test_rails_wear_over_the_tonnage_of_a_mix",
+        "verification/test_creep_law_runs.py::"
+        "test_friction_that_falls_by_nothing_or_at_once[table]",
+        "verification/test_creep_law_runs.py::test_mirrored_track_gives_the_mirrored_run[polach]",
+        "verification/test_creep_law_runs.py::"
+        "test_third_body_softens_and_keeps_the_friction[table]",
+        "verification/test_library.py::"
+        "test_vehicle_runs_its_track_at_the_permitted_speed[wagon_three_piece_25t-curve_r250-480.0]",
+        "reference/test_gritti_pantograph.py::test_a21_better_lift_4_from_every_seed_new[2]",
+        "reference/test_gritti_pantograph.py::"
+        "test_no_seed_ends_above_the_published_design_reconstructed[1-1]",
         "interface/test_docs.py::test_blocks_of_a_page_run_in_their_order[docs/user/stability.md]",
         "interface/test_benchmarks.py::test_script_runs_in_its_small_form[mechanisms.py]",
         "interface/test_benchmarks.py::test_script_runs_in_its_small_form[springs.py]",
@@ -58,4 +98,4 @@ LONG = frozenset(
         "test_a_heavy_bridge_under_the_coach_deflects_as_under_its_loads[25.0]",
     }
 )
-"""Tests of four seconds and more beside shorter ones of the same thing; marked `further`."""
+"""Tests of two seconds and more beside shorter ones of the same thing; marked `further`."""
