@@ -33,6 +33,7 @@ FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first
 SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
 CLOSE, MOST_TIMES = 0.1, 4  # standard deviations; times that derivatives are taken at the solution
+SAME = 3e-3  # change of a coordinate up to which derivatives are the same
 PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
 ALONG = 20.0  # m, within which the place of a run is looked for
@@ -193,7 +194,7 @@ def _with_own_derivatives(
     -------
     x : Floats
     change : float
-        The last change of a parameter in standard deviations.
+        The last change of a parameter in standard deviations; 0 where the derivatives are the same.
     """
     change = np.inf
     for _ in range(MOST_TIMES):
@@ -201,6 +202,8 @@ def _with_own_derivatives(
         before, (x, _) = x, _least(problem, x, bounds, loss, FINE)
         deviations = np.sqrt(np.diag(_covariance(problem, x, jacobian)[0]))
         change = float(np.max(np.abs(x - before) / deviations))
+        if np.max(np.abs(x - before)[: problem.count]) < SAME:
+            change = 0.0
         if change < CLOSE:
             break
     return x, change

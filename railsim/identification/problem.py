@@ -1,10 +1,11 @@
 """The least-squares problem: residuals and their derivatives at some coordinates.
 
 Each coordinate is that of a parameter, followed by the shift [m] and stretch [1] of each run's
-arc length where its place on the track is sought too.  A derivative is a forward difference of two
-simulated runs; those to the place come from the splines of one.  They change slowly, so that those
-of a point serve its neighbourhood (chord method).  Evaluations are kept in a folder, if one is
-given, so that an identification that was interrupted goes on where it was.
+arc length where its place on the track is sought too.  A derivative is a difference of simulated
+runs, forward in the search and central at its end; those to the place come from the splines of one.
+They change slowly, so that those of a point serve its neighbourhood (chord method).  Evaluations
+are kept in a folder, if one is given, so that an identification that was interrupted goes on where
+it was.
 """
 
 import hashlib
@@ -23,7 +24,7 @@ from railsim.identification.runs import Prepared
 from railsim.identification.variants import Task, Workers
 
 Floats = NDArray[np.float64]
-STEP = 0.03  # of a coordinate, for differences: sticking and cells of the contact are not smooth
+STEP = 0.02  # of a coordinate, for differences: sticking and cells of the contact are not smooth
 STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
 NEAR = 0.03  # change of a coordinate up to which derivatives serve
 LARGEST_KEPT = 2_000_000_000  # bytes
@@ -63,6 +64,7 @@ class Problem:
     _inputs: str = ""
     _last: dict[str, Floats] = field(default_factory=dict)
     _derived: Floats | None = None  # where the derivatives were taken
+    _central: bool = False  # whether those are central
 
     def __post_init__(self) -> None:
         digest = hashlib.sha256()
@@ -119,7 +121,7 @@ class Problem:
         """
         wanted = [(x, k, self.place) for k in range(len(self.runs))]
         if ahead and any(self._kept(*one) is None for one in wanted):
-            wanted += self._variants(x)[0]
+            wanted += self._variants(x, central=False)[0]
         return self._evaluated(wanted)[: len(self.runs)]
 
     def tried(self, x: Floats) -> Floats:
@@ -139,25 +141,29 @@ class Problem:
     def derivatives_near(self, x: Floats) -> Floats:
         """Return derivatives of `vector` at a point near by, if they are known."""
         if self._derived is None or not self._is_near(x):
-            self._derived = x.copy()
-        return self.jacobian(self._derived)
+            # levels bend more than histories do
+            self._derived, self._central = x.copy(), self.form.kind != "history"
+        return self.jacobian(self._derived, central=self._central)
 
     def derivatives_at(self, x: Floats) -> Floats:
-        """Return derivatives of `vector` at a point, which then serve its neighbourhood."""
-        self._derived = x.copy()
-        return self.jacobian(x)
+        """Return central derivatives of `vector` at a point, which then serve its neighbourhood."""
+        self._derived, self._central = x.copy(), True
+        return self.jacobian(x, central=True)
 
-    def _variants(self, x: Floats) -> tuple[list[tuple[Floats, int, bool]], list[float]]:
-        """Return what is simulated for the derivatives, and the step of each parameter."""
+    def _variants(
+        self, x: Floats, *, central: bool
+    ) -> tuple[list[tuple[Floats, int, bool]], list[tuple[int, float]]]:
+        """Return what is simulated for the derivatives: of each parameter one step or two."""
         wanted: list[tuple[Floats, int, bool]] = []
         steps = []
         for k, parameter in enumerate(self.parameters):
-            # inwards at a bound
-            step = STEP if x[k] + STEP <= parameter.bounds[1] else -STEP
-            moved = x.copy()
-            moved[k] += step
-            steps.append(step)
-            wanted += [(moved, number, False) for number in range(len(self.runs))]
+            low, high = parameter.bounds
+            inside = [step for step in (STEP, -STEP) if low <= x[k] + step <= high]
+            for step in inside if central else inside[:1]:
+                moved = x.copy()
+                moved[k] += step
+                steps.append((k, step))
+                wanted += [(moved, number, False) for number in range(len(self.runs))]
         return wanted, steps
 
     def residuals(self, x: Floats) -> list[list[Floats]]:
@@ -183,17 +189,18 @@ class Problem:
         known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
         return np.array([-x[k] / (self.parameters[k].spread or 1.0) for k in known])
 
-    def jacobian(self, x: Floats) -> Floats:
+    def jacobian(self, x: Floats, *, central: bool) -> Floats:
         """Return the derivatives of `vector`, float64[residual, coordinate]."""
         self._bases(x, ahead=True)
         base = self.series(x)
-        wanted, steps = self._variants(x)
+        wanted, steps = self._variants(x, central=central)
         series = self._evaluated(wanted)
         placed = self.placed(x)
         columns = np.zeros((len(self.vector(x)), self.size))
-        for k, step in enumerate(steps):
-            own = series[k * len(self.runs) : (k + 1) * len(self.runs)]
-            columns[:, k] = self._difference(placed, base, own, step)
+        for number, (k, step) in enumerate(steps):
+            own = series[number * len(self.runs) : (number + 1) * len(self.runs)]
+            sides = sum(one == k for one, _ in steps)
+            columns[:, k] += self._difference(placed, base, own, step) / sides
         for number, one in enumerate(placed if self.place else []):
             slope = self._bases(x)[number][len(one.names) :]
             along = one.run.at - one.run.at[0]

@@ -55,21 +55,30 @@ def quarter(**elements):
     })  # fmt: skip
 
 
-def measured(folder, vehicle, factors=None, *, seed=1, noise=0.02, stated=True, name="run"):
-    """Write a measured run of a vehicle with some parameters off."""
+def measured(folder, vehicle, factors=None, *, seed=1, noise=0.02, stated=True, name="run",
+             load=None, drive=None, hum=0.0):  # fmt: skip
+    """Write a measured run of a vehicle with some parameters off; hum of 9 Hz on its body."""
     factors = factors or {}
     keys = parsed(factors, vehicle, TRACK) if factors else []
     true = Model(vehicle, TRACK).with_parameters(keys, np.log(list(factors.values())))
     low_pass = {"frequency": 60.0}
     outputs = {"sensors": "readings", "quantities": ["distance"], "low_pass": low_pass}
-    settings = railsim.Settings.model_validate({"output_rate": RATE, "outputs": outputs})
-    run = railsim.simulate(true.vehicle, TRACK, speed=SPEED, until=LENGTH, settings=settings)
+    how = {"output_rate": RATE, "outputs": outputs}
+    if drive:
+        how |= {"drive": {"mode": "table", "speed_table": drive}}
+        del outputs["low_pass"]
+    settings = railsim.Settings.model_validate(how)
+    loaded = true.vehicle.with_values({"load": load}) if load else true.vehicle
+    run = railsim.simulate(loaded, TRACK, speed=SPEED, until=LENGTH, settings=settings)
     rng = np.random.default_rng(seed)
     columns, lines = {"t": run.time, "s": run.distance}, []
+    columns["v"] = np.gradient(run.distance, run.time)
     for channel in ("on_frame", "on_body", "axlebox_1_left"):
         x = run.series("sensor_acceleration", sensor=channel, axis="z")
         level = noise * float(np.std(x))
         columns[channel] = x + level * rng.standard_normal(len(x))
+        if channel == "on_body":
+            columns[channel] += hum * np.std(x) * np.sin(2.0 * np.pi * 9.0 * run.time)
         own = f", noise = {level}" if stated else ""
         lines.append(f'{channel} = {{ quantity = "sensor_acceleration:{channel}:z"{own} }}')
     rows = zip(*columns.values(), strict=True)
@@ -78,8 +87,9 @@ def measured(folder, vehicle, factors=None, *, seed=1, noise=0.02, stated=True, 
     TRACK.save(folder / "track.toml", overwrite=True)
     (folder / f"{name}.toml").write_text(
         f'format = "railsim-measurement/1"\nname = "{name}"\nfile = "{name}.csv"\n'
-        f'track = "track.toml"\nspeed = {SPEED}\n[channels]\n'
-        't = { quantity = "time" }\ns = { quantity = "distance" }\n' + "\n".join(lines)
+        f'track = "track.toml"\n' + (f'load = "{load}"\n' if load else "") + "[channels]\n"
+        't = { quantity = "time" }\nv = { quantity = "speed" }\ns = { quantity = "distance" }\n'
+        + "\n".join(lines)
     )
     return folder / f"{name}.toml"
 
@@ -135,6 +145,27 @@ def test_the_fitted_file_extends_the_original(found, tmp_path):
         one.save_vehicle(path)
     whole = one.save_vehicle(tmp_path / "whole.toml")
     assert railsim.load_vehicle(whole) == one.fitted
+
+
+@pytest.mark.further
+def test_runs_of_other_speed_and_load_at_once_by_the_command(tmp_path):
+    """Empty at constant speed, laden while it speeds up, with a hum that the model has not."""
+    laden = {"loads": {"laden": {"bodies": {"body": {"mass": 12000.0}}}}}
+    vehicle = Vehicle.model_validate({**quarter().model_dump(exclude_none=True), **laden})
+    (tmp_path / "quarter.toml").write_text(vehicle.to_toml())
+    empty = measured(tmp_path, vehicle, FACTORS, name="empty", hum=0.5)
+    rising = [[0.0, 18.0], [60.0, 19.0], [120.0, 22.0], [200.0, 23.0]]
+    full = measured(tmp_path, vehicle, FACTORS, name="full", load="laden", drive=rising)
+    keys = ",".join(FACTORS)
+    arguments = ["identify", str(tmp_path / "quarter.toml"), str(empty), str(full), "--json"]
+    more = ["-p", keys, "--band", "0.5:14", "--workers", "1", "--loss", "soft_l1"]
+    done = CliRunner().invoke(
+        command_line, [*arguments, *more], standalone_mode=False, catch_exceptions=False
+    )
+    record = json.loads(done.output)
+    assert {one["run"] for one in record["channels"]} == {"empty", "full"}
+    factors = [one["factor"] for one in record["parameters"]]
+    assert factors == pytest.approx(list(FACTORS.values()), rel=0.01)
 
 
 def in_series():
