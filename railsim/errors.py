@@ -7,7 +7,8 @@ range of validity.
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
@@ -165,6 +166,32 @@ class InputError(RailsimError):
             found[MOST_FAULTS:] = [Fault(found[-1].file, "", f"{more} more faults", "")]
         self.faults = tuple(found)
         super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+class Faults(list[Fault]):
+    """Faults that are collected, to be raised together.
+
+    Examples
+    --------
+    >>> faults = Faults()
+    >>> with faults.caught():
+    ...     raise InputError([Fault("a.toml", "mass", "-1", "above 0")])
+    >>> len(faults)
+    1
+    """
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Collect the faults of an `InputError` that ends the block."""
+        try:
+            yield
+        except InputError as error:
+            self.extend(error.faults)
+
+    def check(self) -> None:
+        """Raise them as an `InputError`, if there are any."""
+        if self:
+            raise InputError(self)
 
 
 class ModelError(RailsimError):

@@ -30,6 +30,13 @@ BEGINNINGS = ("RAILSIM_", "NUMBA_", "XDG_", "PYTHON", "OPENBLAS_", "MKL_", "OMP_
 _environment: dict[str, str] = {}  # of the server; empty before it begins
 
 
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def begin_server() -> None:
     """Let the server begin, to be there when workers are wanted; once is enough."""
     if _environment or not FORKSERVER:

@@ -15,11 +15,11 @@ from PIL import Image
 
 import railsim
 from generators.filling import filled, table
-from railsim.cli.library import MEANING, text_with_bases, trust
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.description.library import MEANING, text_with_bases, trust
 from railsim.files.sources import read_toml, shipped_folder
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium

@@ -1,14 +1,19 @@
 """Assessments as tables: estimates of each zone, comfort, wear and safety of each run."""
 
-from collections.abc import Sequence
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from railsim.assessment.assess import Assessment
 from railsim.assessment.comfort_report import PointComfort
+from railsim.assessment.criteria import WORDS
 from railsim.assessment.safety_report import SafetyReport
 from railsim.assessment.wear import LAWS
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.table import Amount, Column, Table
+from railsim.text import counted_remarks, spreadsheet_cell
 
 SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
 
@@ -102,3 +107,59 @@ def _safety(run: str, report: SafetyReport) -> list[Table]:
     ]
     bogies = [Column("bogie"), Column("overturning", format=".3f")]
     return [Table(wheels, rows), Table(bogies, list(report.overturning.items()))]
+
+
+def assessment_csv(assessments: Sequence[Assessment]) -> str:
+    """Return one line for each zone, quantity and location, for spreadsheets; SI."""
+    rows = [row for assessment in assessments for row in _csv_rows(assessment)]
+    text = io.StringIO()
+    columns = list(dict.fromkeys(column for row in rows for column in row))
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: spreadsheet_cell(cell) for name, cell in row.items()} for row in rows)
+    return text.getvalue()
+
+
+def _csv_rows(assessment: Assessment) -> Iterator[dict[str, Any]]:
+    head = {"vehicle": assessment.vehicle, "standard": assessment.standard}
+    for zone in assessment.zones:
+        for row in (*zone.rows, *zone.information):
+            yield {**head, "zone": zone.zone, "population": zone.population.name, **row.record()}
+    data: Any = assessment.record()
+    for kind in ("comfort", "wear"):
+        for run, points in data[kind].items():
+            for point in points:
+                yield {**head, "run": run, **_flat(point)}
+    for run, report in data["safety"].items():
+        for wheel in report["wheels"]:
+            yield {**head, "run": run, **wheel}
+
+
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, list):
+            value = dict(enumerate(value))
+        if isinstance(value, dict):
+            found |= {f"{name}_{key}": member for key, member in value.items()}
+        else:
+            found[name] = value
+    return found
+
+
+def assessment_lines(assessment: Assessment, *, quiet: bool) -> list[str | Table]:
+    """Return what is printed of an assessment: verdict, each of its parts with reasons, tables."""
+    edition = f", {assessment.limits.edition}" if assessment.limits else ""
+    runs = f"{len(assessment.runs)} run{'s' * (len(assessment.runs) > 1)}"
+    lines: list[str | Table] = [f"{assessment.vehicle}{edition}, {runs}"]
+    if assessment.verdict:
+        deciding = getattr(assessment.limits, "deciding", ())
+        lines.append(f"verdict: {assessment.verdict}")
+        for name, verdict in assessment.verdicts.items():
+            note = "" if name in deciding else " (for information)"
+            lines.append(f"  {WORDS[name]}{note}: {verdict.value}")
+        lines += [f"    {reason}" for reason in assessment.reasons]
+    for table in tables(assessment):
+        lines += ["", table]
+    remarks = [] if quiet else counted_remarks(("", remark) for remark in assessment.remarks)
+    return [*lines, *[""] * (not quiet), *(f"remark: {one}" for one in remarks)]

@@ -64,6 +64,7 @@ COMMANDS = {
     "info": "Contents of a vehicle, track or result file on one screen.",
     "bench": "The runtime benchmark on this machine.",
 }
+SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 MODULES = {"list": "library"}  # others are called as their commands
 
 
@@ -108,7 +109,9 @@ class LazyGroup(click.Group):
             formatter.write_dl([*COMMANDS.items()])
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "show_default": True}
+)
 @click.version_option(__version__, prog_name="railsim")
 def railsim() -> None:
     """Simulate the dynamics of rail vehicles.

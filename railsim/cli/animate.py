@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import output_options, report_file
-from railsim.files.access import TABLE_BYTES, check_file, read_text
+from railsim.cli.output import Output, output_options
+from railsim.errors import Fault, Faults, InputError
+from railsim.files.access import TABLE_BYTES, read_text
 
 if TYPE_CHECKING:
     from railsim.animation import Scene
@@ -29,21 +30,15 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 @click.option(
     "--frames", type=click.IntRange(2, 20_000), metavar="N", help="Maximum number of frames."
 )
-@click.option("--fps", type=click.IntRange(1, 100), default=20, show_default=True,
-              help="Frames per second of a film.")  # fmt: skip
-@click.option("--gain", type=click.FloatRange(0.0, 1000.0), default=1.0, show_default=True,
-              help="Magnification of the motion of the bodies in a film.")  # fmt: skip
-@output_options
-def command(
-    file: str,
-    out: str | None,
-    fps: int,
-    gain: float,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-    **how: Any,
-) -> None:
+@click.option("--fps", type=click.IntRange(1, 100), default=20, help="Frames per second of a film.")
+@click.option(
+    "--gain",
+    type=click.FloatRange(0.0, 1000.0),
+    default=1.0,
+    help="Magnification of the motion of the bodies in a film.",
+)
+@output_options()
+def command(file: str, fps: int, gain: float, output: Output, **how: Any) -> None:
     """Animate a run or a mode as one HTML page or as a film.
 
     The page is self-contained: it plays, zooms and rotates in any browser, also without a network.
@@ -55,18 +50,14 @@ def command(
     """  # noqa: D301 - click reads the escape  # fmt: skip
     from railsim.animation import write_movie, write_page
 
-    path = Path(out or file)
-    if not out and path.name:
-        path = path.with_suffix(".html")
-    check_file(path, overwrite=overwrite, endings=ENDINGS)
+    path, overwrite = output.file(file, ENDINGS, suffix=".html"), output.overwrite
     film = path.suffix.lower() in (".gif", ".mp4")
     scene = _scene(Path(file), film=film, **how)
     if film:
         write_movie(scene, path, frames_per_second=fps, gain=gain, overwrite=overwrite)
     else:
         write_page(scene, path, overwrite=overwrite)
-    frames = len(scene.time)
-    report_file(path, as_json=as_json, quiet=quiet, frames=frames, title=scene.title)
+    output.wrote(path, frames=len(scene.time), title=scene.title)
 
 
 def _scene(
@@ -80,18 +71,15 @@ def _scene(
 ) -> "Scene":
     from railsim.animation import mode_scene, result_scene
     from railsim.animation.scene import FRAMES, chosen_mode
-    from railsim.errors import Fault, InputError
 
     if file.suffix.lower() != ".json":
         from railsim.result import open_run
 
-        wrong = [
+        Faults(
             Fault(option, "", "belongs to a mode", "give the JSON of railsim modes")
             for option, value in (("--vehicle", vehicle), ("--mode", mode))
             if value
-        ]
-        if wrong:
-            raise InputError(wrong)
+        ).check()
         return result_scene(
             open_run(file), frames=frames or (200 if film else FRAMES), between=between
         )
@@ -110,8 +98,6 @@ def _read(file: Path) -> dict[str, Any]:
     """Read what ``railsim modes --json`` printed; of several speeds the first."""
     import json
 
-    from railsim.errors import Fault, InputError
-
     try:
         data: Any = json.loads(read_text(file, TABLE_BYTES))
     except (ValueError, RecursionError) as error:
@@ -119,10 +105,9 @@ def _read(file: Path) -> dict[str, Any]:
     if isinstance(data, list) and data:
         data = data[0]
     modes = data.get("modes") if isinstance(data, dict) else None
-    if not isinstance(modes, list) or not modes or not all(
-        isinstance(m, dict) and {"name", "frequency", "damping_ratio", "shape"} <= set(m)
-        for m in modes
-    ):  # fmt: skip
+    known = {"name", "frequency", "damping_ratio", "shape"}
+    complete = isinstance(modes, list) and all(isinstance(m, dict) and known <= {*m} for m in modes)
+    if not modes or not complete:
         allowed = "the JSON of railsim modes"
         raise InputError([Fault(str(file), "modes", "missing or incomplete", allowed)])
     checked: dict[str, Any] = data

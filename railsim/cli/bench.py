@@ -2,15 +2,14 @@
 
 import click
 
-from railsim.cli.common import echo, json_option, print_json, show
+from railsim.cli.output import Output, answer_options
 from railsim.cli.progress import progress_bar
 
 
 @click.command()
 @click.option("--quick", is_flag=True, help="No errors, which take most of the time.")
-@json_option
-@click.option("--quiet", is_flag=True, help="No progress bar.")
-def command(quick: bool, as_json: bool, quiet: bool) -> None:
+@answer_options
+def command(quick: bool, output: Output) -> None:
     """Measure the speed of railsim on this machine, and the error at that speed.
 
     Two coaches through a curve and one on irregular rails, in multiples of real time of the time
@@ -25,15 +24,12 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
     """  # noqa: D301 - click reads the escape
     from railsim.bench.runs import benchmark, table
 
-    with progress_bar("bench", quiet=quiet) as progress:
+    with progress_bar("bench", quiet=output.quiet) as progress:
         found = benchmark(errors=not quick, progress=progress)
-    if as_json:
-        print_json(found)
-        return
-    facts = found["hardware"]
-    echo(
+    facts, versions = found["hardware"], found["versions"].items()
+    machine = (
         f"{facts['processor']}, {facts['cores']} cores, {facts['memory']}, {facts['system']}; "
         f"FASTSIM's vectors: {facts['vectors']}"
     )
-    echo(", ".join(f"{name} {number}" for name, number in found["versions"].items()))
-    show("", table(found["runs"]))
+    programs = ", ".join(f"{name} {number}" for name, number in versions)
+    output.answer(found, [machine, programs, "", table(found["runs"])])

@@ -5,8 +5,10 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -120,30 +122,54 @@ set_option = click.option(
 load_option = click.option(
     "--load", metavar="NAME", help="Load case of the vehicle; by default its design load."
 )
+workers_option = click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Number of processes; default: all cores.",
+)
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on."
+)
+fail_option = click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
+rails_option = click.option(
+    "--track", metavar="F", help="Rails, gauge, friction, support; default straight."
+)
+vehicle_argument = click.argument("vehicle", shell_complete=names_of("vehicle"))
+track_argument = click.argument("track", shell_complete=names_of("track"))
+optional_track = click.argument(
+    "track", metavar="[TRACK]", required=False, shell_complete=names_of("track")
+)
 
 
-def _allow_code(ctx: click.Context, param: click.Parameter, given: bool) -> None:
-    if given:
-        from railsim.laws.permission import allow
+def extent_options(function: F) -> F:
+    """Add ``--start``, ``--duration``, ``--until``."""
+    for option, metavar, words in (
+        ("--until", "S", "End of the run in m along the track."),
+        ("--duration", "T", "Length of the run in s."),
+        ("--start", "S", "Start in m along the track; default 0."),
+    ):
+        function = click.option(option, type=float, metavar=metavar, help=words)(function)
+    return function
 
-        allow()
 
-
-def _allow_files(ctx: click.Context, param: click.Parameter, files: tuple[str, ...]) -> None:
+def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
+    """Permit laws of one's own: all that the files name, or those of some files."""
     if files:
         from railsim.files.access import DEFINITION_BYTES, read_text
         from railsim.files.sources import library_files
         from railsim.laws.permission import allow
 
-        named = library_files("law")
-        allow(*(read_text(named.get(file, Path(file)), DEFINITION_BYTES) for file in files))
+        known = {} if files is True else library_files("law")
+        paths = [] if files is True else [known.get(file, Path(file)) for file in files]
+        allow(*(read_text(path, DEFINITION_BYTES) for path in paths))
 
 
 allow_code_option = click.option(
     "--allow-code",
     is_flag=True,
     expose_value=False,
-    callback=_allow_code,
+    callback=_allow,
     help="Execute the Python code of laws that the files name.",
 )
 
@@ -155,15 +181,35 @@ def code_options(function: F) -> F:
         multiple=True,
         metavar="FILE",
         expose_value=False,
-        callback=_allow_files,
+        callback=_allow,
         help="Execute the laws of this file, or of this name; may be given several times.",
     )
     return allow_code_option(files(function))
 
 
-def output_options(function: F) -> F:
-    """Add ``--overwrite``, ``--json``, ``--quiet``."""
-    return overwrite_option(json_option(quiet_option(function)))
+def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:
+    """Return what adds options to a command, which takes their values as one object.
+
+    Parameters
+    ----------
+    name : str
+        Parameter of the command.
+    kind : type
+        Dataclass of the object, with the options' parameters as its fields.
+    """
+    keys = [field.name for field in fields(kind) if field.init]
+
+    def add(function: F) -> F:
+        @wraps(function)
+        def command(**values: Any) -> Any:
+            own = {key: values.pop(key) for key in keys if key in values}
+            return function(**values, **{name: kind(**own)})
+
+        for option in reversed(options):
+            command = option(command)
+        return command  # type: ignore[return-value]
+
+    return add
 
 
 def linearisation_options(function: F) -> F:
@@ -171,7 +217,6 @@ def linearisation_options(function: F) -> F:
     linearisation = click.option(
         "--linearisation",
         default="tangent",
-        show_default=True,
         type=click.Choice(["tangent", "harmonic"]),
         help="Contact: its derivative, or its first harmonic for --amplitude.",
     )
@@ -179,16 +224,10 @@ def linearisation_options(function: F) -> F:
         "--amplitude",
         type=float,
         default=3e-3,
-        show_default=True,
         metavar="A",
         help="Lateral amplitude of the wheelsets in m, for harmonic.",
     )
     return linearisation(amplitude(function))
-
-
-def with_load(assignments: Sequence[str], load: str | None, prefix: str = "") -> tuple[str, ...]:
-    """Return the assignments with that of a load case."""
-    return (*assignments, f"{prefix}load={load}") if load is not None else tuple(assignments)
 
 
 @contextmanager
@@ -233,11 +272,3 @@ def plain(data: Any) -> Any:
     if isinstance(data, float):
         return data if abs(data) < float("inf") else None
     return data
-
-
-def report_file(path: Path, *, as_json: bool, quiet: bool, **facts: Any) -> None:
-    """Print the path of the file that a command has written."""
-    if as_json:
-        print_json({"file": str(path), **facts})
-    elif not quiet:
-        echo(str(path))

@@ -1,19 +1,19 @@
 """``railsim contact``: contact geometry of a wheelset, equivalent conicity, patches, creep."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, output_options, print_json, show
+from railsim.cli.common import collected, echo
+from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
-from railsim.files.access import check_folder, make_folder, whole_file
+from railsim.errors import Fault, Faults
 
 if TYPE_CHECKING:
     from railsim.contact.summary import Array, ContactSummary
     from railsim.description import Description
-    from railsim.profiles import Profile
 
 TABLES = ("functions.csv", "conicity.csv", "patches.csv")
 MAP, OVERLAY = ("conicity_over_gauge.png", "conicity_over_gauge.csv"), "overlay.png"
@@ -31,46 +31,67 @@ RANGES = {
 """What an option's number may be, and its unit."""
 
 
+@dataclass(frozen=True)
+class Geometry:
+    """Profiles on their track; values once, or for left and right."""
+
+    wheel: tuple[str, ...]
+    rail: tuple[str, ...]
+    radius: tuple[float, ...]
+    gauge: float
+    inclination: float
+    back_to_back: float
+    load: float
+    max_shift: float
+
+    def check(self) -> None:
+        """Refuse more values than there are sides, and numbers that mean nothing, all at once."""
+        Faults(
+            Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for each side")
+            for name, values in vars(self).items()
+            if isinstance(values, Sequence) and len(values) > 2
+        ).check()
+        faults = Faults()
+        for name, (low, high, unit) in RANGES.items():
+            values = getattr(self, name)
+            for value in values if isinstance(values, Sequence) else (values,):
+                if not low <= value <= high:
+                    option, allowed = name.replace("_", "-"), f"{low:g} to {high:g} {unit}"
+                    faults.append(Fault(f"--{option}", "", f"found {value:g}", allowed))
+        faults.check()
+
+
 @click.command()
 @click.argument("profiles", nargs=-1, metavar="[WHEEL] [RAIL]")
-@click.option(
-    "--wheel",
-    "wheels",
-    multiple=True,
-    default=("S1002",),
-    show_default=True,
-    metavar="W",
-    help="Wheel profile, name or file; give it twice for different left and right wheels.",
-)
-@click.option(
-    "--rail",
-    "rails",
-    multiple=True,
-    default=("60E1",),
-    show_default=True,
-    metavar="R",
-    help="Rail profile, name or file; twice for left and right.",
-)
-@click.option("--gauge", default=1.435, show_default=True, help="Track gauge (m).")
-@click.option("--inclination", default=0.025, show_default=True, help="Rail inclination (1).")
-@click.option(
-    "--back-to-back",
-    default=1.360,
-    show_default=True,
-    help="Distance between the flange backs (m).",
-)
-@click.option(
-    "--radius",
-    "radii",
-    multiple=True,
-    type=float,
-    default=(0.46,),
-    show_default=True,
-    help="Rolling radius (m); twice for left and right.",
-)
-@click.option("--load", default=60e3, show_default=True, help="Vertical wheel load (N).")
-@click.option(
-    "--max-shift", default=0.010, show_default=True, help="Largest lateral displacement (m)."
+@collected(
+    "geometry",
+    Geometry,
+    click.option(
+        "--wheel",
+        multiple=True,
+        default=("S1002",),
+        metavar="W",
+        help="Wheel profile, name or file; give it twice for different left and right wheels.",
+    ),
+    click.option(
+        "--rail",
+        multiple=True,
+        default=("60E1",),
+        metavar="R",
+        help="Rail profile, name or file; twice for left and right.",
+    ),
+    click.option("--gauge", default=1.435, help="Track gauge (m)."),
+    click.option("--inclination", default=0.025, help="Rail inclination (1)."),
+    click.option("--back-to-back", default=1.360, help="Distance between the flange backs (m)."),
+    click.option(
+        "--radius",
+        multiple=True,
+        type=float,
+        default=(0.46,),
+        help="Rolling radius (m); twice for left and right.",
+    ),
+    click.option("--load", default=60e3, help="Vertical wheel load (N)."),
+    click.option("--max-shift", default=0.010, help="Largest lateral displacement (m)."),
 )
 @click.option("--gauges", metavar="A:B:N", help="Also the conicity over N gauges from A to B (m).")
 @click.option(
@@ -85,7 +106,6 @@ RANGES = {
     "--normal",
     type=click.Choice(NORMAL),
     default="hertz",
-    show_default=True,
     help="Normal contact of the table; with --exact both are compared.",
 )
 @click.option(
@@ -93,47 +113,27 @@ RANGES = {
     is_flag=True,
     help="Creep forces of the centred wheel's patch by every creep law, and traction fields.",
 )
-@click.option(
-    "--friction", default=0.4, show_default=True, help="Friction coefficient, for --creep."
-)
+@click.option("--friction", default=0.4, help="Friction coefficient, for --creep.")
 @click.option(
     "--build-creep-table",
     is_flag=True,
     help="Only recompute the table of the creep law `table` (half an hour; can be interrupted).",
 )
 @click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    default=2,
-    show_default=True,
-    help="Processes, for --build-creep-table.",
+    "--workers", type=click.IntRange(min=1), default=2, help="Processes, for --build-creep-table."
 )
-@click.option(
-    "--out", metavar="DIR", help="Folder for pictures and tables; created if it does not exist."
-)
-@output_options
+@output_options("Folder for pictures and tables; created if it does not exist.")
 def command(
     profiles: tuple[str, ...],
-    wheels: tuple[str, ...],
-    rails: tuple[str, ...],
-    gauge: float,
-    inclination: float,
-    back_to_back: float,
-    radii: tuple[float, ...],
-    load: float,
-    max_shift: float,
+    geometry: Geometry,
     gauges: str | None,
     overlay: str | None,
-    exact: bool,
-    normal: str,
     creep: bool,
     friction: float,
     build_creep_table: bool,
     workers: int,
-    out: str | None,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    output: Output,
+    **how: Any,
 ) -> None:
     """Contact geometry of a wheelset on its rails.
 
@@ -149,25 +149,21 @@ def command(
       railsim contact --creep --friction 0.35 --out creep
     """  # noqa: D301 - click reads the escape
     from railsim.cli import creep as creep_part
-    from railsim.cli.analysis import values_of
+    from railsim.cli.inputs import values_of
     from railsim.contact import tables
     from railsim.contact.creep_curves import forces_by_law
     from railsim.contact.summary import conicity_over_gauge, contact_summary
     from railsim.profiles import load_profile
 
     if build_creep_table:
-        creep_part.build_table(out, workers, as_json, quiet)
+        creep_part.build_table(workers, output)
         return
-    wheels, rails = _named(profiles, wheels, rails)
-    _check_counts(wheel=wheels, rail=rails, radius=radii)
-    _check_ranges(
-        gauge=gauge,
-        inclination=inclination,
-        back_to_back=back_to_back,
-        radius=radii,
-        load=load,
-        max_shift=max_shift,
+    if len(profiles) > 2:
+        raise click.UsageError("give a wheel and a rail; --wheel and --rail twice for both sides")
+    geometry = replace(
+        geometry, wheel=profiles[:1] or geometry.wheel, rail=profiles[1:] or geometry.rail
     )
+    geometry.check()
     if creep:
         creep_part.check_friction(friction)
     over = values_of(gauges, "--gauges") if gauges else []
@@ -178,87 +174,41 @@ def command(
     written += [*creep_part.PICTURES, *creep_part.TABLES] if creep else []
     written += [*MAP] if over else []
     written += [OVERLAY] if compared else []
-    folder = Path(out) if out else None
-    if folder:
-        check_folder(folder, written, overwrite=overwrite)
-    with progress_bar("contact", quiet=quiet):
+    output.reserve(*written)
+    numbers = {name: getattr(geometry, name) for name in RANGES}
+    radii = numbers.pop("radius")
+    with progress_bar("contact", quiet=output.quiet):
         found = contact_summary(
-            _profiles(wheels, "wheel"),
-            _profiles(rails, "rail"),
+            _profiles(geometry.wheel, "wheel"),
+            _profiles(geometry.rail, "rail"),
             radii=(radii[0], radii[-1]),
-            gauge=gauge,
-            inclination=inclination,
-            back_to_back=back_to_back,
-            load=load,
-            max_shift=max_shift,
-            normal=normal,  # type: ignore[arg-type]
-            exact=exact,
+            **numbers,
+            **how,
         )
-    patch = found.main_patch(friction) if creep else None
-    creep_rows = forces_by_law(patch) if patch else []
-    by_gauge = conicity_over_gauge(found, over) if over else None
     described = _described(found)
-    if by_gauge is not None:
+    _write(output, found)
+    if over:
+        by_gauge = conicity_over_gauge(found, over)
         described.data.update(gauges=over, conicity_over_gauge=by_gauge.tolist())
         described.parts.extend(["", tables.conicity_map_table(found, over, by_gauge)])
-    if patch:
-        described.data.update(creep=creep_rows)
-        described.parts.extend(["", tables.creep_table(patch, creep_rows)])
-    if folder:
-        make_folder(folder)
-        if patch:
-            creep_part.write(folder, patch, creep_rows)
-        _write(folder, found)
-        if by_gauge is not None:
-            _write_map(folder, found, over, by_gauge)
-        if compared is not None:
-            _write_overlay(folder, found, compared)
-    if as_json:
-        print_json(described.data)
-        return
-    for note in found.notes:
-        echo(note, err=True)
-    show(*described.parts)
-    if folder and not quiet:
-        echo(f"wrote {', '.join(written)} to {folder}", err=True)
+        _write_map(output, found, over, by_gauge)
+    if creep:
+        patch = found.main_patch(friction)
+        rows = forces_by_law(patch)
+        described.data.update(creep=rows)
+        described.parts.extend(["", tables.creep_table(patch, rows)])
+        if output.folder:
+            creep_part.write(output, patch, rows)
+    if compared is not None:
+        from railsim.plot.contact import overlay_figure
 
-
-def _named(
-    profiles: tuple[str, ...], wheels: tuple[str, ...], rails: tuple[str, ...]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return wheels and rails: the first argument is a wheel, the second a rail."""
-    if len(profiles) > 2:
-        raise click.UsageError("give a wheel and a rail; --wheel and --rail twice for both sides")
-    wheels = profiles[:1] or wheels
-    return wheels, profiles[1:] or rails
-
-
-def _check_counts(**options: Sequence[Any]) -> None:
-    """Refuse more values than there are sides."""
-    from railsim.errors import Fault, InputError
-
-    faults = [
-        Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for left and right")
-        for name, values in options.items()
-        if len(values) > 2
-    ]
-    if faults:
-        raise InputError(faults)
-
-
-def _check_ranges(**options: float | Sequence[float]) -> None:
-    """Refuse numbers that mean nothing, all at once."""
-    from railsim.errors import Fault, InputError
-
-    faults = []
-    for name, values in options.items():
-        low, high, unit = RANGES[name]
-        for value in values if isinstance(values, Sequence) else (values,):
-            if not low <= value <= high:
-                option = "--" + name.replace("_", "-")
-                faults.append(Fault(option, "", f"found {value:g}", f"{low:g} to {high:g} {unit}"))
-    if faults:
-        raise InputError(faults)
+        right = found.pairs[1]
+        own = right.wheel if compared.kind == "wheel" else right.rail
+        output.write(OVERLAY, lambda: overlay_figure([compared, own]))
+    if not output.as_json:
+        for note in found.notes:
+            echo(note, err=True)
+    output.answer(described.data, described.parts)
 
 
 def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
@@ -303,45 +253,36 @@ def _described(found: "ContactSummary") -> "Description":
     return Description(data, [functions, "", conicity, "", gauge_values, words, "", patches])
 
 
-def _write(folder: Path, found: "ContactSummary") -> None:
+def _write(output: Output, found: "ContactSummary") -> None:
     """Write the tables and the pictures that there always are."""
+    if output.folder is None:
+        return
     from railsim.contact import tables
     from railsim.contact.summary import OTHER_NORMAL
     from railsim.plot import contact as plot
-    from railsim.plot.style import save
 
-    made = tables.function_table(found), tables.conicity_table(found), tables.patch_table(found)
-    for name, table in zip(TABLES, made, strict=True):
-        with whole_file(folder / name) as partial:
-            partial.write_text(table.csv(), encoding="utf-8")
     names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in found.pairs)
     other = found.with_other_normal() if found.exact else None
     labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
-    figures = (
+    content = (
+        tables.function_table(found),
+        tables.conicity_table(found),
+        tables.patch_table(found),
         plot.profiles_figure(found.geometry, found.pairs),
         plot.functions_figure(found.geometry),
         plot.conicity_figure({" / ".join(names): (found.amplitudes, found.conicity)}),
         plot.patches_figure(found.contacts, found.load, found.exact, other, labels),
     )
-    for name, figure in zip(PICTURES, figures, strict=True):
-        save(figure, folder / name, overwrite=True)
+    for name, one in zip((*TABLES, *PICTURES), content, strict=True):
+        output.write(name, one)
 
 
-def _write_map(folder: Path, found: "ContactSummary", gauges: list[float], values: "Array") -> None:
+def _write_map(
+    output: Output, found: "ContactSummary", gauges: list[float], values: "Array"
+) -> None:
     from railsim.contact.tables import conicity_map_table
     from railsim.plot.contact import conicity_map_figure
-    from railsim.plot.style import save
 
     picture, table = MAP
-    save(conicity_map_figure(gauges, found.amplitudes, values), folder / picture, overwrite=True)
-    with whole_file(folder / table) as partial:
-        partial.write_text(conicity_map_table(found, gauges, values).csv(), encoding="utf-8")
-
-
-def _write_overlay(folder: Path, found: "ContactSummary", compared: "Profile") -> None:
-    from railsim.plot.contact import overlay_figure
-    from railsim.plot.style import save
-
-    right = found.pairs[1]
-    own = right.wheel if compared.kind == "wheel" else right.rail
-    save(overlay_figure([compared, own]), folder / OVERLAY, overwrite=True)
+    output.write(picture, lambda: conicity_map_figure(gauges, found.amplitudes, values))
+    output.write(table, conicity_map_table(found, gauges, values))

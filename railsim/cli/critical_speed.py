@@ -1,12 +1,22 @@
 """``railsim critical-speed``: linear and non-linear critical speed of a vehicle."""
 
+from collections.abc import Callable
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.analysis import Folder, InputFiles, Inputs, Output, analysis_options, values_of
-from railsim.cli.common import Speed, code_options, echo, linearisation_options, names_of
+from railsim.cli.common import (
+    Speed,
+    code_options,
+    linearisation_options,
+    optional_track,
+    vehicle_argument,
+    workers_option,
+)
+from railsim.cli.inputs import Given, Inputs, given_options, values_of
+from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -19,12 +29,11 @@ FILES = ("critical_speed.json", "critical_speed.png")
 
 
 @click.command(name="critical-speed")
-@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
-@click.argument("track", metavar="[TRACK]", required=False, shell_complete=names_of("track"))
+@vehicle_argument
+@optional_track
 @click.option(
     "--method",
     default="ramp",
-    show_default=True,
     type=click.Choice(METHODS),
     help="The linear critical speed is always found.",
 )
@@ -33,7 +42,6 @@ FILES = ("critical_speed.json", "critical_speed.png")
     "low",
     type=Speed(),
     default=5.0,
-    show_default=True,
     metavar="V",
     help="Lowest speed in m/s, or with a unit.",
 )
@@ -42,17 +50,11 @@ FILES = ("critical_speed.json", "critical_speed.png")
     "high",
     type=Speed(),
     default=120.0,
-    show_default=True,
     metavar="V",
     help="Highest speed in m/s, or with a unit.",
 )
 @click.option(
-    "--points",
-    type=int,
-    default=16,
-    show_default=True,
-    metavar="N",
-    help="Speeds of a bifurcation diagram.",
+    "--points", type=int, default=16, metavar="N", help="Speeds of a bifurcation diagram."
 )
 @click.option(
     "--excitation",
@@ -68,18 +70,14 @@ FILES = ("critical_speed.json", "critical_speed.png")
     metavar="KEY.PATH=A:B:N",
     help="A map over a key of the vehicle, track or settings; at most two parameters.",
 )
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Processes for a map; default: all cores.",
-)
-@analysis_options(
-    "critical_speed.json and .png; an interrupted map is continued", "scheme, creep law, contact"
-)
+@workers_option
+@given_options("scheme, creep law, contact")
+@output_options("Folder for critical_speed.json and .png; an interrupted map is continued.")
 @code_options
 def command(
-    files: InputFiles,
+    vehicle: str,
+    track: str | None,
+    given: Given,
     output: Output,
     method: str,
     excitation: str | None,
@@ -102,40 +100,32 @@ def command(
       railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """  # noqa: D301 - click reads the escape
-    inputs, workers = files.load(), how.pop("workers")
-    ranges = _ranges(conicity, friction, over)
+    load, workers = partial(given.inputs, vehicle, track), how.pop("workers")
+    inputs, ranges = load(), _ranges(conicity, friction, over)
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))
     if excitation:
         how["excitations"] = values_of(excitation, "--excitation")
     points = [
-        _point(inputs, files, dict(zip(ranges, values, strict=True)))
+        _point(inputs, load, dict(zip(ranges, values, strict=True)))
         for values in product(*ranges.values())
     ]
-    folder = Folder(output.out, FILES, output.overwrite)
-    if len(points) > 1:
-        _map(points, ranges, how, workers, folder, output)
-    else:
-        _one(points[0], how, folder, output)
+    output.reserve(*FILES)
+    with progress_bar("critical speed", quiet=output.quiet) as progress:
+        how["progress"] = progress
+        if len(points) > 1:
+            _map(points, ranges, how, workers, output)
+        else:
+            _one(points[0], how, output)
 
 
-def _one(point: "MapPoint", how: dict[str, Any], folder: Folder, output: Output) -> None:
+def _one(point: "MapPoint", how: dict[str, Any], output: Output) -> None:
     from railsim.stability.critical_speed import critical_speed
 
-    with progress_bar("critical speed", quiet=output.quiet) as progress:
-        found = critical_speed(
-            point.vehicle,
-            point.track,
-            settings=point.settings,
-            conicity=point.at.get("conicity"),
-            progress=progress,
-            **how,
-        )
-
-    def parts() -> list[Any]:
-        verdict = [found.verdict()] if found.verdict() else []
-        return [found.table(), *verdict, *(f"remark: {remark}" for remark in found.remarks)]
-
-    folder.finish(found.record(), found.plot, parts, as_json=output.as_json)
+    cones = point.at.get("conicity")
+    found = critical_speed(
+        point.vehicle, point.track, settings=point.settings, conicity=cones, **how
+    )
+    output.finish(FILES, found, [found.table(), *filter(None, [found.verdict()])], found.remarks)
 
 
 def _map(
@@ -143,35 +133,27 @@ def _map(
     ranges: dict[str, list[float]],
     how: dict[str, Any],
     workers: int | None,
-    folder: Folder,
     output: Output,
 ) -> None:
     from railsim.plot.stability import map_figure
     from railsim.studies.stability_map import map_speeds, map_table, stability_map
 
-    with progress_bar("critical speed", quiet=output.quiet) as progress:
-        found = stability_map(
-            points,
-            {**how, "over_amplitude": False},
-            folder=folder.path,
-            workers=workers,
-            overwrite=output.overwrite,
-            progress=progress,
-            on_remark=lambda text: echo(f"remark: {text}", err=True),
-        )
-    axes = {name: values for name, values in ranges.items() if len(values) > 1}
-
-    def parts() -> list[Any]:
-        remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
-        return [map_table(found, list(axes)), *(f"remark: {remark}" for remark in remarks)]
-
-    name = points[0].vehicle.name
-    folder.finish(
-        found,
-        lambda: map_figure(axes, map_speeds(found), f"{name}: critical speed"),
-        parts,
-        as_json=output.as_json,
+    progress = how.pop("progress")
+    found = stability_map(
+        points,
+        {**how, "over_amplitude": False},
+        folder=output.folder,
+        workers=workers,
+        overwrite=output.overwrite,
+        progress=progress,
+        on_remark=output.remark,
     )
+    axes = {name: values for name, values in ranges.items() if len(values) > 1}
+    title = f"{points[0].vehicle.name}: critical speed"
+    output.write(FILES[0], found)
+    output.write(FILES[1], lambda: map_figure(axes, map_speeds(found), title))
+    remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
+    output.answer(found, [map_table(found, list(axes))], remarks)
 
 
 def _ranges(
@@ -194,12 +176,11 @@ def _ranges(
     return found
 
 
-def _point(inputs: Inputs, files: InputFiles, at: dict[str, float]) -> "MapPoint":
+def _point(inputs: Inputs, load: Callable[..., Inputs], at: dict[str, float]) -> "MapPoint":
     from railsim.studies.stability_map import MapPoint
 
     changes = [f"{key}={value!r}" for key, value in at.items() if key not in BY_OPTION]
-    here = files.load(changes) if changes else inputs
-    track = here.track
+    vehicle, track, settings = load(changes) if changes else inputs
     if "friction" in at:
         track = track.replace(friction=at["friction"], friction_table=None)
-    return MapPoint(at, here.vehicle, track, here.settings)
+    return MapPoint(at, vehicle, track, settings)

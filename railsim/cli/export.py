@@ -1,11 +1,8 @@
 """``railsim export``: a result in the files of other programs."""
 
-from pathlib import Path
-
 import click
 
-from railsim.cli.common import output_options, report_file
-from railsim.files.access import check_file
+from railsim.cli.output import Output, output_options
 
 
 @click.command()
@@ -18,20 +15,16 @@ from railsim.files.access import check_file
     "--units",
     type=click.Choice(["si", "shown"]),
     default="si",
-    show_default=True,
     help="SI, or those of tables and plots: kN, mm.",
 )
-@output_options
+@output_options()
 def command(
     file: str,
     quantities: tuple[str, ...],
-    out: str,
     between: tuple[float, float] | None,
     rate: float | None,
     units: str,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    output: Output,
 ) -> None:
     """Write a result, or some of its quantities, as CSV, for MATLAB and Octave, or as Parquet.
 
@@ -46,8 +39,6 @@ def command(
     from railsim.result import open_run
     from railsim.result.export import ENDINGS, export, selected
 
-    check_file(Path(out), overwrite=overwrite, endings=ENDINGS)
-    shown = units == "shown"
+    out, shown = output.file("", ENDINGS), units == "shown"
     part = selected(open_run(file), quantities, between=between, rate=rate, shown_units=shown)
-    path = export(part, out, overwrite=overwrite)
-    report_file(path, as_json=as_json, quiet=quiet)
+    output.wrote(export(part, out, overwrite=output.overwrite))

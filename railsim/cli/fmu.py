@@ -1,35 +1,24 @@
 """``railsim fmu``: a vehicle on its track as a unit of FMI 3.0 for other programs."""
 
-from pathlib import Path
+from typing import Any
 
 import click
 
-from railsim.cli.common import (
-    Speed,
-    code_options,
-    load_option,
-    names_of,
-    output_options,
-    report_file,
-    set_option,
-    with_load,
-)
+from railsim.cli.common import Speed, code_options, extent_options, track_argument, vehicle_argument
+from railsim.cli.inputs import Given, given_options
+from railsim.cli.output import Output, output_options
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
-@click.argument("track", metavar="TRACK", shell_complete=names_of("track"))
+@vehicle_argument
+@track_argument
 @click.option("--speed", type=Speed(), metavar="V", help="Speed in m/s, or with a unit: 72km/h.")
 @click.option("--inputs", metavar="A,B", help="Actuators that are commanded; default all.")
 @click.option("--outputs", metavar="X,Y", help="Quantities and signals; default Q, Y, lateral.")
 @click.option("--out", required=True, metavar="F.fmu", help="The unit.")
-@click.option("--start", type=float, default=0.0, metavar="S", help="Start in m along the track.")
-@click.option("--duration", type=float, metavar="T", help="Length of the run in s.")
-@click.option("--until", type=float, metavar="S", help="End of the run in m along the track.")
-@load_option
-@click.option("--settings", metavar="F", help="Settings file.")
-@set_option
-@output_options
+@extent_options
+@given_options()
+@output_options()
 @code_options
 def command(
     vehicle: str,
@@ -37,16 +26,9 @@ def command(
     speed: float | None,
     inputs: str | None,
     outputs: str | None,
-    out: str,
-    start: float,
-    duration: float | None,
-    until: float | None,
-    load: str | None,
-    settings: str | None,
-    assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    given: Given,
+    output: Output,
+    **extent: Any,
 ) -> None:
     """Write a vehicle on its track as a unit for co-simulation by FMI 3.0.
 
@@ -59,18 +41,16 @@ def command(
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
     """  # noqa: D301 - click reads the escape
     from railsim.errors import InputError, argument_fault
-    from railsim.files.access import check_file
     from railsim.fmi import OUTPUTS, fmu
     from railsim.studies.case import load_case
     from railsim.studies.spec import RunSpec
 
-    check_file(Path(out), overwrite=overwrite, endings=(".fmu",))
-    assignments = with_load(assignments, load, "vehicle.")
-    spec = RunSpec(
-        vehicle, track, speed, settings=settings, duration=duration, until=until,
-        assignments=assignments, start=start,
-    )  # fmt: skip
-    case = load_case(spec)
+    out = output.file("", (".fmu",))
+    extent["start"] = extent["start"] or 0.0
+    assignments = given.overrides
+    case = load_case(
+        RunSpec(vehicle, track, speed, settings=given.settings, assignments=assignments, **extent)
+    )
     try:
         path = fmu(
             case.vehicle,
@@ -78,13 +58,11 @@ def command(
             out,
             inputs=None if inputs is None else inputs.split(","),
             outputs=OUTPUTS if outputs is None else outputs.split(","),
-            overwrite=overwrite,
+            overwrite=output.overwrite,
             speed=case.speed,
             settings=case.settings,
-            start=start,
-            duration=duration,
-            until=until,
+            **extent,
         )
     except ImportError as error:
         raise InputError([argument_fault("fmu", "", str(error), "")]) from None
-    report_file(Path(path), as_json=as_json, quiet=quiet)
+    output.wrote(path)

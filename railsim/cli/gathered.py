@@ -43,6 +43,29 @@ class Gathered:
         return {name: open_run(self.paths[name]) for name in names if name in self.paths}
 
 
+def opened(paths: Sequence[Path]) -> "dict[str, Result]":
+    """Open results under the shortest names that tell them apart.
+
+    Raises
+    ------
+    InputError : everything that cannot be read, or is given twice.
+    """
+    from railsim.errors import Fault, Faults
+    from railsim.result import open_run
+
+    faults, results = Faults(), dict[str, Any]()
+    stems = [path.stem for path in paths]
+    for path in paths:
+        label = path.stem if stems.count(path.stem) == 1 else str(path)
+        if label in results:
+            faults.append(Fault(str(path), "", "given twice", "give each result once"))
+            continue
+        with faults.caught():
+            results[label] = open_run(path)
+    faults.check()
+    return results
+
+
 def gather(files: Sequence[str]) -> Gathered:
     """Return the runs of result files and of folders.
 
@@ -52,27 +75,23 @@ def gather(files: Sequence[str]) -> Gathered:
     ------
     InputError : everything that cannot be read.
     """
-    from railsim.errors import Fault, InputError
+    from railsim.errors import Fault, Faults
 
-    found = Gathered()
-    faults: list[Fault] = []
+    found, faults = Gathered(), Faults()
     for file in files:
         path = folder_of(file)
-        try:
+        with faults.caught():
             records, inputs = _of_folder(path) if os.path.isdir(path) else ([_of_file(path)], {})
-        except InputError as error:
-            faults.extend(error.faults)
-            continue
-        if not records:
-            allowed = "the folder of a study, or one with .h5 files"
-            faults.append(Fault(file, "", "no results in this folder", allowed))
-        found.inputs = inputs if len(files) == 1 else {}
-        _add(found, records, path if os.path.isdir(path) else path.parent, prefix=len(files) > 1)
+            if not records:
+                allowed = "the folder of a study, or one with .h5 files"
+                faults.append(Fault(file, "", "no results in this folder", allowed))
+            found.inputs = inputs if len(files) == 1 else {}
+            folder = path if os.path.isdir(path) else path.parent
+            _add(found, records, folder, prefix=len(files) > 1)
     names = [record["name"] for record in found.records]
     twice = {name for name in names if names.count(name) > 1} if len(files) > 1 else set()
     faults += [Fault(name, "", "given twice", "give each result once") for name in sorted(twice)]
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return found
 
 

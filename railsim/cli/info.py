@@ -8,20 +8,21 @@ import click
 
 from railsim.cli.common import (
     Speed,
+    collected,
     json_option,
     load_option,
     overwrite_option,
-    print_json,
     remarks_on,
     set_option,
-    show,
-    with_load,
 )
 from railsim.cli.gathered import STUDY_FILES, described_runs
+from railsim.cli.output import Output
 from railsim.files.access import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
-    from railsim.definitions.file_definition import FileDefinition
+    from railsim.definitions.base import Remark
+
+DRAWN = "--draw is for vehicles and tracks"
 
 
 @click.command()
@@ -41,19 +42,17 @@ if TYPE_CHECKING:
     help="Also the vehicle at rest, in each load case: wheel loads, heights, springs, stops.",
 )
 @click.option("--draw", metavar="F.png", help="Draw a vehicle in three views, or a track.")
-@overwrite_option
 @load_option
 @set_option
-@json_option
+@collected("output", Output, overwrite_option, json_option)
 def command(
     file: str,
     speeds: tuple[float, ...],
     static: bool,
     draw: str | None,
-    overwrite: bool,
     load: str | None,
     assignments: tuple[str, ...],
-    as_json: bool,
+    output: Output,
 ) -> None:
     """Show what a vehicle, track, settings, study or result holds: a file, a name or a folder.
 
@@ -66,8 +65,8 @@ def command(
     result = path.suffix.lower() in RESULTS
     runs = os.path.isdir(file) or path.name in STUDY_FILES
     if draw is not None and (result or runs):
-        raise click.UsageError("--draw is for vehicles and tracks; see `railsim plot`")
-    remarks: list[str] = []
+        raise click.UsageError(f"{DRAWN}; see `railsim plot`")
+    remarks: list[Remark] = []
     if runs:
         found = described_runs(file)
     elif result:
@@ -79,10 +78,14 @@ def command(
         from railsim.definitions.loading import load_any
         from railsim.definitions.vehicle.definition import Vehicle
         from railsim.description import describe
+        from railsim.plottable import Plottable
 
-        definition = load_any(file, with_load(assignments, load))
+        definition = load_any(file, [*assignments, *([f"load={load}"] if load else [])])
         if draw is not None:
-            _draw(definition, Path(draw), overwrite)
+            if not isinstance(definition, Plottable):
+                raise click.UsageError(DRAWN)
+            check_file(Path(draw), overwrite=output.overwrite, option="--draw", endings=PICTURES)
+            definition.plot(draw, overwrite=output.overwrite)
         found = describe(definition, speeds)
         if static and isinstance(definition, Vehicle):
             from railsim.description import Description
@@ -92,26 +95,5 @@ def command(
             chosen = rest.data[definition.load or "design"]
             data = {**found.data, "static": chosen, "load_cases": rest.data}
             found = Description(data, [*found.parts, *rest.parts])
-        remarks = (
-            [] if as_json else [f"remark: {one}" for one in remarks_on(definition, supports=static)]
-        )
-    if as_json:
-        print_json(found.data)
-    else:
-        show(*found.parts, *remarks)
-
-
-def _draw(definition: "FileDefinition", path: Path, overwrite: bool) -> None:
-    from railsim.definitions.track.definition import Track
-    from railsim.definitions.vehicle.definition import Vehicle
-    from railsim.plot.style import save
-    from railsim.plot.track import track_figure
-    from railsim.plot.vehicle import vehicle_figure
-
-    check_file(path, overwrite=overwrite, option="--draw", endings=PICTURES)
-    if isinstance(definition, Vehicle):
-        save(vehicle_figure(definition), path, overwrite=overwrite)
-    elif isinstance(definition, Track):
-        save(track_figure(definition), path, overwrite=overwrite)
-    else:
-        raise click.UsageError("--draw is for vehicles and tracks")
+        remarks = [] if output.as_json else remarks_on(definition, supports=static)
+    output.answer(found.data, found.parts, remarks)

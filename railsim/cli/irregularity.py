@@ -4,8 +4,8 @@ from typing import Any
 
 import click
 
-from railsim.cli.analysis import Folder
-from railsim.cli.common import code_options, names_of, output_options
+from railsim.cli.common import code_options, names_of, rails_option, set_option
+from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -13,20 +13,33 @@ FILES = ("irregularity.json", "irregularity.png")
 
 
 @click.command()
-@click.argument("measured", metavar="MEASURED", shell_complete=names_of("measurement"))
+@click.argument("measured", shell_complete=names_of("measurement"))
 @click.option("--vehicle", metavar="F", help="The vehicle that measured; default as MEASURED says.")
-@click.option("--track", metavar="F", help="Rails, gauge, friction, support; default straight.")
-@click.option("--spectrum", default="erri_b176_low", show_default=True, metavar="NAME",
-              help="Spectrum that the track is assumed to have.")  # fmt: skip
-@click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on it.")
-@click.option("--wavelengths", type=float, nargs=2, default=(3.0, 100.0), show_default=True,
-              metavar="A B", help="Shortest and longest wavelength of the track in m.")  # fmt: skip
-@click.option("--noise", type=float, default=0.05, show_default=True, metavar="A",
-              help="rms noise of an accelerometer in m/s2, where MEASURED has none.")  # fmt: skip
-@click.option("--set", "assignments", multiple=True, metavar="KEY.PATH=VALUE",
-              help="Replace one value of MEASURED; may be given several times.")  # fmt: skip
-@click.option("--out", metavar="DIR", help="Folder for recording, track, estimates, forces.")
-@output_options
+@rails_option
+@click.option(
+    "--spectrum",
+    default="erri_b176_low",
+    metavar="NAME",
+    help="Spectrum that the track is assumed to have.",
+)
+@click.option("--scale", type=float, default=1.0, help="Factor on it.")
+@click.option(
+    "--wavelengths",
+    type=float,
+    nargs=2,
+    default=(3.0, 100.0),
+    metavar="A B",
+    help="Shortest and longest wavelength of the track in m.",
+)
+@click.option(
+    "--noise",
+    type=float,
+    default=0.05,
+    metavar="A",
+    help="rms noise of an accelerometer in m/s2, where MEASURED has none.",
+)
+@set_option
+@output_options("Folder for recording, track, estimates, forces.")
 @code_options
 def command(
     measured: str,
@@ -37,10 +50,7 @@ def command(
     wavelengths: tuple[float, float],
     noise: float,
     assignments: tuple[str, ...],
-    out: str | None,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    output: Output,
 ) -> None:
     """Irregularities of a track and wheel forces from accelerations of a vehicle.
 
@@ -62,7 +72,7 @@ def command(
 
     assumed = Assumed(spectrum, scale, wavelengths, noise)
     assumed.check()
-    folder = Folder(out, (*FILES, *WRITTEN), overwrite)
+    folder = output.reserve(*FILES, *WRITTEN)
     measurement = load_measurement(measured, assignments)
     how = measurement.definition
     name = vehicle or how.vehicle
@@ -70,16 +80,17 @@ def command(
         raise InputError([Fault("--vehicle", "", "not given", "the vehicle that measured")])
     case = getattr(how, "load", None)
     load = [f"load={case}"] if case else []
-    with progress_bar(measurement.name, quiet=quiet) as progress:
+    with progress_bar(measurement.name, quiet=output.quiet) as progress:
         found = irregularity(
-            measurement, load_vehicle(name, load), load_track(track or how.track or "straight"),
-            assumed=assumed, progress=progress,
-        )  # fmt: skip
-    if folder.path is not None:
-        folder.written += found.write(folder.path)
-
-    def parts() -> list[Any]:
-        remarks = [f"remark: {remark}" for remark in found.remarks]
-        return [found.table(), "", found.forces_table(), "", *found.notes, *remarks]
-
-    folder.finish(found.record(), lambda: irregularity_figure(found), parts, as_json=as_json)
+            measurement,
+            load_vehicle(name, load),
+            load_track(track or how.track or "straight"),
+            assumed=assumed,
+            progress=progress,
+        )
+    if folder is not None:
+        output.written += found.write(folder)
+    output.write(FILES[0], found.record())
+    output.write(FILES[1], lambda: irregularity_figure(found))
+    parts: list[Any] = [found.table(), "", found.forces_table(), "", *found.notes]
+    output.answer(found.record(), parts, found.remarks)

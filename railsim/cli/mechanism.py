@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, faults_in, output_options, print_json, set_option, show
-from railsim.files.access import check_folder, write_folder
+from railsim.cli.common import faults_in, set_option
+from railsim.cli.output import Output, output_options
 
 if TYPE_CHECKING:
-    from railsim.definitions.mechanism.definition import Mechanism
     from railsim.mechanisms.analysis import Analysis
     from railsim.mechanisms.optimum import Optimum
+    from railsim.table import Table
 
 REPORT, OPTIMISED = "report.html", "optimised.toml"
 
@@ -40,11 +40,8 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
     metavar="NAME=VALUE",
     help="Also print all results at a given value of one of them (SI), such as height=0.8955.",
 )
-@click.option(
-    "--out", metavar="DIR", help=f"Folder for {REPORT}, pictures, animation, positions.csv."
-)
 @set_option
-@output_options
+@output_options(f"Folder for {REPORT}, pictures, animation, positions.csv.")
 def command(
     files: tuple[str, ...],
     searched: bool,
@@ -52,11 +49,8 @@ def command(
     seed: int | None,
     case: str | None,
     at: tuple[str, ...],
-    out: str | None,
     assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    output: Output,
 ) -> None:
     """Compute planar linkages with one degree of freedom: positions, forces, components.
 
@@ -76,63 +70,34 @@ def command(
     if not searched and (starts is not None or seed is not None):
         raise click.UsageError("--starts and --seed go with --optimise")
     from railsim.definitions.loading import load_mechanism
+    from railsim.mechanisms.analysis import analyse
+    from railsim.mechanisms.optimisation import optimise
+    from railsim.mechanisms.remarks import remarks
+    from railsim.processes import available_cores
 
     mechanisms = [load_mechanism(file, assignments) for file in files]
-    if out is not None:
-        check_folder(Path(out))
-    optimum, results, at_values = None, [], []
+    output.reserve()
+    optimum, results, at_values, cases = None, [], [], {}
     for file, mechanism in zip(files, mechanisms, strict=True):
         with faults_in(file, "mechanism", mechanism.name):
             if searched:
-                optimum = _optimised(mechanism, case, starts, seed)
-            results.append(optimum.after if optimum else _analysed(mechanism, case))
+                chosen, cores = mechanism.in_case(case), available_cores()
+                optimum = optimise(chosen, starts=starts, seed=seed, workers=cores)
+            results.append(optimum.after if optimum else analyse(mechanism, case))
             at_values.append(_values_at(results[-1], at))
-    cases = {} if searched else _cases(files[0], mechanisms[0], results[0])
-    written: list[Path] = []
-    if out is not None:
+            if len(results) == 1 and mechanism.cases and case is None and not searched:
+                cases = {name: analyse(mechanism, name) for name in mechanism.cases}
+                cases = {"base": results[0], **cases}
+    if output.out is not None:
         content = _content(results, cases, optimum)
         if optimum is not None:
-            content[OPTIMISED] = _optimised_text(files[0], case, out, optimum, assignments)
-        written = write_folder(Path(out), content, overwrite=overwrite)
-    if as_json:
-        print_json(_data(results, cases, at_values, optimum))
-        return
-    _show(results, at_values, optimum)
-    if not quiet:
-        from railsim.mechanisms.remarks import remarks
-
-        for remark in dict.fromkeys(r for result in results for r in remarks(result)):
-            echo(f"remark: {remark}", err=True)
-        for path in written:
-            echo(str(path))
-
-
-def _analysed(mechanism: "Mechanism", case: str | None) -> "Analysis":
-    from railsim.mechanisms.analysis import analyse
-
-    return analyse(mechanism, case)
-
-
-def _cases(file: str, mechanism: "Mechanism", base: "Analysis") -> dict[str, "Analysis"]:
-    """All cases of the first file, the base first; none where it is computed in a case."""
-    if not mechanism.cases or base.case is not None:
-        return {}
-    with faults_in(file, "mechanism", mechanism.name):
-        return {"base": base, **{name: _analysed(mechanism, name) for name in mechanism.cases}}
-
-
-def _optimised(
-    mechanism: "Mechanism", case: str | None, starts: int | None, seed: int | None
-) -> "Optimum":
-    from railsim.errors import InputError
-    from railsim.mechanisms.analysis import no_case
-    from railsim.mechanisms.optimisation import optimise
-
-    if case is not None and case not in mechanism.cases:
-        raise InputError([no_case(mechanism, case)])
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    chosen = mechanism.in_case(case)
-    return optimise(chosen, starts=starts, seed=seed, workers=cores or 1)
+            content[OPTIMISED] = _optimised_text(files[0], case, output.out, optimum, assignments)
+        output.write_all(content)
+    output.answer(
+        _data(results, cases, at_values, optimum),
+        [] if output.as_json else _parts(results, at_values, optimum),
+        dict.fromkeys(r for result in results for r in remarks(result)),
+    )
 
 
 def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
@@ -159,14 +124,14 @@ def _data(
     optimum: "Optimum | None",
 ) -> dict[str, Any]:
     from railsim.mechanisms.comparison import compare
-    from railsim.mechanisms.summary import analysis_data, comparison_data, optimum_data
+    from railsim.mechanisms.summary import analysis_data, optimum_data
 
     data = [optimum_data(optimum)] if optimum else [analysis_data(result) for result in results]
     for one, values in zip(data, found, strict=True):
         if values:
             one["at"] = values
     if len(data) > 1:
-        return {"mechanisms": data, "comparison": comparison_data(compare(results))}
+        return {"mechanisms": data, "comparison": compare(results)}
     data[0]["cases"] = {
         name: analysis_data(result, courses=False)
         for name, result in cases.items()
@@ -175,25 +140,23 @@ def _data(
     return data[0]
 
 
-def _show(
+def _parts(
     results: Sequence["Analysis"], at: Sequence[list[dict[str, Any]]], optimum: "Optimum | None"
-) -> None:
+) -> "list[str | Table]":
     from railsim.mechanisms import tables
     from railsim.mechanisms.comparison import compare
 
+    parts: list[str | Table] = []
     if optimum is not None:
-        show(*tables.optimum_sentences(optimum), "")
+        parts += [*tables.optimum_sentences(optimum), ""]
         for table in tables.optimum_tables(optimum):
-            show(table, "")
+            parts += [table, ""]
     for number, (result, values) in enumerate(zip(results, at, strict=True)):
-        if number:
-            show("")
-        _show_result(result, values)
-    if len(results) > 1:
-        show("", tables.comparison_table(compare(results)))
+        parts += [*[""] * (number > 0), *_result_parts(result, values)]
+    return [*parts, "", tables.comparison_table(compare(results))] if len(results) > 1 else parts
 
 
-def _show_result(result: "Analysis", at: Sequence[dict[str, Any]]) -> None:
+def _result_parts(result: "Analysis", at: Sequence[dict[str, Any]]) -> "list[str | Table]":
     from railsim.design_checks import check_table
     from railsim.mechanisms import tables
     from railsim.mechanisms.checks import checks
@@ -202,20 +165,18 @@ def _show_result(result: "Analysis", at: Sequence[dict[str, Any]]) -> None:
 
     definition = result.definition
     case = f", case {result.case}" if result.case else ""
-    show(f"{definition.name}{case}", "", tables.position_table(result), "")
+    parts: list[Any] = [f"{definition.name}{case}", "", tables.position_table(result), ""]
     if at:
-        show(tables.value_table(result, [(values["where"], values) for values in at]), "")
-    show(*tables.sentences(result))
-    found = [
+        parts += [tables.value_table(result, [(values["where"], values) for values in at]), ""]
+    parts += tables.sentences(result)
+    found = (
         tables.reaction_table(result),
         tables.published_table(result),
         check_table(checks(result)),
         tables.selection_table(selection(result)),
         tables.scatter_table(scatter(definition) if definition.tolerances else []),
-    ]
-    for table in found:
-        if len(table):
-            show("", table)
+    )
+    return parts + [part for table in found if len(table) for part in ("", table)]
 
 
 def _content(

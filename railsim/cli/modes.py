@@ -1,14 +1,23 @@
 """``railsim modes``: eigenfrequencies, damping and mode shapes of a vehicle."""
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.analysis import Folder, InputFiles, Output, analysis_options, values_of
-from railsim.cli.common import Speed, code_options, linearisation_options, names_of
+from railsim.cli.common import (
+    Speed,
+    code_options,
+    linearisation_options,
+    optional_track,
+    vehicle_argument,
+)
+from railsim.cli.inputs import Given, Inputs, given_options, values_of
+from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -22,15 +31,10 @@ CYCLE = {"frames": 40, "cycles": 1}
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
-@click.argument("track", metavar="[TRACK]", required=False, shell_complete=names_of("track"))
+@vehicle_argument
+@optional_track
 @click.option(
-    "--speed",
-    type=Speed(),
-    default=20.0,
-    show_default=True,
-    metavar="V",
-    help="Speed in m/s, or with a unit: 72km/h.",
+    "--speed", type=Speed(), default=20.0, metavar="V", help="Speed in m/s, or with a unit: 72km/h."
 )
 @click.option("--speeds", metavar="A:B:N", help="N speeds from A to B: a root locus.")
 @click.option(
@@ -51,6 +55,7 @@ CYCLE = {"frames": 40, "cycles": 1}
     "--radius",
     type=float,
     default=math.inf,
+    show_default=False,
     metavar="R",
     help="Radius of the track in m, positive to the right; default straight.",
 )
@@ -60,15 +65,20 @@ CYCLE = {"frames": 40, "cycles": 1}
     metavar="NAME",
     help="Begin the animated page of --out with this mode, and call it mode.html.",
 )
-@analysis_options("modes.json, modes.png and, at one speed, modes.html with all modes animated")
+@given_options("creep law and contact")
+@output_options(
+    "Folder for modes.json, modes.png and, at one speed, modes.html with all modes animated."
+)
 @code_options
 def command(
-    files: InputFiles,
-    output: Output,
+    vehicle: str,
+    track: str | None,
     speed: float,
     speeds: str | None,
     over: str | None,
     animate: str | None,
+    given: Given,
+    output: Output,
     **how: Any,
 ) -> None:
     """Compute the modes of a vehicle in steady rolling.
@@ -88,33 +98,25 @@ def command(
 
     if speeds is not None and over is not None:
         raise InputError([Fault("--over", "", "given together with --speeds", "one of the two")])
-    inputs = files.load()
+    load = partial(given.inputs, vehicle, track)
+    coach, rails, settings = load()
     if animate is not None and (output.out is None or speeds is not None or over is not None):
         wrong = "given without --out" if output.out is None else "given with --speeds or --over"
         raise InputError([Fault("--animate", "", wrong, "one speed, and --out DIR")])
-    names = FILES if animate is None else (*FILES, ANIMATION)
-    if speeds is None and over is None and animate is None:
-        names = (*FILES, ALL)
-    folder = Folder(output.out, names, output.overwrite)
+    page = ALL if animate is None else ANIMATION
+    folder = output.reserve(*FILES, *[page] * (speeds is None and over is None))
     with progress_bar("modes", quiet=output.quiet):
         found: Modes | RootLocus
         if over is not None:
-            found = _over(files, over, speed, how)
+            found = _over(load, over, speed, how)
         elif speeds is not None:
-            how.update(settings=inputs.settings, speeds=values_of(speeds, "--speeds"))
-            found = root_locus(inputs.vehicle, inputs.track, **how)
+            values = values_of(speeds, "--speeds")
+            found = root_locus(coach, rails, settings=settings, speeds=values, **how)
         else:
-            how.update(settings=inputs.settings, speed=speed)
-            found = modes(inputs.vehicle, inputs.track, **how)
-    if folder.path is not None and isinstance(found, Modes):
-        page = folder.path / (ALL if animate is None else ANIMATION)
-        folder.written += _animated(inputs.vehicle, found, animate, page)
-
-    def parts() -> list[Any]:
-        remarks = [f"remark: {remark}" for remark in found.remarks]
-        return [found.table(), *found.notes, *remarks]
-
-    folder.finish(found.record(), found.plot, parts, as_json=output.as_json)
+            found = modes(coach, rails, settings=settings, speed=speed, **how)
+    if folder is not None and isinstance(found, Modes):
+        output.written += _animated(coach, found, animate, folder / page)
+    output.finish(FILES, found, [found.table(), *found.notes], found.remarks)
 
 
 def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) -> list[Path]:
@@ -141,8 +143,8 @@ def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) 
     return [write_page(scene, page, modes=list(scenes.values()), overwrite=True)]
 
 
-def _over(files: InputFiles, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
-    """Root locus over one key of the files."""
+def _over(load: Callable[..., Inputs], over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
+    """Root locus over one key of the inputs."""
     from railsim.linear.modes import parameter_locus
     from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law
 
@@ -150,8 +152,7 @@ def _over(files: InputFiles, over: str, speed: float, how: dict[str, Any]) -> "R
     contact = Contact(*(how.pop(name) for name in ("linearisation", "amplitude", "conicity")))
 
     def prepared(value: float) -> LinearVehicle:
-        here = files.load([f"{key}={value!r}"])
-        law = smooth_law(here.settings)
-        return LinearVehicle(here.vehicle, here.track, contact=contact, settings=law, **how)
+        coach, rails, settings = load([f"{key}={value!r}"])
+        return LinearVehicle(coach, rails, contact=contact, settings=smooth_law(settings), **how)
 
     return parameter_locus(prepared, key, values_of(text, "--over"), speed)

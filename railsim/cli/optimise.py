@@ -1,11 +1,12 @@
 """``railsim optimise``: parameters of a vehicle against objectives and constraints."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import code_options, echo, names_of, output_options, print_json, show
+from railsim.cli.common import code_options, names_of, scheduler_option, workers_option
+from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
 
@@ -17,8 +18,8 @@ MOST_ROWS = 15
 
 
 @click.command()
-@click.argument("study", metavar="STUDY", shell_complete=names_of("study"))
-@click.option("--out", default="optimise", metavar="DIR", show_default=True, help="Folder.")
+@click.argument("study", shell_complete=names_of("study"))
+@click.option("--out", default="optimise", metavar="DIR", help="Folder.")
 @click.option(
     "--method",
     type=click.Choice(["surrogate", "nsga2", "differential_evolution"]),
@@ -35,30 +36,12 @@ MOST_ROWS = 15
     help="Design that becomes a vehicle file; by default the one nearest to the best of each "
     "objective.",
 )
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Number of processes; default: all cores.",
-)
-@click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
+@workers_option
+@scheduler_option
 @click.option("--resume", is_flag=True, help="Continue in DIR although STUDY has changed.")
-@output_options
+@output_options()
 @code_options
-def command(
-    study: str,
-    out: str,
-    method: str | None,
-    evaluations: int | None,
-    seed: int | None,
-    choose: int | None,
-    workers: int | None,
-    scheduler: str | None,
-    resume: bool,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def command(study: str, output: Output, **how: Any) -> None:
     """Find the parameters of a vehicle that give the best compromises between objectives.
 
     STUDY is a study file with a table [optimise]: variables with bounds, objectives and
@@ -71,29 +54,20 @@ def command(
       railsim optimise examples/primary_and_yaw_damper.toml --out compromise
       railsim optimise my_study.toml --evaluations 200 --method nsga2 --seed 3
     """  # noqa: D301 - click reads the escape
-    if workers != 1 and scheduler is None:
+    if how["workers"] != 1 and how["scheduler"] is None:
         begin_server()  # which imports on another core while this process does
     from railsim.studies.optimise import optimise
 
-    with progress_bar("optimise", quiet=quiet) as progress:
+    with progress_bar("optimise", quiet=output.quiet) as progress:
         found = optimise(
             study,
-            out=out,
-            method=method,
-            evaluations=evaluations,
-            seed=seed,
-            choose=choose,
-            workers=workers,
-            scheduler=scheduler,
-            resume=resume,
-            overwrite=overwrite,
+            out=str(output.out),
+            overwrite=output.overwrite,
             progress=progress,
-            on_remark=lambda text: echo(f"remark: {text}", err=True),
+            on_remark=output.remark,
+            **how,
         )
-    if as_json:
-        print_json({"folder": str(found.folder), **found.record()})
-        return
-    show(*_lines(found))
+    output.answer({"folder": str(found.folder), **found.record()}, _lines(found))
 
 
 def _lines(found: "Optimisation") -> "list[str | Table]":

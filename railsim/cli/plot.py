@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import output_options, report_file
-from railsim.errors import Fault, InputError, nearest
-from railsim.files.access import PICTURES, RESULTS, check_file
+from railsim.cli.gathered import folder_of, gather
+from railsim.cli.output import Output, output_options
+from railsim.errors import Fault, Faults, InputError, nearest
+from railsim.files.access import PICTURES, RESULTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,14 +29,12 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
     "--over",
     type=click.Choice(["distance", "time"]),
     default="distance",
-    show_default=True,
     help="Horizontal axis; the distance is that of the reference body.",
 )
 @click.option(
     "--by",
     type=click.Choice(["wheel", "wheelset"]),
     default="wheel",
-    show_default=True,
     help="All wheels in one pair of axes, or one pair of axes for each wheelset.",
 )
 @click.option(
@@ -50,20 +49,15 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
     type=click.Choice(["curves", "map", "ranking"]),
     help="Of a study: curves; colours over two parameters; the runs by their values.",
 )
-@output_options
+@output_options()
 def command(
     file: str,
     selections: tuple[str, ...],
-    out: str | None,
-    over: str,
-    by: str,
-    between: tuple[float, float] | None,
     against: str | None,
     family: str | None,
     kind: str | None,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    output: Output,
+    **how: Any,
 ) -> None:
     """Draw quantities of a result or of a study, or a track with its curvature and cant.
 
@@ -88,44 +82,32 @@ def command(
       railsim plot curve_r250 --out curve.png
       railsim plot my_track.toml recording --out recording.png
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.gathered import folder_of
+    from railsim.plot.style import save
 
     folder = folder_of(file)
     of_study = os.path.isdir(folder)
-    path = Path(out or folder)
-    if not out and path.name:
-        path = path / "study.png" if of_study else path.with_suffix(".png")
-    check_file(path, overwrite=overwrite, endings=PICTURES)
+    default = folder / "study" if of_study and folder.name else folder
+    path = output.file(default, PICTURES, suffix=".png")
     options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
         figure = _study_figure(str(folder), selections, options)
     elif wrong := [option for option, value in options.items() if value]:
-        fault = Fault(wrong[0], "", f"'{file}' is no study's folder", "a folder of results")
-        raise InputError([fault])
+        found = f"'{file}' is no study's folder"
+        raise InputError([Fault(wrong[0], "", found, "a folder of results")])
     elif Path(file).suffix.lower() in RESULTS:
-        figure = _result_figure(file, selections, over, by, between)
+        from railsim.plot.histories import histories
+        from railsim.plot.selection import STUDY
+        from railsim.result import open_run
+
+        figure = histories(open_run(file), selections or STUDY, **how)
     else:
         figure = _track_figure(file, selections)
-    from railsim.plot.style import save
-
-    save(figure, path, overwrite=overwrite)
-    report_file(path, as_json=as_json, quiet=quiet)
-
-
-def _result_figure(
-    file: str, selections: tuple[str, ...], over: str, by: str, between: tuple[float, float] | None
-) -> "Figure":
-    from railsim.plot.histories import histories
-    from railsim.plot.selection import STUDY
-    from railsim.result import open_run
-
-    return histories(open_run(file), selections or STUDY, over=over, by=by, between=between)
+    output.wrote(save(figure, path, overwrite=output.overwrite))
 
 
 def _study_figure(
     file: str, selections: tuple[str, ...], options: "dict[str, str | None]"
 ) -> "Figure":
-    from railsim.cli.gathered import gather
     from railsim.plot.study import curves_figure, map_figure, ranking_figure
     from railsim.report.spread import columns, parameters
 
@@ -135,11 +117,11 @@ def _study_figure(
     if not known:
         raise InputError([Fault(file, "", "no run has values", "a study with finished runs")])
     names = selections or [name for name in DEFAULT if name in known] or list(known)[:4]
-    faults = [
+    faults = Faults(
         Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
         for name in names
         if name not in known
-    ]
+    )
     varied = {name: _quantity(column) for name, column in parameters(records).items()}
     faults += [
         Fault(
@@ -148,8 +130,7 @@ def _study_figure(
         for option in ("--against", "--family")
         if options[option] and options[option] not in varied
     ]
-    if faults:
-        raise InputError(faults)
+    faults.check()
     quantities = [_quantity(known[name]) for name in names]
     # most values first, numbers before words
     order = sorted(varied, key=lambda n: (not varied[n].numeric, -len(varied[n].different)))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import output_options, report_file
-from railsim.files.access import check_file, whole_file
+from railsim.cli.output import Output, output_options
+from railsim.files.access import whole_file
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment
@@ -19,26 +19,17 @@ ENDINGS = (".html", ".htm")
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="DIR_OR_FILES...")
-@click.option("--out", default="report.html", metavar="F.html", show_default=True, help="Page.")
+@click.option("--out", default="report.html", metavar="F.html", help="Page.")
 @click.option("--title", metavar="TEXT", help="Title; by default the names of what is reported.")
 @click.option(
     "--curves",
     type=click.IntRange(min=1, max=16),
     default=8,
-    show_default=True,
     metavar="N",
     help="Runs whose curves are shown; of more, those with the largest values.",
 )
-@output_options
-def command(
-    files: tuple[str, ...],
-    out: str,
-    title: str | None,
-    curves: int,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@output_options()
+def command(files: tuple[str, ...], title: str | None, curves: int, output: Output) -> None:
     """Write one self-contained page about results, studies, comparisons with tests.
 
     Inputs, peaks, values against limits, curves to zoom, spread over the varied parameters of a
@@ -51,10 +42,9 @@ def command(
       railsim report curves --out report.html
       railsim report manchester.h5 flexicoil.h5 --out coaches.html --overwrite
     """  # noqa: D301 - click reads the escape
-    path = Path(out)
-    check_file(path, overwrite=overwrite, endings=ENDINGS)
+    path = output.file("", ENDINGS)
     write_report(files, path, title=title, curves=curves)
-    report_file(path, as_json=as_json, quiet=quiet)
+    output.wrote(path)
 
 
 def write_report(
@@ -84,11 +74,8 @@ def write_report(
     with_files = [record for record in found.records if record["name"] in found.paths]
     results = found.results(worst_runs(with_files, curves))
     study = found.inputs.get("name")
-    names = (
-        str(study)
-        if study
-        else ", ".join(dict.fromkeys(folder_of(file).resolve().stem for file in files[:4]))
-    )
+    stems = dict.fromkeys(folder_of(file).resolve().stem for file in files[:4])
+    names = str(study) if study else ", ".join(stems)
     more = f" and {len(files) - 4} more" if len(files) > 4 else ""
     every = found.results([record["name"] for record in with_files])
     used = [] if results or not found.inputs else _used(folder_of(files[0]))
@@ -126,7 +113,13 @@ def _used(folder: Path) -> "list[Used]":
     except (RailsimError, OSError):
         return []
     return [
-        Used(str(case.labels["vehicle"]), str(case.labels["track"]), case.vehicle, case.track,
-             case.settings, case.speed)
+        Used(
+            str(case.labels["vehicle"]),
+            str(case.labels["track"]),
+            case.vehicle,
+            case.track,
+            case.settings,
+            case.speed,
+        )
         for case in cases
-    ]  # fmt: skip
+    ]

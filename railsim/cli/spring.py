@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    faults_in,
-    json_option,
-    output_options,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    set_option,
-    show,
-)
-from railsim.files.access import TABLES, check_file, check_folder, is_file, whole_file, write_folder
+from railsim.cli.common import echo, faults_in, set_option
+from railsim.cli.output import Output, output_options
+from railsim.files.access import TABLES, is_file, whole_file
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
@@ -46,32 +37,13 @@ def command() -> None:
 
 def _spring_command(function: Any) -> Any:
     """Make a command of the group with a file, a folder for pages and the common options."""
-    options = (
-        quiet_option,
-        json_option,
-        overwrite_option,
-        set_option,
-        click.option(
-            "--out", metavar="DIR", help=f"Folder for the pictures and the page {REPORT}."
-        ),
-        click.argument("file", metavar="FILE"),
-    )
-    for option in options:
-        function = option(function)
-    return command.command()(function)
+    options = output_options(f"Folder for the pictures and the page {REPORT}.")
+    return command.command()(click.argument("file")(set_option(options(function))))
 
 
 @_spring_command
 @click.option("--search", is_flag=True, help="Also search the nests that fit the table [search].")
-def design(
-    file: str,
-    search: bool,
-    out: str | None,
-    assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def design(file: str, search: bool, assignments: tuple[str, ...], output: Output) -> None:
     """Find stiffnesses and numbers of coils of the springs for two required deflections.
 
     With --search, also find the nests of standard wires that fit the space and the stresses,
@@ -86,7 +58,7 @@ def design(
     from railsim.springs.summary import design_data, search_data
     from railsim.springs.tables import design_table, search_table
 
-    suspension = _loaded(file, assignments, out, overwrite)
+    suspension = _loaded(file, assignments, output)
     with faults_in(file, "spring", suspension.name):
         result = designed(suspension)
         found = None
@@ -94,38 +66,26 @@ def design(
             from railsim.springs.search import search as searched
 
             found = searched(suspension)
-        written = _write_pages(suspension, out, overwrite, found) if out else []
-    if as_json:
-        data = design_data(suspension, result)
-        if found is not None:
-            data["search"] = search_data(found)
-        print_json(data)
-        return
+        _write_pages(suspension, output, found)
+    data = design_data(suspension, result)
     low, high = (load * 1e-3 for load in result.load_range)
-    show(
+    parts: list[Any] = [
         design_table(suspension, result),
         f"arm at the target: {math.degrees(result.rotation):.4f} deg; "
         f"target load possible there: {low:.3f} to {high:.3f} kN",
-    )
+    ]
     if found is not None:
-        show(
-            "",
+        data["search"] = search_data(found)
+        tried = (
             f"{found.tried} nests tried, {found.feasible} within all limits before refinement; "
-            f"ranked by {found.objective}",
-            search_table(found),
+            f"ranked by {found.objective}"
         )
-    _finish(suspension, written, quiet)
+        parts += ["", tried, search_table(found)]
+    output.answer(data, parts, suspension.unusual())
 
 
 @_spring_command
-def verify(
-    file: str,
-    out: str | None,
-    assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
     """Verify a suspension under all its loads: equilibrium, heights, stresses, buckling.
 
     A check that is not met is a result: the exit status stays 0.  A load that the nest cannot
@@ -143,36 +103,23 @@ def verify(
     from railsim.springs.tolerance import ride_heights
     from railsim.springs.verification import verify as verified
 
-    suspension = _loaded(file, assignments, out, overwrite)
+    suspension = _loaded(file, assignments, output)
     with faults_in(file, "spring", suspension.name):
         result = verified(suspension)
         heights = ride_heights(suspension) if suspension.tolerances is not None else ()
-        written = _write_pages(suspension, out, overwrite) if out else []
-    if as_json:
-        data = verification_data(suspension, result)
-        if heights:
-            data["ride_height"] = ride_height_data(heights)
-        print_json(data)
-        return
-    if suspension.load_notes:
-        show(tables.load_table(suspension), "")
-    sheets = data_sheets(suspension, result)
-    show(tables.case_table(result), "", tables.loaded_table(sheets), "")
-    show(tables.sheet_table(sheets), "", check_table(result.checks))
+        _write_pages(suspension, output)
+    data, sheets = verification_data(suspension, result), data_sheets(suspension, result)
+    parts: list[Any] = [tables.load_table(suspension), ""] if suspension.load_notes else []
+    parts += [tables.case_table(result), "", tables.loaded_table(sheets), ""]
+    parts += [tables.sheet_table(sheets), "", check_table(result.checks)]
     if heights:
-        show("", tables.ride_height_table(heights))
-    _finish(suspension, written, quiet)
+        data["ride_height"] = ride_height_data(heights)
+        parts += ["", tables.ride_height_table(heights)]
+    output.answer(data, parts, suspension.unusual())
 
 
 @_spring_command
-def fatigue(
-    file: str,
-    out: str | None,
-    assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
     """Stress range of each spring against the Goodman-Smith line of the material.
 
     \b
@@ -185,35 +132,25 @@ def fatigue(
     from railsim.springs.verification import dynamic_loads
     from railsim.springs.verification import fatigue as fatigue_of
 
-    suspension = _loaded(file, assignments, out, overwrite)
+    suspension = _loaded(file, assignments, output)
     with faults_in(file, "spring", suspension.name):
         result = fatigue_of(suspension)
         loads = dynamic_loads(suspension)
-        written = _write_pages(suspension, out, overwrite) if out else []
-    if as_json:
-        print_json(fatigue_data(suspension, result, loads))
-        return
+        _write_pages(suspension, output)
     low, high = (loads[key] * 1e-3 for key in ("min_load", "max_load"))
-    show(f"between {low:.3f} and {high:.3f} kN", fatigue_table(result))
-    _finish(suspension, written, quiet)
+    parts: list[Any] = [f"between {low:.3f} and {high:.3f} kN", fatigue_table(result)]
+    output.answer(fatigue_data(suspension, result, loads), parts, suspension.unusual())
 
 
 @command.command()
-@click.argument("file", metavar="FILE")
+@click.argument("file")
 @click.option("--out", metavar="F.toml", help="Vehicle file to write; by default to stdout.")
 @click.option("--load", metavar="NAME", help="Load at which the stiffness of the springs is taken.")
 @click.option("--extends", metavar="VEHICLE", help="Vehicle to extend instead of vehicle.extends.")
 @set_option
-@output_options
+@output_options()
 def vehicle(
-    file: str,
-    out: str | None,
-    load: str | None,
-    extends: str | None,
-    assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    file: str, load: str | None, extends: str | None, assignments: tuple[str, ...], output: Output
 ) -> None:
     """Write the suspension as a vehicle file that replaces the primary of another one.
 
@@ -222,12 +159,12 @@ def vehicle(
       railsim spring vehicle turasas_axlebox --out my_coach.toml --overwrite
       railsim run my_coach.toml curve_r250 --speed 20 --overwrite
     """  # noqa: D301 - click reads the escape
+    from railsim.definitions.loading import load_spring
     from railsim.errors import Fault, InputError, nearest
     from railsim.springs.vehicle_table import vehicle_part, vehicle_text
 
-    suspension = _loaded(file, assignments)
-    if out:
-        check_file(Path(out), overwrite=overwrite, endings=TABLES)
+    suspension = load_spring(file, assignments)
+    out = output.file(output.out, TABLES) if output.out else None
     with faults_in(file, "spring", suspension.name):
         if load is not None and load not in suspension.loads:
             valid = nearest(load, suspension.loads)
@@ -236,53 +173,43 @@ def vehicle(
         base, removed = _base(suspension, extends, out)
         text = vehicle_text(suspension, part, base, removed)
         if out:
-            with whole_file(Path(out)) as partial:
+            with whole_file(out) as partial:
                 partial.write_text(text, encoding="utf-8")
-    if as_json:
-        print_json(
-            {
-                "file": out,
-                "assembly": part.assembly,
-                "axleboxes": part.axleboxes,
-                "elements": part.elements,
-                "load": part.case.name,
-            }
-        )
-    elif not out:
-        echo(text.rstrip("\n"))
-    if not quiet:
-        for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
+            output.written.append(out)
+    for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
+        if not output.quiet:
             echo(remark, err=True)
-        if out and not as_json:
-            echo(out)
+    record = {
+        "file": output.out,
+        "assembly": part.assembly,
+        "axleboxes": part.axleboxes,
+        "elements": part.elements,
+        "load": part.case.name,
+    }
+    output.answer(record, [] if out else [text.rstrip("\n")])
 
 
-def _loaded(
-    file: str, assignments: Sequence[str], out: str | None = None, overwrite: bool = False
-) -> "TrailingArmSuspension":
+def _loaded(file: str, assignments: Sequence[str], output: Output) -> "TrailingArmSuspension":
     """Load a file; refuse a folder before anything is computed."""
     from railsim.definitions.loading import load_spring
 
-    if out:
-        check_folder(Path(out), [REPORT], overwrite=overwrite)
+    output.reserve(REPORT)
     return load_spring(file, assignments)
 
 
 def _write_pages(
-    suspension: "TrailingArmSuspension",
-    out: str,
-    overwrite: bool,
-    search: "SearchResult | None" = None,
-) -> list[Path]:
-    """Write pictures and page into a folder, created if it does not exist; nothing on a fault."""
+    suspension: "TrailingArmSuspension", output: Output, search: "SearchResult | None" = None
+) -> None:
+    """Write pictures and page into the folder of ``--out``, if there is one."""
+    if output.folder is None:
+        return
     from railsim.report.document import as_png
     from railsim.report.springs import collected, figures, page
 
     results = collected(suspension, search)
     drawn = {name: as_png(figure) for name, figure in figures(results).items()}
-    files = {f"{name}.png": png for name, png in drawn.items()}
-    files[REPORT] = page(results, drawn).encode()
-    return write_folder(Path(out), files, overwrite=overwrite)
+    files: dict[str, Any] = {f"{name}.png": png for name, png in drawn.items()}
+    output.write_all({**files, REPORT: page(results, drawn)})
 
 
 def _load_remarks(
@@ -311,7 +238,7 @@ def _load_remarks(
 
 
 def _base(
-    suspension: "TrailingArmSuspension", extends: str | None, out: str | None
+    suspension: "TrailingArmSuspension", extends: str | None, out: Path | None
 ) -> tuple[str | None, list[str] | None]:
     """The vehicle to extend as the written file must name it, and what to remove there."""
     if extends is None or suspension.vehicle is None:
@@ -323,8 +250,7 @@ def _base(
     data = read_source(base, "vehicle").data
     removed = [key for key in suspension.vehicle.remove if _holds(data, key_path(key))]
     if is_file(extends):
-        folder = Path(out).parent if out else Path()
-        extends = Path(os.path.relpath(base, folder)).as_posix()
+        extends = Path(os.path.relpath(base, out.parent if out else "")).as_posix()
     return extends, removed
 
 
@@ -332,15 +258,3 @@ def _holds(data: Any, path: Sequence[str]) -> bool:
     for part in path:
         data = data.get(part) if isinstance(data, dict) else None
     return data is not None
-
-
-def _finish(suspension: "TrailingArmSuspension", written: Sequence[Path], quiet: bool) -> None:
-    """Say what is unusual in the file, and what was written."""
-    from railsim.definitions.spring import spring_remarks
-
-    if quiet:
-        return
-    for remark in spring_remarks(suspension):
-        echo(f"remark: {remark}", err=True)
-    for path in written:
-        echo(str(path))

@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import echo, json_option, print_json, quiet_option, remarks_on
+from railsim.cli.common import echo, print_json, remarks_on
+from railsim.cli.output import Output, answer_options
 from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
@@ -15,9 +16,8 @@ PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="F...")
-@json_option
-@quiet_option
-def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
+@answer_options
+def command(files: tuple[str, ...], output: Output) -> int:
     """Check vehicle, track, settings, spring, mechanism, study and profile files.
 
     Every fault is listed with file, key, what was found and what is allowed; remarks point out what
@@ -30,11 +30,11 @@ def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
     from railsim.cli import DONE, WRONG_INPUT
 
     reports = [_report(file) for file in files]
-    if as_json:
+    if output.as_json:
         print_json([_record(report) for report in reports])
     else:
         for report in reports:
-            _print(report, quiet)
+            _print(report, output.quiet)
     return WRONG_INPUT if any(report["faults"] for report in reports) else DONE
 
 
@@ -93,7 +93,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         return f"study of {len(index.runs)} runs, {index.status}", []
 
     from railsim.definitions.loading import load_any
-    from railsim.errors import InputError
+    from railsim.errors import Faults
     from railsim.profiles.used import profile_faults
 
     definition = load_any(file)
@@ -102,8 +102,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
 
         run = load_measurement(file)
         return definition.KIND, [{"key": "channels", "text": remark} for remark in run.remarks]
-    if faults := profile_faults(definition, file):
-        raise InputError(faults)
+    Faults(profile_faults(definition, file)).check()
     return definition.KIND, [dict(vars(remark)) for remark in remarks_on(definition)]
 
 

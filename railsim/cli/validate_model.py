@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import code_options, echo, names_of, output_options, print_json, show
-from railsim.files.access import RESULTS, check_folder, write_folder
+from railsim.cli.common import code_options, fail_option, names_of
+from railsim.cli.output import Output, output_options
+from railsim.files.access import RESULTS
 
 if TYPE_CHECKING:
     from railsim.measurement import Measurement
@@ -28,22 +29,13 @@ FILES = ("model_validation.json", "sections.csv", "report.html", "scatter.png", 
     "--limits",
     metavar="F",
     default="validation_en14363_t",
-    show_default=True,
     help="Limits of the differences: a file, or the name of a shipped one.",
 )
-@click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
-@click.option("--out", metavar="DIR", help="Folder for JSON, CSV, pictures and a page.")
-@output_options
+@fail_option
+@output_options("Folder for JSON, CSV, pictures and a page.")
 @code_options
 def command(
-    files: tuple[str, ...],
-    vehicle: str | None,
-    limits: str,
-    fail: bool,
-    out: str | None,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    files: tuple[str, ...], vehicle: str | None, limits: str, fail: bool, output: Output
 ) -> int:
     """Compare simulated with measured runs, section by section (EN 14363, Annex T).
 
@@ -60,37 +52,26 @@ def command(
     from railsim.cli import DONE, LIMIT_EXCEEDED
     from railsim.measurement import load_measurement
 
-    folder = Path(out) if out else None
-    if folder:
-        check_folder(folder, FILES, overwrite=overwrite)
+    output.reserve(*FILES)
     names = [f for f in files if not (os.path.isdir(f) or Path(f).suffix.lower() in RESULTS)]
     runs = [load_measurement(name) for name in names]
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
     found = validate_model(runs, results, limits=limits)
-    if as_json:
-        print_json(found.record())
-    else:
-        show(f"{found.vehicle} against {', '.join(found.runs)}: {found.verdict}", found.table())
-        for remark in found.remarks if not quiet else ():
-            echo(f"note: {remark}")
-    if folder:
-        import json
-
-        from railsim.cli.common import plain
-        from railsim.report.document import as_png
+    if output.folder:
         from railsim.report.measured import validation_figures, validation_page
 
         figures = validation_figures(found)
         content = (
-            json.dumps(plain(found.record()), indent=2).encode(),
-            found.section_table().csv().encode(),
-            validation_page(found).encode(),
-            as_png(figures["scatter"]),
-            as_png(figures["overlays"]),
+            found.record(),
+            found.section_table(),
+            validation_page(found),
+            figures["scatter"],
+            figures["overlays"],
         )
-        for path in write_folder(folder, dict(zip(FILES, content, strict=True)), overwrite=True):
-            if not quiet and not as_json:
-                echo(str(path))
+        for name, one in zip(FILES, content, strict=True):
+            output.write(name, one)
+    verdict = f"{found.vehicle} against {', '.join(found.runs)}: {found.verdict}"
+    output.answer(found.record(), [verdict, found.table()], found.remarks)
     return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
 
 

@@ -6,67 +6,60 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    Speed,
-    allow_code_option,
-    echo,
-    load_option,
-    names_of,
-    output_options,
-    print_json,
-    set_option,
-    show,
-)
+from railsim.cli.common import Speed, allow_code_option, track_argument, vehicle_argument
+from railsim.cli.inputs import Given, given_options
+from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from railsim.cli.analysis import Folder
     from railsim.studies.wear_loop import WearStep
+    from railsim.table import Table
 
 RECORD, PICTURE, STEPS = "wear.json", "wear.png", "steps"
 MOST_STEPS = 1000
 
+Mix = tuple[tuple[str, float, float], ...]
+Rows = Mapping[str, list[dict[str, float | None]]]
+
 law_option = click.option(
-    "--law", default="pearce_sherratt", show_default=True, metavar="NAME_OR_FILE",
+    "--law",
+    default="pearce_sherratt",
+    metavar="NAME_OR_FILE",
     help="Law of wear; a wrong name shows all.",
-)  # fmt: skip
-settings_option = click.option(
-    "--settings", metavar="F", help="Settings file: creep law and contact."
 )
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
+@vehicle_argument
 @click.option(
-    "--route", "routes", required=True, multiple=True, type=(str, Speed(), float),
-    metavar="TRACK V SHARE", help="A track, its speed in m/s or with a unit, and its share of the "
-    "distance in any unit; may be repeated.",
-)  # fmt: skip
+    "--route",
+    "routes",
+    required=True,
+    multiple=True,
+    type=(str, Speed(), float),
+    metavar="TRACK V SHARE",
+    help="A track, its speed in m/s or with a unit, and its share of the distance in any unit; may "
+    "be repeated.",
+)
 @click.option("--distance", required=True, type=float, metavar="KM", help="Distance to run in km.")
 @click.option(
-    "--step", required=True, type=float, metavar="KM",
+    "--step",
+    required=True,
+    type=float,
+    metavar="KM",
     help="Distance in km between two updates of the wheel profile.",
-)  # fmt: skip
+)
 @law_option
 @click.option(
-    "--limits", default="wheel", show_default=True, metavar="F",
+    "--limits",
+    default="wheel",
+    metavar="F",
     help="Limits of flange and tread at which the loop ends.",
-)  # fmt: skip
-@click.option("--out", metavar="DIR", help="Folder for wear.json, wear.png and the profiles.")
-@settings_option
-@load_option
-@set_option
-@output_options
+)
+@given_options("creep law and contact")
+@output_options("Folder for wear.json, wear.png and the profiles.")
 @allow_code_option
-def command(
-    vehicle: str,
-    routes: tuple[tuple[str, float, float], ...],
-    settings: str | None,
-    load: str | None,
-    assignments: tuple[str, ...],
-    limits: str,
-    **how: Any,
-) -> None:
+def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) -> None:
     """Compute the wear of the wheels of a vehicle on several tracks, updating the profile.
 
     Each step runs every track once with the wheel profile of the step, averages the wear of all
@@ -80,53 +73,53 @@ def command(
       railsim wear coach_manchester --route curve_r500 20 0.3 --route straight 40 0.7 \\
           --distance 6000 --step 1000 --out worn
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.analysis import load_inputs
     from railsim.definitions.loading import load_wheel_limits
     from railsim.studies.wear_loop import Route, wear_loop, wear_rows
 
-    inputs = [load_inputs(vehicle, name, settings, assignments, load) for name, _, _ in routes]
+    inputs = [given.inputs(vehicle, track) for track, _, _ in routes]
     ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
-    coach, ends = inputs[0].vehicle, load_wheel_limits(limits)
+    (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
+    named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
     of = Wearing(
-        coach.name, "km", 1e3, "--distance",
-        {"vehicle": coach.name, "routes": [
-            {"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways
-        ]},
+        coach.name,
+        "km",
+        1e3,
+        "--distance",
+        {"vehicle": coach.name, "routes": named},
         [(w.track.name, w.speed, w.share) for w in ways],
         "mean of all wheels; y from the nominal rolling circle, negative towards the flange",
-        lambda **more: wear_loop(coach, ways, limits=ends, settings=inputs[0].settings, **more),
+        lambda **more: wear_loop(coach, ways, limits=ends, settings=settings, **more),
         lambda found: {"rows": wear_rows(found, coach, ways[0].track)},
-    )  # fmt: skip
+    )
     _carry_out(of, **how)
 
 
 @click.command()
-@click.argument("track", metavar="TRACK", shell_complete=names_of("track"))
+@track_argument
 @click.option(
-    "--traffic", required=True, multiple=True, type=(str, Speed(), float),
-    metavar="VEHICLE V SHARE", help="A vehicle, its speed in m/s or with a unit, and its share of "
-    "the tonnage in any unit; may be repeated.",
-)  # fmt: skip
+    "--traffic",
+    required=True,
+    multiple=True,
+    type=(str, Speed(), float),
+    metavar="VEHICLE V SHARE",
+    help="A vehicle, its speed in m/s or with a unit, and its share of the tonnage in any unit; "
+    "may be repeated.",
+)
 @click.option(
     "--tonnage", "distance", required=True, type=float, metavar="MT", help="Traffic in Mt."
 )
 @click.option(
-    "--step", required=True, type=float, metavar="MT",
+    "--step",
+    required=True,
+    type=float,
+    metavar="MT",
     help="Tonnage in Mt between two updates of the rail profiles.",
-)  # fmt: skip
+)
 @law_option
-@click.option("--out", metavar="DIR", help="Folder for wear.json and the profiles.")
-@settings_option
-@set_option
-@output_options
+@given_options("creep law and contact", load=False)
+@output_options("Folder for wear.json and the profiles.")
 @allow_code_option
-def rails(
-    track: str,
-    traffic: tuple[tuple[str, float, float], ...],
-    settings: str | None,
-    assignments: tuple[str, ...],
-    **how: Any,
-) -> None:
+def rails(track: str, traffic: Mix, given: Given, **how: Any) -> None:
     """Compute the wear of both rails of a track under a mix of traffic, updating their profiles.
 
     The mean wear over the track is removed from the profiles, so the track should have one
@@ -138,21 +131,23 @@ def rails(
       railsim rail-wear curve_r500 --traffic coach_manchester 20 3 --traffic wagon_y25 20 1 \\
           --tonnage 0.1 --step 0.05 --out worn
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.analysis import load_inputs
     from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
 
-    inputs = [load_inputs(name, track, settings, assignments) for name, _, _ in traffic]
+    inputs = [given.inputs(vehicle, track) for vehicle, _, _ in traffic]
     mix = [Traffic(i.vehicle, v, share) for i, (_, v, share) in zip(inputs, traffic, strict=True)]
+    _, worn, settings = inputs[0]
+    named = [{"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix]
     of = Wearing(
-        inputs[0].track.name, "Mt", 1e9, "--tonnage",
-        {"track": inputs[0].track.name, "traffic": [
-            {"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix
-        ]},
+        worn.name,
+        "Mt",
+        1e9,
+        "--tonnage",
+        {"track": worn.name, "traffic": named},
         [(t.vehicle.name, t.speed, t.share) for t in mix],
         "both rails; y from the middle of the rail, negative towards the gauge side",
-        lambda **more: rail_wear(inputs[0].track, mix, settings=inputs[0].settings, **more),
+        lambda **more: rail_wear(worn, mix, settings=settings, **more),
         rail_rows,
-    )  # fmt: skip
+    )
     _carry_out(of, **how)
 
 
@@ -182,72 +177,59 @@ class Wearing:
     shares: Sequence[tuple[str, float, float]]
     note: str
     loop: "Callable[..., list[WearStep]]"
-    rows: "Callable[[list[WearStep]], Mapping[str, list[dict[str, float | None]]]]"
+    rows: "Callable[[list[WearStep]], Rows]"
 
 
-def _carry_out(
-    of: Wearing, *, distance: float, step: float, law: str, out: str | None, overwrite: bool,
-    as_json: bool, quiet: bool,
-) -> None:  # fmt: skip
+def _carry_out(of: Wearing, distance: float, step: float, law: str, output: Output) -> None:
     from railsim.assessment.wear import wear_law
-    from railsim.cli.analysis import Folder
     from railsim.errors import RailsimError
+    from railsim.profiles import save_profile
 
     steps = _number_of_steps(of, distance, step)
     amounts = [of.scale * step * (number + 1) for number in range(steps)]
-    folder = Folder(out, (RECORD, PICTURE, *(_file_name(of, at) for at in amounts)), overwrite)
+    folder = output.reserve(RECORD, PICTURE, *(_file_name(of, at) for at in amounts))
     found: list[WearStep] = []
     remarks: list[str] = []
 
     def remark(words: str) -> None:
         remarks.append(words)
-        echo(f"remark: {words}", err=True)
+        output.remark(words)
 
     ended = None
     try:
-        with progress_bar("wear", quiet=quiet) as progress:
+        with progress_bar("wear", quiet=output.quiet) as progress:
             of.loop(
-                step=of.scale * step, steps=steps, law=law, progress=progress,
-                folder=None if folder.path is None else folder.path / STEPS,
-                on_step=found.append, on_remark=remark,
-            )  # fmt: skip
+                step=of.scale * step,
+                steps=steps,
+                law=law,
+                progress=progress,
+                folder=folder and folder / STEPS,
+                on_step=found.append,
+                on_remark=remark,
+            )
     except RailsimError as error:
         if not found:
             raise
         ended = error
     rows = of.rows(found)
-    end = None if ended is None else str(ended)
-    record = {**of.record, "step": of.scale * step, "law": law, **rows, "remarks": remarks,
-              "ended": end}  # fmt: skip
-    _write(folder, of, record, found)
-    if not as_json:
-        _show(of, wear_law(law).source, rows)
-        folder.tell()
-    elif ended is None:
-        print_json(record)
-    if ended is not None:
-        raise ended
-
-
-def _write(
-    folder: "Folder", of: Wearing, record: Mapping[str, Any], found: "list[WearStep]"
-) -> None:
-    """Write record, profiles and, of wheels, the picture of what was done."""
-    from railsim.profiles import save_profile
-
-    folder.write_json(RECORD, record)
-    if folder.path is None:
-        return
+    record: dict[str, Any] = {**of.record, "step": of.scale * step, "law": law, **rows}
+    record |= {"remarks": remarks, "ended": None if ended is None else str(ended)}
+    output.write(RECORD, record)
     for done in found:
         for side, worn in done.worn_profiles.items():
-            name = _file_name(of, done.distance + done.length, side)
-            folder.written.append(save_profile(worn, folder.path / name))
-    if "rows" in record:
+            if folder is not None:
+                name = _file_name(of, done.distance + done.length, side)
+                output.written.append(save_profile(worn, folder / name))
+    if "rows" in rows:
         from railsim.plot.wear import wear_figure
 
         wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
         title = f"{of.name}: wear of the wheels"
-        folder.write_picture(PICTURE, wear_figure(wheels, record["rows"], title))
+        output.write(PICTURE, lambda: wear_figure(wheels, rows["rows"], title))
+    if ended is None or not output.as_json:
+        output.answer(record, _parts(of, wear_law(law).source, rows))
+    if ended is not None:
+        raise ended
 
 
 def _file_name(of: Wearing, amount: float, side: str = "wheel") -> str:
@@ -255,15 +237,13 @@ def _file_name(of: Wearing, amount: float, side: str = "wheel") -> str:
 
 
 def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
-    from railsim.errors import Fault, InputError
+    from railsim.errors import Fault, Faults, InputError
 
-    faults = [
+    Faults(
         Fault(option, "", f"found {value:g}", "above 0")
         for option, value in ((of.option, distance), ("--step", step))
         if not 0.0 < value < float("inf")
-    ]
-    if faults:
-        raise InputError(faults)
+    ).check()
     steps = round(min(distance / step, MOST_STEPS + 1.0))
     if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
         whole = of.option.removeprefix("--")
@@ -273,12 +253,12 @@ def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
     return steps
 
 
-def _show(of: Wearing, source: str, rows: "Mapping[str, list[dict[str, float | None]]]") -> None:
+def _parts(of: Wearing, source: str, rows: Rows) -> "list[str | Table]":
     from railsim.table import Column, Table
 
     total = sum(share for _, _, share in of.shares)
     shares = ", ".join(f"{share / total:.0%} {name} at {v:g} m/s" for name, v, share in of.shares)
-    show(of.name, f"  {shares}", f"  {source}, {of.note}")
+    parts: list[str | Table] = [of.name, f"  {shares}", f"  {source}, {of.note}"]
     columns = [
         Column("distance", "distance" if of.unit == "km" else "tonnage", of.unit, "g"),
         Column("area", "worn area", "mm2", ".2f"),
@@ -292,4 +272,5 @@ def _show(of: Wearing, source: str, rows: "Mapping[str, list[dict[str, float | N
     for side, of_side in rows.items():
         shown = [row if row["area"] else row | {"deepest_y": None} for row in of_side]
         known = [column for column in columns if column.name in shown[0]]
-        show("", Table(known, shown, "" if side == "rows" else f"{side} rail"))
+        parts += ["", Table(known, shown, "" if side == "rows" else f"{side} rail")]
+    return parts

@@ -16,13 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError
 from railsim.files.access import TABLE_BYTES, is_file, read_text
 from railsim.text import LONGEST_FILE, shortened
-
-Array = NDArray[np.float64]
 
 MOST_SECTIONS = 2000
 FEWEST_POINTS = 8
@@ -46,9 +44,9 @@ class SectionList:
         where no features are given.
     """
 
-    positions: Array
-    points: tuple[Array, ...]
-    features: Array
+    positions: Floats
+    points: tuple[Floats, ...]
+    features: Floats
 
 
 def read_sections(path: str | Path, kind: str) -> SectionList:
@@ -90,7 +88,7 @@ def _wrong(path: Path, key: str, found: str, allowed: str) -> InputError:
     return InputError([Fault(str(path), key, found, allowed)])
 
 
-def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Array]:
+def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Floats]:
     """Positions [m or rad], files and features of a list of the program CONTACT."""
     lines = [
         (number, stripped)
@@ -139,7 +137,7 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Ar
     return positions, names, features
 
 
-def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Array]]:
+def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Floats]]:
     """Positions and points of the project's own list."""
     key = "s" if kind == "rail" else "angle"
     rows = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
@@ -166,7 +164,7 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Array
     return list(found), [_checked(path, np.array(points).T) for points in found.values()]
 
 
-def _section(path: Path, name: str) -> Array:
+def _section(path: Path, name: str) -> Floats:
     """Points y, z of a section [m]."""
     file = path.parent / name
     if not name or not is_file(file):
@@ -189,7 +187,7 @@ def _section(path: Path, name: str) -> Array:
     return _checked(file, points)
 
 
-def _checked(file: Path, points: Array) -> Array:
+def _checked(file: Path, points: Floats) -> Floats:
     """Points of a section that can be one [m]."""
     if points.shape[-1] < FEWEST_POINTS:
         raise _wrong(file, "", f"{points.shape[-1]} points", f"{FEWEST_POINTS} at least")

@@ -12,11 +12,14 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from railsim.errors import Fault, InputError
+from railsim.errors import Faults
 from railsim.files.key_paths import descend, full_path, key_path
-from railsim.files.sources import OVERRIDE, Source, override_fault, replace_origin
+from railsim.files.sources import OVERRIDE, Source, located_fault, override_fault, replace_origin
 from railsim.text import shortened
 from railsim.units import number_with_unit
+
+Read = Callable[[Any], Any]
+"""What becomes of a present value."""
 
 
 def apply_overrides(
@@ -42,19 +45,8 @@ def apply_overrides(
     ------
     InputError : an assignment that means nothing; all of them at once.
     """
-    if isinstance(overrides, str):
-        overrides = [overrides]
-    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
-    faults = []
-    for text in overrides:
-        try:
-            _apply(changed, text, free, defaults)
-        except KeyError as problem:
-            key = text.partition("=")[0].strip()
-            faults.append(override_fault(key, str(problem.args[0])))
-    if faults:
-        raise InputError(faults)
-    return changed
+    texts = [overrides] if isinstance(overrides, str) else overrides
+    return _changed(source, map(_parsed, texts), free, defaults, OVERRIDE)
 
 
 def with_values(
@@ -71,21 +63,19 @@ def with_values(
     ------
     InputError : keys that lead nowhere; all of them at once.
     """
-    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
-    faults = []
-    for key, value in values.items():
-        try:
-            _assign(changed, key, partial(_given, value), free, defaults, source.file)
-        except KeyError as problem:
-            faults.append(Fault(source.file, key, str(problem.args[0]), ""))
-    if faults:
-        raise InputError(faults)
-    return changed
+    given = ((key, partial(_given, value)) for key, value in values.items())
+    return _changed(source, given, free, defaults, source.file)
 
 
 def _given(value: Any, _: Any) -> Any:
     """Return a value whatever the present one is."""
     return _plain(value)
+
+
+def _parsed(text: str) -> tuple[str, Read | None]:
+    """Return the key of an assignment, and what makes its value of the present one."""
+    key, equals, written = text.partition("=")
+    return key.strip(), partial(_value, written.strip()) if equals else None
 
 
 def _plain(value: Any) -> Any:
@@ -99,21 +89,31 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _apply(source: Source, text: str, free: Sequence[str], defaults: Mapping[str, Any]) -> None:
-    key, equals, written = text.partition("=")
-    if not equals:
-        raise KeyError("an assignment key.path=value is needed")
-
-    def read(present: Any) -> Any:
-        return _value(written.strip(), isinstance(present, str))
-
-    _assign(source, key.strip(), read, free, defaults, OVERRIDE)
+def _changed(
+    source: Source,
+    assignments: Iterable[tuple[str, Read | None]],
+    free: Sequence[str],
+    defaults: Mapping[str, Any],
+    origin: str,
+) -> Source:
+    """Return the source with keys set to what is made of their present values."""
+    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
+    faults = Faults()
+    for key, read in assignments:
+        try:
+            if read is None:
+                raise KeyError("an assignment key.path=value is needed")
+            _assign(changed, key, read, free, defaults, origin)
+        except KeyError as problem:
+            faults.append(located_fault(origin, key, str(problem.args[0]), ""))
+    faults.check()
+    return changed
 
 
 def _assign(
     source: Source,
     key: str,
-    read: Callable[[Any], Any],
+    read: Read,
     free: Sequence[str],
     defaults: Mapping[str, Any],
     origin: str,
@@ -131,8 +131,9 @@ def _assign(
     replace_origin(source.origin, names, present, parent[last], origin)
 
 
-def _value(written: str, text_expected: bool) -> Any:
+def _value(written: str, present: Any) -> Any:
     """Return a written value: TOML, and what is not TOML is text without its quotes."""
+    text_expected = isinstance(present, str)
     try:
         value = tomllib.loads(f"value = {written}")["value"]
     except tomllib.TOMLDecodeError:
@@ -157,7 +158,7 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
     InputError : an assignment with another beginning.
     """
     sorted_ones: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
-    faults = []
+    faults = Faults()
     for text in overrides:
         prefix, _, rest = text.partition(".")
         if prefix in sorted_ones:
@@ -166,6 +167,5 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
             key = text.partition("=")[0]
             allowed = "a path that begins with vehicle., track. or settings."
             faults.append(override_fault(key, "unknown beginning", allowed))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return sorted_ones

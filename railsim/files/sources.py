@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import Fault, Faults, InputError, argument_fault, nearest
 from railsim.files.access import DEFINITION_BYTES, is_file, read_text
 from railsim.files.key_paths import descend, key_path
 from railsim.text import shortened
@@ -299,8 +299,7 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
         found = f"the {len(chain)}th file in a chain"
         raise InputError([Fault(str(path), "extends", found, f"{LONGEST_CHAIN} at most")])
     base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
-    if faults := [fault for key in removed for fault in _remove(base, key, str(path))]:
-        raise InputError(faults)
+    Faults(fault for key in removed for fault in _remove(base, key, str(path))).check()
     _merge(base.data, data, (), base.origin, str(path))
     return Source(str(path), base.data, base.origin)
 
@@ -319,7 +318,7 @@ def _without_extends(
     data = dict(data)
     base = data.pop("extends", None)
     removed = data.pop("remove", [])
-    faults = []
+    faults = Faults()
     if base is not None and not isinstance(base, str):
         faults.append(
             Fault(str(path), "extends", shortened(repr(base)), "a path or the name of a file")
@@ -330,8 +329,7 @@ def _without_extends(
         )
     elif removed and base is None:
         faults.append(Fault(str(path), "remove", "no 'extends'", "'remove' goes with 'extends'"))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return data, base, removed
 
 

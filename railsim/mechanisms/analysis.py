@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import InputError, argument_fault, nearest
 from railsim.mechanisms.cams import Transition, transitions
 from railsim.mechanisms.contact import Contact, Rest, contact_of, positions_of_rest
 from railsim.mechanisms.dynamics import FreeMotion, TimedMotion, driven_motion, free_motion
@@ -18,7 +18,6 @@ from railsim.mechanisms.kinematics import Motion, check_freedom, driver_words, f
 from railsim.mechanisms.model import Model, build
 from railsim.mechanisms.outputs import check_pressure, outputs, sampled, zone_drivers
 
-Floats = NDArray[np.float64]
 DENSE = 401
 """Positions from which heights and lengths are looked up."""
 
@@ -166,8 +165,6 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     >>> print(f"{result.stroke * 1e3:.3f} mm, {result.max_force:.0f} N")
     113.668 mm, 9803 N
     """
-    if case is not None and case not in definition.cases:
-        raise InputError([no_case(definition, case)])
     definition = definition.in_case(case)
     model = build(definition)
     check_freedom(model)
@@ -196,13 +193,6 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
         _release(model),
         case,
     )
-
-
-def no_case(definition: Mechanism, case: str) -> Fault:
-    """The fault of a case that a mechanism does not have."""
-    cases = definition.cases
-    allowed = nearest(case, cases) if cases else "the file has no cases"
-    return argument_fault("case", "", f"no case '{case}'", allowed)
 
 
 def _force_zeros(dense: Motion) -> tuple[float, ...]:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.parts import Link, Prismatic, Revolute
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.model import Model
 
-Floats = NDArray[np.float64]
 CLOSED = 1e-9
 """Residual, as a share of the mechanism's size, of a closed loop."""
 TRIES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5)

@@ -1,13 +1,16 @@
 """Checks of a mechanism: every value that a file limits, against its limit."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from railsim.definitions.mechanism.definition import Actuator
 from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring, Piston
 from railsim.definitions.mechanism.values import points_of
 from railsim.design_checks import ROUNDING, Check
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.components import cylinder_area, lid_force, next_size
-from railsim.mechanisms.forces import unit_work
+from railsim.mechanisms.components import lid_force, next_size
+from railsim.mechanisms.forces import chamber_area, unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion
 from railsim.mechanisms.outputs import actuator_of
@@ -15,54 +18,63 @@ from railsim.mechanisms.outputs import actuator_of
 
 def checks(result: Analysis) -> list[Check]:
     """Everything that a mechanism must keep, as far as its file says so."""
-    definition = result.definition
-    found = [*_forces(result), *_angles(result), *_lengths(result), *_boxes(result)]
+    return [*_checks(result)]
+
+
+def _checks(result: Analysis) -> Iterator[Check]:
+    definition, n = result.definition, result.model.number
+    if definition.solve is not None:
+        yield from _forces(result, definition.actuators[definition.solve.unknown])
+    limits = definition.optimise
+    if limits is not None and limits.min_transmission_angle is not None:
+        limit = n(limits.min_transmission_angle)
+        note = "smallest over the whole travel, folded to 90 deg"
+        for angle, value in result.min_angles.items():
+            if definition.angles[angle].limited:
+                yield Check(angle, value, limit, "above", "rad", note)
+    if "length" in result.output:
+        yield from _lengths(result)
+    yield from _boxes(result)
     for element, part in definition.elements.items():
         if isinstance(part, GasSpring):
-            found += _gas_spring(result, element, part)
+            yield from _gas_spring(result, element, part)
     if (lid := definition.lid) is not None:
-        n, part = result.model.number, definition.elements[lid.element]
+        part = definition.elements[lid.element]
         assert isinstance(part, GasSpring)
         rule = lid_force(n(lid.mass), n(lid.centre), n(lid.lever), n(lid.springs), n(lid.factor))
         note = "F1 and the makers' rule of thumb G D/(b n) 9.8 alpha, which is approximate"
-        found.append(Check(f"lid_{lid.element}", n(part.F1), rule, "about", "N", note))
+        yield Check(f"lid_{lid.element}", n(part.F1), rule, "about", "N", note)
     if result.contact is not None:
         values = [*result.contact.rising.values(), *result.contact.falling.values()]
         note = "static contact force in the zone: the head must not come down"
-        found.append(Check("contact_force", float(np.min(values)), 0.0, "above", "N", note))
-    return found
+        yield Check("contact_force", float(np.min(values)), 0.0, "above", "N", note)
 
 
-def _forces(result: Analysis) -> list[Check]:
+def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
     """The unknown force in either sense, on the way from start to end and back."""
-    definition, n = result.definition, result.model.number
-    if definition.solve is None:
-        return []
-    unknown = definition.actuators[definition.solve.unknown]
+    n, limits = result.model.number, result.definition.optimise
     least, most = force_range(result)
-    limits = definition.optimise
-    found = []
+    acts = unknown.acts if isinstance(unknown, Cylinder) else "push"
     if isinstance(unknown, Cylinder):
         pressure = n(unknown.supply_pressure)
         note = "largest force of the chamber under pressure against bore and supply pressure"
-        available = pressure * area(result, unknown)
-        found.append(Check("available_force", max(most, 0.0), available, "below", "N", note))
-        if unknown.acts == "both":
+        acting = "pull" if acts == "pull" else "push"
+        available = pressure * chamber_area(result.model, unknown, acting)
+        yield Check("available_force", max(most, 0.0), available, "below", "N", note)
+        if acts == "both":
             note = "largest pull against bore less rod and supply pressure"
-            available = pressure * area(result, unknown, pulls=True)
-            found.append(Check("available_pull", max(-least, 0.0), available, "below", "N", note))
+            available = pressure * chamber_area(result.model, unknown, "pull")
+            yield Check("available_pull", max(-least, 0.0), available, "below", "N", note)
     elif limits is not None and limits.available_force is not None:
         note, limit = "largest amount of the force", n(limits.available_force)
-        found.append(Check("available_force", result.peak_force, limit, "below", "N", note))
-    if (isinstance(unknown, Cylinder) and unknown.acts != "both") or isinstance(unknown, AirSpring):
-        pulls = getattr(unknown, "acts", "push") == "push"
-        name, words = ("pulls", "push") if pulls else ("pushes", "pull")
+        yield Check("available_force", result.peak_force, limit, "below", "N", note)
+    if isinstance(unknown, Cylinder | AirSpring) and acts != "both":
+        name, words = ("pulls", "push") if acts == "push" else ("pushes", "pull")
         note = f"least force: it can only {words}"
-        found.append(Check(name, _sign(least, result), 0.0, "above", "N", note))
+        yield Check(name, _sign(least, result), 0.0, "above", "N", note)
     if isinstance(unknown, Cylinder | AirSpring | Piston):
         note = "least force along its motion: below 0 the load runs ahead and must be held back"
-        found.append(Check("runs_ahead", runs_ahead(result), 0.0, "above", "N", note))
-    return found
+        yield Check("runs_ahead", runs_ahead(result), 0.0, "above", "N", note)
 
 
 def force_range(result: Analysis) -> tuple[float, float]:
@@ -86,54 +98,35 @@ def _sign(force: float, result: Analysis) -> float:
     return 0.0 if abs(force) <= ROUNDING * result.peak_force else force
 
 
-def _angles(result: Analysis) -> list[Check]:
-    limits = result.definition.optimise
-    if limits is None or limits.min_transmission_angle is None:
-        return []
-    limit = result.model.number(limits.min_transmission_angle)
-    note = "smallest over the whole travel, folded to 90 deg"
-    return [
-        Check(angle, value, limit, "above", "rad", note)
-        for angle, value in result.min_angles.items()
-        if result.definition.angles[angle].limited
-    ]
-
-
-def _lengths(result: Analysis) -> list[Check]:
-    if "length" not in result.output:
-        return []
+def _lengths(result: Analysis) -> Iterator[Check]:
     definition, n = result.definition, result.model.number
     limits = definition.optimise
     actuator = definition.actuators[actuator_of(definition) or ""]
     shortest = result.extremes("length").least
-    found = []
     if limits is not None and limits.min_length is not None:
-        note = "shortest length wanted"
-        found.append(Check("min_length", shortest, n(limits.min_length), "above", "m", note))
+        limit, note = n(limits.min_length), "shortest length wanted"
+        yield Check("min_length", shortest, limit, "above", "m", note)
     if limits is not None and limits.max_stroke is not None:
-        note = "stroke wanted at most"
-        found.append(Check("max_stroke", result.stroke, n(limits.max_stroke), "below", "m", note))
+        limit, note = n(limits.max_stroke), "stroke wanted at most"
+        yield Check("max_stroke", result.stroke, limit, "below", "m", note)
     if isinstance(actuator, Cylinder) and actuator.pin_to_pin is not None:
         stroke = next_size([n(s) for s in actuator.strokes], result.stroke)
         if stroke is not None:
             least = n(actuator.pin_to_pin) + stroke
             note = f"shortest length against pin to pin and the stroke of {stroke * 1e3:g} mm"
-            found.append(Check("pin_to_pin", shortest, least, "above", "m", note))
-    return found
+            yield Check("pin_to_pin", shortest, least, "above", "m", note)
 
 
-def _boxes(result: Analysis) -> list[Check]:
+def _boxes(result: Analysis) -> Iterator[Check]:
     """Points against the boxes that they may not leave."""
     limits = result.definition.optimise
-    found = []
     for i, box in enumerate(limits.envelope if limits is not None else ()):
         for axis, edges in ((0, box.x), (1, box.y)):
             for edge, sense, k in zip(edges or (), ("above", "below"), (-1.0, 1.0), strict=False):
                 value = k * max(_furthest(result, point, axis, k) for point in box.points)
                 note = f"{'xy'[axis]} of {', '.join(box.points)}"
                 limit = result.model.number(edge)
-                found.append(Check(f"envelope.{i}", value, limit, sense, "m", note))
-    return found
+                yield Check(f"envelope.{i}", value, limit, sense, "m", note)
 
 
 def _furthest(result: Analysis, point: str, axis: int, sense: float) -> float:
@@ -143,20 +136,19 @@ def _furthest(result: Analysis, point: str, axis: int, sense: float) -> float:
     return largest(result.motion, along, along(result.motion))[1]
 
 
-def _gas_spring(result: Analysis, name: str, spring: GasSpring) -> list[Check]:
+def _gas_spring(result: Analysis, name: str, spring: GasSpring) -> Iterator[Check]:
     """Temperature against the nearer end of the service range; the rod's end when compressed."""
     n = result.model.number
     value, (low, high) = n(spring.temperature), (n(x) for x in spring.service)
     above = value < 0.5 * (low + high)
     limit, sense = (low, "above") if above else (high, "below")
     note = "temperature against the range in service"
-    found = [Check(f"{name}_temperature", value, limit, sense, "C", note)]
+    yield Check(f"{name}_temperature", value, limit, sense, "C", note)
     if spring.rod_end is not None:
         note = "height of the body's end over the rod's, compressed: the rod must point down"
         drop = rod_drop(result, name)
         drop = drop if spring.rod_end == spring.gas_spring[0] else -drop
-        found.append(Check(f"{name}_rod_down", drop, 0.0, "above", "m", note))
-    return found
+        yield Check(f"{name}_rod_down", drop, 0.0, "above", "m", note)
 
 
 def rod_drop(result: Analysis, name: str) -> float:
@@ -165,13 +157,3 @@ def rod_drop(result: Analysis, name: str) -> float:
     k = int(np.argmin(result.output[f"{name}_length"]))
     first, second = (result.motion.point(point)[0][k, 1] for point in pair)
     return float(second - first)
-
-
-def area(
-    result: Analysis, cylinder: Cylinder, bore: float | None = None, *, pulls: bool = False
-) -> float:
-    """Area of a cylinder's chamber under pressure, of the pulling one where both can be [m2]."""
-    n = result.model.number
-    size = n(cylinder.bore) if bore is None else bore
-    acts = "pull" if pulls or cylinder.acts == "pull" else "push"
-    return float(cylinder_area(size, n(cylinder.rod), n(cylinder.count), acts))

@@ -1,7 +1,7 @@
 """Several mechanisms side by side at equal output; the first is the reference."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,44 +15,33 @@ POINTS = 215
 """Positions in the zone at which ratios are compared, in equal steps of the reference's length."""
 
 
-@dataclass(frozen=True)
-class Compared:
-    """One mechanism against the reference."""
+def compare(results: Sequence[Analysis]) -> list[dict[str, Any]]:
+    """Compare mechanisms with the first one.
 
-    name: str
-    values: dict[str, float]  # results by name; NaN where the mechanism has none
-    error: float  # sum of squared differences of the ratio from the reference's at equal heights
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Mechanisms by their file, the reference first."""
-
-    rows: tuple[Compared, ...]
-
-
-def compare(results: Sequence[Analysis]) -> Comparison:
-    """Compare mechanisms with the first one."""
+    Returns
+    -------
+    list of dict
+        Results of each by name, where it has them; `error` is the sum of squared differences of the
+        ratio from the reference's at equal heights, NaN where there is none.
+    """
     reference = _reference(results[0])
     rows = []
     for result in results:
-        values = {
+        limited = [v for n, v in result.min_angles.items() if result.definition.angles[n].limited]
+        row: dict[str, Any] = {
+            "name": result.definition.name + (f", {result.case}" if result.case else ""),
             "stroke": result.stroke,
             "max_force": result.max_force,
             "peak_force": result.peak_force,
             "length_start": float(result.output.get("length", [np.nan])[0]),
-            "min_angle": min(
-                (v for n, v in result.min_angles.items() if result.definition.angles[n].limited),
-                default=np.nan,
-            ),
+            "min_angle": min(limited, default=np.nan),
         }
         if result.zone and "force" in result.zone["work"]:
             forces = [result.zone[k]["force"] for k in ("low", "work", "high")]
-            values["work_force"] = forces[1]
-            values["zone_spread"] = (max(forces) - min(forces)) / float(np.mean(forces))
-        name = result.definition.name + (f", {result.case}" if result.case else "")
-        rows.append(Compared(name, values, _error(result, reference)))
-    return Comparison(tuple(rows))
+            row["work_force"] = forces[1]
+            row["zone_spread"] = (max(forces) - min(forces)) / float(np.mean(forces))
+        rows.append({**row, "error": _error(result, reference)})
+    return rows
 
 
 def _reference(result: Analysis) -> Positions | None:

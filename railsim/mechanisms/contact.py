@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.expressions import Expression
 from railsim.definitions.mechanism.parts import AUTO
 from railsim.mechanisms.forces import (
@@ -21,8 +21,6 @@ from railsim.mechanisms.forces import (
 from railsim.mechanisms.inversion import zeros
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.outputs import height_of
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.parts import (
     GasSpring,
     Link,
@@ -19,7 +19,6 @@ from railsim.definitions.mechanism.values import ends
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.kinematics import Motion
 
-Floats = NDArray[np.float64]
 ARC_POINTS = 24
 COILS = 8
 

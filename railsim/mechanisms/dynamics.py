@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism import definition as written
 from railsim.definitions.mechanism.values import points_of
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia
@@ -15,7 +15,6 @@ from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.links import Course
 from railsim.mechanisms.model import Model
 
-Floats = NDArray[np.float64]
 Law = Callable[[Floats], tuple[Floats, Floats, Floats]]
 """Travel, speed and acceleration at given times."""
 

@@ -345,9 +345,11 @@ def pressure_for(motion: Motion, name: str, force: Any) -> Any:
         return table_of(motion, actuator).pressure(motion.length(actuator.air_spring)[0], force)
     assert isinstance(actuator, Cylinder)
     if actuator.acts != "both":
-        return force / _area(motion, actuator, actuator.acts)
-    pulls = -force / _area(motion, actuator, "pull")
-    return np.where(np.real(force) < 0.0, pulls, force / _area(motion, actuator, "push"))
+        return force / chamber_area(motion.model, actuator, actuator.acts)
+    pulls = -force / chamber_area(motion.model, actuator, "pull")
+    return np.where(
+        np.real(force) < 0.0, pulls, force / chamber_area(motion.model, actuator, "push")
+    )
 
 
 def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
@@ -356,11 +358,12 @@ def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
     if isinstance(actuator, AirSpring):
         return table_of(motion, actuator).force(motion.length(actuator.air_spring)[0], pressure)
     assert isinstance(actuator, Cylinder)
-    return pressure * _area(motion, actuator, actuator.acts) + 0.0 * motion.s
+    return pressure * chamber_area(motion.model, actuator, actuator.acts) + 0.0 * motion.s
 
 
-def _area(motion: Motion, cylinder: Cylinder, acts: str) -> Any:
-    n = motion.model.number
+def chamber_area(model: Model, cylinder: Cylinder, acts: str) -> Any:
+    """Area of the chamber that pushes or pulls, of all cylinders side by side [m2]."""
+    n = model.number
     return cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), acts)
 
 

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.model import Model
 
-Floats = NDArray[np.float64]
 Quantity = Callable[[Motion], tuple[Any, Any]]
 """A quantity and its derivative by the driver, of a motion."""
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism, Optimise
 from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism.values import ends, number, parameter_values
@@ -31,7 +31,6 @@ from railsim.mechanisms.model import Model, build, with_lanes
 from railsim.mechanisms.outputs import length_points
 from railsim.mechanisms.targets import Positions, drivers_at_heights, positions
 
-Floats = NDArray[np.float64]
 GRID = 17
 """Positions over the whole travel at which constraints are held."""
 DENSE = 201

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.expressions import atan2
 from railsim.definitions.mechanism.parts import Angle
 from railsim.errors import Fault, InputError
@@ -19,7 +20,6 @@ from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.assembly import assembled, constraints, dead_loop, open_loop
 from railsim.mechanisms.model import STEP, Model
 
-Floats = NDArray[np.float64]
 Triple = tuple[Any, Any, Any]
 ASTRAY = 1.0
 """Turn from the given pose beyond which the nearest assembly is looked for instead [rad]."""

@@ -14,9 +14,9 @@ from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number
 from railsim.errors import Fault, InputError, argument_fault
@@ -26,8 +26,6 @@ from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of
 from railsim.processes import workers_begin
 from railsim.units import duration_in_words
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis, analyse
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import check_freedom
 from railsim.mechanisms.model import build
-
-Floats = NDArray[np.float64]
-
 
 FEASIBLE = 1e-7
 """Breach of a constraint, in its scale, that counts as none."""

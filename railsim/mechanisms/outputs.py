@@ -5,12 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism.values import ends
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, Faults
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.dynamics import driven_motion
 from railsim.mechanisms.forces import (
@@ -27,7 +27,6 @@ from railsim.mechanisms.forces import (
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, driver_words, solve
 
-Floats = NDArray[np.float64]
 ZONE = ("low", "work", "high")
 
 
@@ -166,7 +165,7 @@ def zone_drivers(dense: Motion) -> dict[str, float]:
     heights = np.array([model.number(getattr(zone, name)) for name in ZONE])
     found = dict(zip(ZONE, driver_at(dense, height_of, heights).tolist(), strict=True))
     y = height_of(dense)[0]
-    faults = [
+    faults = Faults(
         Fault(
             model.definition.name,
             f"zone.{name}",
@@ -175,9 +174,8 @@ def zone_drivers(dense: Motion) -> dict[str, float]:
         )
         for name, height in zip(ZONE, heights, strict=True)
         if np.isnan(found[name])
-    ]
-    if faults:
-        raise InputError(faults)
+    )
+    faults.check()
     return found
 
 

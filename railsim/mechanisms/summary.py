@@ -11,7 +11,6 @@ import numpy as np
 
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact
 from railsim.mechanisms.dynamics import TimedMotion
 from railsim.mechanisms.links import Course, actuators, links
@@ -20,7 +19,7 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimum import Optimum
+    from railsim.mechanisms.optimum import Optimum, Start
 
 Data = dict[str, Any]
 
@@ -169,11 +168,6 @@ def _courses(courses: Mapping[str, Course], *names: str) -> Data:
     }
 
 
-def comparison_data(comparison: Comparison) -> list[Data]:
-    """Mechanisms side by side as plain numbers; the first is the reference."""
-    return [{"name": row.name, **row.values, "error": row.error} for row in comparison.rows]
-
-
 def optimum_data(optimum: "Optimum") -> Data:
     """A search as plain numbers, and everything about the optimum."""
     return {
@@ -183,20 +177,14 @@ def optimum_data(optimum: "Optimum") -> Data:
         "feasible": optimum.feasible,
         "breaches": dict(optimum.breaches),
         "active": [asdict(active) for active in optimum.active],
-        "starts": [
-            {
-                "number": start.number,
-                "begin": start.begin,
-                "parameters": start.end,
-                "objective": start.objective,
-                "violation": start.violation,
-                "feasible": start.feasible,
-                "evaluations": start.evaluations,
-            }
-            for start in optimum.starts
-        ],
+        "starts": [_start_data(start) for start in optimum.starts],
         "seed": optimum.seed,
     }
+
+
+def _start_data(start: "Start") -> Data:
+    data = asdict(start) | {"feasible": start.feasible}
+    return data | {"parameters": data.pop("end")}
 
 
 def _list(array: Any) -> list[float]:

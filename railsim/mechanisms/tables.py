@@ -7,13 +7,12 @@ import numpy as np
 
 from railsim.design_checks import SHOWN, shown
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact, moved
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.mechanisms.selection import Choice
-from railsim.mechanisms.summary import comparison_data, parameter_data, published_data
+from railsim.mechanisms.summary import parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
 from railsim.table import Amount, Column, Table
 
@@ -218,15 +217,10 @@ def _contact_sentences(contact: Contact) -> list[str]:
     return found
 
 
-def comparison_table(comparison: Comparison) -> Table:
-    """Return one row for each mechanism; the first is the reference of the error."""
-    return Table(
-        COMPARISON,
-        [
-            dict.fromkeys((c.name for c in COMPARISON), np.nan) | row
-            for row in comparison_data(comparison)
-        ],
-    )
+def comparison_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return one row for each mechanism of `compare`; the first is the reference of the error."""
+    unknown = {column.name: np.nan for column in COMPARISON}
+    return Table(COMPARISON, [{**unknown, **row} for row in rows])
 
 
 def optimum_sentences(optimum: "Optimum") -> list[str]:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number, parameter_values
@@ -15,7 +15,6 @@ from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.model import Model, build
 from railsim.mechanisms.outputs import equal_lengths, height_of, length_points, zone_drivers
 
-Floats = NDArray[np.float64]
 DENSE = 401
 
 

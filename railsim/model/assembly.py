@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.constants import CANT_BASE, GRAVITY
 from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
@@ -25,7 +25,7 @@ from railsim.definitions.track.support import Support as SupportDefinition
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import Fault, Faults, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned
 from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE
 from railsim.kernels.system import (
@@ -52,7 +52,6 @@ from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.tables import track_tables
 
-Floats = NDArray[np.float64]
 _KINDS = {"body": RIGID, "wheelset": WHEELSET, "axlebox": AXLEBOX}
 
 
@@ -227,32 +226,20 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
 
 def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> None:
     """Raise InputError where bodies are fixed that cannot be so on this track."""
-    fixed = [body for body in flat.bodies if body.fixed]
-    faults = []
-    where = f"vehicle '{flat.name}'"
+    fixed, faults = [body for body in flat.bodies if body.fixed], Faults()
     if fixed and drive == "free":
-        names = ", ".join(body.name for body in fixed)
-        faults.append(
-            Fault(
-                "settings",
-                "drive.mode",
-                f"free running with {names} fixed",
-                "constant or table: a fixed body moves on as prescribed",
-            )
-        )
+        found = f"free running with {', '.join(body.name for body in fixed)} fixed"
+        allowed = "constant or table: a fixed body moves on as prescribed"
+        faults.append(Fault("settings", "drive.mode", found, allowed))
     if not is_straight_and_level(track):
+        found = "fixed to the ground beside curves, cant or gradients"
+        allowed = 'fixed = "track", or straight level track'
         faults += [
-            Fault(
-                where,
-                f"{body.name}.fixed",
-                "fixed to the ground beside curves, cant or gradients",
-                'fixed = "track", or straight level track',
-            )
+            Fault(f"vehicle '{flat.name}'", f"{body.name}.fixed", found, allowed)
             for body in fixed
             if body.fixed == "ground"
         ]
-    if faults:
-        raise InputError(faults)
+    faults.check()
 
 
 def support_arrays(definition: SupportDefinition) -> Support:

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import GAUGE_DEPTH, tape_circle_position
 from railsim.definitions.track.check_rail import CheckRail
 from railsim.definitions.track.definition import Track
@@ -13,7 +13,6 @@ from railsim.definitions.vehicle.tables import Wheelset
 from railsim.kernels.check_rails import CHECK_ROW, CHECK_WHEEL
 from railsim.profiles.profile import Profile
 
-Floats = NDArray[np.float64]
 SPACING = 1e-4  # m, of the heights at which both contours are compared
 
 

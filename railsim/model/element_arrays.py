@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.elements.rows import (
     AXES,
@@ -65,7 +66,6 @@ from railsim.kernels.system import (
 )
 from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
 
-Floats = NDArray[np.float64]
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}
 LAWS |= {"lag": LAG, "own": OWN}
 MODES = {"force": BY_FORCE, "damper": BY_DAMPER, "position": BY_POSITION, "law": BY_LAW}

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import NORMAL, W_Q
 from railsim.kernels.contact_table import K2, K
@@ -47,8 +47,6 @@ from railsim.model.solutions import solution
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import components_of, level_track, work_arrays
 from railsim.notation import COMPONENTS, SIDES
-
-Floats = NDArray[np.float64]
 
 RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
 ONE_SIDED = 0.01  # least friction of a rail in the balance, as a share of the other's

@@ -4,8 +4,8 @@ import hashlib
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
@@ -13,9 +13,6 @@ from railsim.kernels.element_columns import FRICTION, ONE_SIDED
 from railsim.kernels.system import AXLEBOX, RIGID, Links, Mounts, System
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
-
-Floats = NDArray[np.float64]
-
 
 UNBALANCED = 1e-6  # share of the weight that may stay unbalanced by preloads (round-off)
 MOST_KEPT = 100  # vehicles
@@ -243,8 +240,7 @@ def _solved_for(
     system = model.system
     unknowns = list(support)
     loads = np.array([_load(system, body, component) for body, component in conditions])
-    links = system.links._replace(row=aligned(system.links.row))
-    mounts = system.mounts._replace(row=aligned(system.mounts.row))
+    links, mounts = _copies(system)
     for group, element in unknowns:
         _set_preload(links, mounts, group, element, 0.0)
     fixed = _preload_forces(system, links, mounts, conditions)
@@ -264,10 +260,17 @@ def _solved_for(
     return filled, matrix @ values - right_side
 
 
+def _copies(system: System) -> tuple[Links, Mounts]:
+    """Links and mounts whose preloads may be changed."""
+    return (
+        system.links._replace(row=aligned(system.links.row)),
+        system.mounts._replace(row=aligned(system.mounts.row)),
+    )
+
+
 def with_these_preloads(model: Model, tension: Floats, preload: Floats) -> Model:
     """Return the model with these preloads of its links and mounts."""
-    links = model.system.links._replace(row=aligned(model.system.links.row))
-    mounts = model.system.mounts._replace(row=aligned(model.system.mounts.row))
+    links, mounts = _copies(model.system)
     links.spring[:, 2] = tension
     mounts.preload[:] = np.reshape(preload, mounts.preload.shape)  # there may be none
     return replace(model, system=model.system._replace(links=links, mounts=mounts))
@@ -318,8 +321,7 @@ def _load(system: System, body: int, component: int) -> float:
 
 
 def _with_unit_preload(system: System, group: str, element: int) -> tuple[Links, Mounts]:
-    links = system.links._replace(row=aligned(system.links.row))
-    mounts = system.mounts._replace(row=aligned(system.mounts.row))
+    links, mounts = _copies(system)
     links.spring[:, 2] = 0.0
     mounts.preload[:] = 0.0
     _set_preload(links, mounts, group, element, 1.0)

@@ -10,8 +10,8 @@ from math import dist, nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.constants import GRAVITY
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.loading import check_types, load_track
@@ -29,8 +29,6 @@ from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 from railsim.profiles import Profile
 from railsim.table import Column, Table
-
-Floats = NDArray[np.float64]
 
 # The equilibrium is followed by that of steady rolling, which needs a speed [m/s].
 SLOW = 10.0

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
@@ -25,7 +26,6 @@ from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
 
-Floats = NDArray[np.float64]
 Situation = tuple[System, Floats]
 
 SCHEMES = {"fast": FAST, "rk4": RK4}

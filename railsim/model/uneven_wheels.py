@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import gauge_face, rail_curve, tape_circle_position, wheel_curve
 from railsim.contact.out_of_round import (
     Surface,
@@ -30,7 +31,6 @@ from railsim.kernels.wheel_surface import FLAT, SURFACE_ROW, WAVE
 from railsim.model.check_rails import CheckRails
 from railsim.profiles.profile import Profile
 
-Floats = NDArray[np.float64]
 PER_LENGTH = 20.0  # steps over a flat or wave
 
 

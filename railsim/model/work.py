@@ -1,8 +1,8 @@
 """Work arrays of a system, and the same system on straight level track."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.creep import creep_scratch
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.commands import Controllers, Signals
@@ -31,9 +31,6 @@ from railsim.kernels.system import (
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.vibration import VIBRATION
 from railsim.kernels.wheel_surface import BUMP_SIZE
-
-Floats = NDArray[np.float64]
-
 
 # shortest step that has the full tolerance of forces on elastic rails (s), see `Work.watch`
 FULL_TOLERANCE = 1.25e-3

@@ -8,11 +8,9 @@ from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
 
 SPACING = 0.05
 """Distance of the points along the contour [mm]."""
@@ -55,22 +53,22 @@ S1002_ROOT = (
 )
 
 
-def s1002_height(y: Array) -> Array:
+def s1002_height(y: Floats) -> Floats:
     """Height of the S1002 contour [mm] at the lateral position y [mm], flange at negative y.
 
     Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H.  The standard's
     polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
     """
 
-    def circle(y: Array, centre_y: float, centre_z: float, radius: float) -> Array:
+    def circle(y: Floats, centre_y: float, centre_z: float, radius: float) -> Floats:
         half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
-        z: Array = centre_z + np.copysign(half, radius)
+        z: Floats = centre_z + np.copysign(half, radius)
         return z
 
-    def polynomial(y: Array, coefficients: tuple[float, ...]) -> Array:
+    def polynomial(y: Floats, coefficients: tuple[float, ...]) -> Floats:
         return np.asarray(np.polynomial.polynomial.polyval(y, coefficients), dtype=np.float64)
 
-    section: dict[str, Callable[[Array], Array]] = {
+    section: dict[str, Callable[[Floats], Floats]] = {
         "A": lambda y: polynomial(y, S1002_OUTER),
         "B": lambda y: polynomial(y, S1002_TREAD),
         "C": lambda y: polynomial(y, S1002_ROOT),
@@ -89,11 +87,11 @@ def s1002_height(y: Array) -> Array:
     return z
 
 
-def even_points(y: Array, z: Array, spacing: float) -> Array:
+def even_points(y: Floats, z: Floats, spacing: float) -> Floats:
     """Lateral positions at about equal distances along the contour through the given points."""
     length = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
     n = max(int(np.ceil(length[-1] / spacing)), 1)
-    positions: Array = np.interp(np.linspace(0.0, length[-1], n + 1), length, y)
+    positions: Floats = np.interp(np.linspace(0.0, length[-1], n + 1), length, y)
     return positions
 
 
@@ -144,7 +142,7 @@ def cone(taper: float) -> Profile:
     end = centre_y + radius * slope / np.hypot(slope, 1.0)
     fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
 
-    def height(y: Array) -> Array:
+    def height(y: Floats) -> Floats:
         fillet = centre_z - np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
         # S1002's own fillet ends farther down: its flank goes on along the same line
         flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
@@ -165,7 +163,7 @@ def arc_chain_rail(
     radii: tuple[float, ...],
     flank_slope: float = 0.05,
     depth: float = 38.0,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Rail head of tangent arcs and a straight flank, symmetric about its axis.
 
     Parameters

@@ -17,11 +17,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError
 from railsim.files.access import read_bytes
 from railsim.profiles.profile import Kind
-
-Array = NDArray[np.float64]
 
 PROFILE_BYTES = 5_000_000
 """Larger files are refused unread; a profile of 10 000 points has some 0.5 MB."""
@@ -51,8 +50,8 @@ class RawProfile:
         What was done on the file's own request.
     """
 
-    y: Array
-    z: Array
+    y: Floats
+    z: Floats
     line: NDArray[np.int64]
     unit: float | None = None
     kind: Kind | None = None

@@ -13,13 +13,11 @@ of a rail: a crown from which the contour only falls, 14 mm or more on the gauge
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.profiles.profile import FLANGE_BACK, Kind, Profile
 from railsim.profiles.readers import RawProfile
 from railsim.profiles.smoothing import Points, smoothed_points, used_part
-
-Array = NDArray[np.float64]
 
 FEWEST_POINTS = 20
 LARGEST_HOLE = 0.006
@@ -132,7 +130,7 @@ def _to_metres(work: Points, unit: float | None, kind: Kind) -> None:
     work.y, work.z = work.y * unit, work.z * unit
 
 
-def _distances(work: Points) -> Array:
+def _distances(work: Points) -> Floats:
     return np.hypot(np.diff(work.y), np.diff(work.z))
 
 
@@ -295,7 +293,7 @@ def _shift_wheel(work: Points) -> None:
     work.z = work.z - level
 
 
-def _function_part(y: Array, z: Array, position: float) -> tuple[Array, Array]:
+def _function_part(y: Floats, z: Floats, position: float) -> tuple[Floats, Floats]:
     """Run of increasing y around the outermost point near a lateral position."""
     near = np.flatnonzero(np.abs(y - position) < 5e-3)
     start = int(near[np.argmax(z[near])]) if near.size else int(np.argmin(np.abs(y - position)))
@@ -409,7 +407,7 @@ def _check_steps(work: Points, kind: Kind) -> None:
             )
 
 
-def _check_overhang(work: Points, kind: Kind, y: Array, z: Array) -> None:
+def _check_overhang(work: Points, kind: Kind, y: Floats, z: Floats) -> None:
     """Refuse a contour that runs back where wheel and rail touch."""
     overhang = np.flatnonzero(used_part(y, z, kind) & (np.diff(y) <= 0.0))
     if overhang.size:

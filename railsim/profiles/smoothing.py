@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError
 from railsim.profiles.profile import Kind
-
-Array = NDArray[np.float64]
-
 
 CURVATURE_NOISE = 3.0
 """Curvature that noise may leave after smoothing [1/m], some 4 % of a gauge corner's."""
@@ -30,8 +28,8 @@ class Points:
     """Points on their way to a profile."""
 
     file: str
-    y: Array
-    z: Array
+    y: Floats
+    z: Floats
     line: NDArray[np.int64]
     notes: list[str]
 
@@ -40,12 +38,12 @@ class Points:
         key = "" if at is None else f"line {int(self.line[at])}"
         return InputError([Fault(self.file, key, found, remedy)])
 
-    def keep(self, which: Array | NDArray[np.bool_] | NDArray[np.int64]) -> None:
+    def keep(self, which: Floats | NDArray[np.bool_] | NDArray[np.int64]) -> None:
         """Keep some of the points, or bring them into another order."""
         self.y, self.z, self.line = self.y[which], self.z[which], self.line[which]
 
 
-def used_part(y: Array, z: Array, kind: Kind) -> NDArray[np.bool_]:
+def used_part(y: Floats, z: Floats, kind: Kind) -> NDArray[np.bool_]:
     """Intervals between points on which wheel and rail may touch."""
     middle_y, middle_z = 0.5 * (y[1:] + y[:-1]), 0.5 * (z[1:] + z[:-1])
     if kind == "rail":
@@ -55,7 +53,7 @@ def used_part(y: Array, z: Array, kind: Kind) -> NDArray[np.bool_]:
     return np.asarray(beside_tip & (middle_y < 0.040))
 
 
-def smoothed_points(work: Points) -> tuple[Array, Array]:
+def smoothed_points(work: Points) -> tuple[Floats, Floats]:
     """Points smoothed as much as their noise demands, no more.
 
     The noise is estimated from how much each point departs from the cubic through its four
@@ -89,7 +87,7 @@ def smoothed_points(work: Points) -> tuple[Array, Array]:
     return smooth_y, smooth_z
 
 
-def _noise(s: Array, values: Array) -> float:
+def _noise(s: Floats, values: Floats) -> float:
     """Robust estimate of the noise of samples over s [unit of values]."""
     n = values.size
     if n < 8:

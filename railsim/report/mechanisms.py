@@ -17,7 +17,6 @@ from railsim.design_checks import check_table
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.links import Course, actuators, links
@@ -60,7 +59,7 @@ class Collected:
 
     results: Sequence[Analysis]  # one for each file; the first is the one that the page describes
     cases: Mapping[str, Analysis]  # its base and cases, where it has cases
-    comparison: Comparison | None = None
+    comparison: Sequence[Mapping[str, Any]] | None = None
     optimum: "Optimum | None" = None
 
     @property

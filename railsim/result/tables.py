@@ -9,6 +9,8 @@ from railsim.result.extremes import MidCurve, Peak, mid_curves, peaks
 from railsim.table import Amount, Column, Table
 
 KINDS = {"abs": "", "max": ", largest", "min": ", smallest"}
+MOST_CURVES = 3
+"""Curves with a table each; more are listed, one line each."""
 PLACE = [Column("time", "t", "s", ".2f"), Column("distance", "s", "m", ".1f")]
 """When, and where the reference body was."""
 
@@ -87,3 +89,32 @@ def full_curves_table(result: Result, curves: Sequence[MidCurve] | None = None) 
         *(Column.of(result.quantities[name], name) for name in names),
     ]
     return Table(columns, rows)
+
+
+def result_parts(result: Result, remarks: Sequence[str] = ()) -> list[str | Table]:
+    """Return how a run ended, its peaks and its values in curves, as lines and tables.
+
+    `remarks` stand before those of the result.
+    """
+    facts = result.attributes
+    end = f"{result.status}: {facts['status_reason']}"
+    if len(result["time"]):
+        end += f"; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m"
+    else:
+        end += "; at its start, before the first instant was recorded"
+    parts: list[str | Table] = [
+        f"  {end}",
+        f"  step {1e3 * float(facts['step']):.4g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
+        f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
+        *(f"  remark: {remark}" for remark in (*remarks, *result.remarks)),
+        "",
+    ]
+    if len(result["time"]):
+        parts.append(peak_table(result))
+    curves = mid_curves(result)
+    if len(curves) > MOST_CURVES:
+        parts += ["", full_curves_table(result, curves)]
+    else:
+        for curve in curves:
+            parts += ["", full_curve_table(result, curve)]
+    return parts

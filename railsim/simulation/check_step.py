@@ -4,12 +4,14 @@ The scheme `fast` is of order two: the difference between both runs is about thr
 error of the first one, and three times that of the second.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from railsim.compare import Comparison, compare
 from railsim.result import Result
 from railsim.simulation.run import simulate
+from railsim.table import Amount, Column, Table
 
 FULL, HALF = "step", "half"
 
@@ -60,3 +62,23 @@ def difference_record(row: Comparison) -> dict[str, Any]:
         "half_step_value": half.value,
         "difference": full.value - half.value,
     }
+
+
+def step_table(result: Result, differences: Sequence[Comparison]) -> Table:
+    """Return what half the step changes."""
+    step = float(result.attributes["step"])
+    rows = []
+    for row in differences:
+        full, half = row.peaks[FULL].value, row.peaks[HALF].value
+        column = Column.of(row.quantity)
+        changed = Amount(full - half, replace(column, format="+.2g"))
+        relative = Amount(row.differences[FULL], Column("", unit="%", format="+.2g"))
+        rows.append([row.quantity.words, row.where, Amount(full, column), changed, relative])
+    columns = [
+        Column("quantity", f"Check of the step, {1e3 * step:.4g} ms"),
+        Column("where", " "),
+        Column("value", format=">"),
+        Column("change", "less that at half", format=">"),
+        Column("share", "%", format=">"),
+    ]
+    return Table(columns, rows)

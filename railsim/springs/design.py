@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from railsim.definitions.spring import TrailingArmSuspension
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, Faults, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm
@@ -125,7 +125,7 @@ def design(suspension: TrailingArmSuspension) -> Design:
     wanted, frame = design_task(suspension)
     *K_V, phi = (float(value) for value in stiffnesses(frame, suspension.engagement, wanted))
     if not all(stiffness > 0.0 for stiffness in K_V):
-        raise InputError(list(_unphysical(suspension, frame, wanted, K_V)))
+        raise InputError(_unphysical(suspension, frame, wanted, K_V))
     coils = [replace(coil, K_V=k) for coil, k in zip(frame.coils, K_V, strict=True)]
     states = [trailing_arm.coil_state(frame, coil, phi) for coil in coils]
     low, high = target_load_range(frame, suspension.engagement, wanted)
@@ -159,16 +159,12 @@ def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
     if target is None or inner is None:
         needed = {"target": "needed: load and deflection"} if target is None else {}
         needed |= {"inner": "a design needs both springs' diameters"} if inner is None else {}
-        raise InputError(
-            [Fault(suspension.name, key, "missing", words) for key, words in needed.items()]
-        )
+        raise InputError(Fault(suspension.name, k, "missing", words) for k, words in needed.items())
     wanted = Wanted(mounting.load, mounting.deflection, target.load, target.deflection)
     springs = [(1.0, s.mean_diameter, s.free_height) for s in suspension.springs.values()]
     frame = trailing_arm.nest(suspension, springs, mounting.deflection)
-    faults = [
-        *_reach_faults(suspension, "mounting", mounting.deflection),
-        *_reach_faults(suspension, "target", target.deflection),
-    ]
+    faults = Faults(_reach_faults(suspension, "mounting", mounting.deflection))
+    faults += _reach_faults(suspension, "target", target.deflection)
     found, remedy = "", ""
     if abs(target.deflection - mounting.deflection) < 1e-6:
         found = f"{target.deflection * 1e3:.2f} mm, the same as mounting.deflection"
@@ -187,8 +183,7 @@ def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
         remedy = "bring target.deflection nearer to mounting.deflection, or raise arm.length"
     if found:
         faults.append(Fault(suspension.name, "target.deflection", found, remedy))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return wanted, frame
 
 

@@ -164,16 +164,6 @@ def lateral_stiffness_wahl(K_V: Values, D: Values, H0: Values, dz: Values, nu: V
     return 1.0 / (height / S + height**3 / (12.0 * B))
 
 
-def shear_spring_bending(K_V: Values, D: Values, H0: Values, dz: Values, nu: Values) -> Values:
-    """Bending stiffness left for a shear-spring element, `K_C - K_L H_s^2 / 4` [N m/rad].
-
-    The element's lateral force `K_L` acts at the middle of the spring, which resists a rotation
-    of one seat by `K_L H_s^2 / 4`; this is the rest of the tilting stiffness `K_C`.
-    """
-    K_L, K_C = lateral_and_tilting(K_V, D, H0, dz, nu)
-    return K_C - K_L * (H0 - dz) ** 2 / 4.0
-
-
 def seat_moment(F: Values, K_L: Values, height: Values) -> Values:
     """Moment of a seat over the lateral displacement, `(F + K_L H_s) / 2` [N].
 

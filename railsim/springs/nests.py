@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.spring import Search, TrailingArmSuspension
 from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
@@ -19,7 +20,6 @@ from railsim.springs.arm import Arm, Coil, CoilState
 from railsim.springs.design import Wanted, stiffnesses
 from railsim.springs.verification import dynamic_loads
 
-Floats = NDArray[np.float64]
 Pair = tuple[Floats, Floats]  # outer and inner spring
 
 # Diameters of hot rolled round steel bars for general purposes, EN 10060:2003, 10 to 60 mm [m].

@@ -17,16 +17,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.stats import qmc
 
+from railsim.arrays import Floats
 from railsim.definitions.spring import Search, TrailingArmSuspension
 from railsim.errors import Fault, InputError
 from railsim.springs import nests as many
 from railsim.springs.nests import Dimensions, Evaluation, Task, evaluate
-
-Floats = NDArray[np.float64]
 
 # limit: key of the file that loosens it, and how
 LIMITS = {

@@ -14,16 +14,14 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
 from railsim.springs.verification import built, load_cases
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

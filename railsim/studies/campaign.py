@@ -17,8 +17,9 @@ from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files.access import check_folder
+from railsim.processes import available_cores
 from railsim.result import Result, open_result
-from railsim.studies.carry_out import carry_out, cores
+from railsim.studies.carry_out import carry_out
 from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.in_conditions import in_condition, repeated, scaled_radii
 from railsim.studies.plan import name_faults
@@ -163,7 +164,7 @@ def scenario_cases(
     faults: list[Fault] = []
     cases: list[Case] = []
     axes = [vehicles, _conditions(scenario), list(scenario.parts), *scenario.grid.values()]
-    check_number(axes, cores(), lambda: ROUGH_DURATION)
+    check_number(axes, available_cores(), lambda: ROUGH_DURATION)
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:

@@ -10,6 +10,7 @@ from typing import Any
 
 from railsim.errors import InputError, argument_fault
 from railsim.files.access import is_file, make_folder, sweep
+from railsim.processes import available_cores
 from railsim.studies.execute import (
     Batch,
     Job,
@@ -103,17 +104,10 @@ def _computed(jobs: Sequence[Job], client: Any, execution: Execution) -> Iterabl
     if client is not None:
         threads = sum(client.nthreads().values())
         return on_cluster(batches(jobs, execution.together, max(1, threads)), client, progress)
-    count = execution.workers or cores()
+    count = execution.workers or available_cores()
     work: Sequence[Batch] = batches(jobs, execution.together, count)
     count = min(count, len(work))
     return in_processes(work, count, progress) if count > 1 else in_this_process(work, progress)
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _refuse_another_study(

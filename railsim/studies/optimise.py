@@ -19,7 +19,7 @@ from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.files.access import check_folder, is_file, make_folder, read_text, whole_file
-from railsim.studies.carry_out import cores
+from railsim.processes import available_cores
 from railsim.studies.designs import (
     INPUTS,
     Design,
@@ -191,7 +191,7 @@ def optimise(
     replaced = {name: value for name, value in changes.items() if value is not None}
     wanted = _changed(definition.optimise, replaced)
     runs = (range(wanted.evaluations), range(definition.runs))
-    check_number(runs, workers or cores(), lambda: ROUGH_DURATION)
+    check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
     folder = Path(out)
     check_folder(folder)
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)

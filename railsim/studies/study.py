@@ -12,7 +12,8 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.files.access import check_folder, is_file
-from railsim.studies.carry_out import carry_out, cores
+from railsim.processes import available_cores
+from railsim.studies.carry_out import carry_out
 from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Plan
@@ -173,7 +174,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
             "quantities", "", "no analysis computes a run", 'add one of kind = "run"'
         )
         raise InputError([fault])
-    plan = Plan(spec, execution.workers or cores())
+    plan = Plan(spec, execution.workers or available_cores())
     base = os.path.relpath(Path.cwd(), folder)
     outcome = carry_out(
         plan, spec.changed(railsim_version=__version__, folder=base), folder, execution

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import (
@@ -28,7 +29,6 @@ from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 from railsim.errors import Fault, InputError
 
-Array = NDArray[np.float64]
 KEPT = "_alignment"
 
 
@@ -66,50 +66,50 @@ class Alignment:
         rising = _magnitudes(cant) if track.cant_rotation == "inner_rail" else []
         self._lifting_cant = RoundedProfile(rising, track.rounding)
 
-    def curvature(self, s: ArrayLike) -> Array:
+    def curvature(self, s: ArrayLike) -> Floats:
         """Curvature kappa, positive to the right [1/m]."""
         return self._curvature(s)
 
-    def curvature_rate(self, s: ArrayLike) -> Array:
+    def curvature_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the curvature along the track [1/m2]."""
         return self._curvature.rate(s)
 
-    def heading(self, s: ArrayLike) -> Array:
+    def heading(self, s: ArrayLike) -> Floats:
         """Heading psi, positive to the right [rad]."""
         return self._curvature.integral(s)
 
-    def cant(self, s: ArrayLike) -> Array:
+    def cant(self, s: ArrayLike) -> Floats:
         """Cant: height of the left rail over the right one [m]."""
         return self._cant(s)
 
-    def cant_angle(self, s: ArrayLike) -> Array:
+    def cant_angle(self, s: ArrayLike) -> Floats:
         """Cant angle phi = asin(cant / 1.5 m), positive = left rail higher [rad]."""
         return np.arcsin(self._cant(s) / CANT_BASE)
 
-    def cant_angle_rate(self, s: ArrayLike) -> Array:
+    def cant_angle_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the cant angle along the track [rad/m]."""
         sine = self._cant(s) / CANT_BASE
         return self._cant.rate(s) / (CANT_BASE * np.sqrt(1.0 - sine**2))
 
-    def gradient(self, s: ArrayLike) -> Array:
+    def gradient(self, s: ArrayLike) -> Floats:
         """Gradient of the vertical profile, rise over horizontal distance [1]."""
         return self._gradient(s)
 
-    def grade_angle(self, s: ArrayLike) -> Array:
+    def grade_angle(self, s: ArrayLike) -> Floats:
         """Grade angle theta of the centre line, positive = nose up [rad].
 
         With the cant about the inner rail the centre line also rises by half the cant.
         """
         return np.arcsin(self._climb(s))
 
-    def grade_angle_rate(self, s: ArrayLike) -> Array:
+    def grade_angle_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the grade angle along the track [rad/m]."""
         gradient = self._gradient(s)
         climb_rate = self._gradient.rate(s) / (1.0 + gradient**2) ** 1.5
         climb_rate += 0.5 * self._lifting_cant.second_rate(s)
         return climb_rate / np.sqrt(1.0 - self._climb(s) ** 2)
 
-    def _climb(self, s: ArrayLike) -> Array:
+    def _climb(self, s: ArrayLike) -> Floats:
         gradient = self._gradient(s)
         return gradient / np.sqrt(1.0 + gradient**2) + 0.5 * self._lifting_cant.rate(s)
 

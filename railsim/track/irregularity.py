@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from railsim.definitions.excitations.base import Array, Displacement
+from railsim.arrays import Floats
+from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import Measured, largest_between_rows
 from railsim.definitions.track.definition import Track
@@ -28,7 +29,7 @@ def shown_displacement(track: Track) -> Displacement | None:
     return displacement(permitted_part(track)) or (_nothing if track.irregularities else None)
 
 
-def _nothing(s: Array) -> tuple[Array, Array]:
+def _nothing(s: Floats) -> tuple[Floats, Floats]:
     return np.zeros((4, *s.shape)), np.zeros((4, *s.shape))
 
 
@@ -45,7 +46,7 @@ def displacement(track: Track) -> Displacement | None:
     if not parts:
         return None
 
-    def total(s: Array) -> tuple[Array, Array]:
+    def total(s: Floats) -> tuple[Floats, Floats]:
         values, rates = zip(*(part(s) for part in parts), strict=True)
         return np.sum(values, axis=0), np.sum(rates, axis=0)
 
@@ -61,8 +62,8 @@ def _by_law(part: ByLaw, key: str, track: Track) -> Displacement:
     bound = bind(part.law, laws[part.law], EXCITATION)
     values = bound.parameters(f"{key}.parameters", part.parameters)
 
-    def value(s: Array) -> Array:
-        found: Array = bound.values(s[:, None], values)
+    def value(s: Floats) -> Floats:
+        found: Floats = bound.values(s[:, None], values)
         wrong = np.flatnonzero(~(np.abs(part.factor * found) <= LARGEST))
         if wrong.size:
             words = f"the law '{part.law}' gives {found[wrong[0]]:g} m at s = {s[wrong[0]]:.6g} m"
@@ -98,7 +99,7 @@ def _widening(track: Track) -> Displacement:
     left = _profile([(row[0], -row[1]) for row in rows], track.rounding)
     right = _profile([(row[0], row[2]) for row in rows], track.rounding)
 
-    def moved(s: Array) -> tuple[Array, Array]:
+    def moved(s: Floats) -> tuple[Floats, Floats]:
         zero = np.zeros_like(s)
         return (
             np.stack((left(s), zero, right(s), zero)),

@@ -11,12 +11,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.track.definition import Track
 from railsim.errors import Fault, InputError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
-from railsim.track.alignment import Alignment, Array
+from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement, shortest_length
 
 # Usual length of a cell, and the largest number of them that is worth its memory.
@@ -62,7 +63,7 @@ def track_tables(
         raise InputError([Fault(track.name, "plan", found, "a shorter track, or coarser details")])
     cells_before = int(np.ceil(before / ds))
     n_cells = cells_before + int(np.ceil((track.length + after) / ds))
-    s: Array = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)
+    s: Floats = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)
     text = track.model_dump_json(exclude={"friction", "friction_table"})
     line = _Line(text, float(ds), cells_before, n_cells, alignment, s)
     make = _kept_coefficients if n_cells <= MOST_CELLS_KEPT else _coefficients
@@ -81,10 +82,10 @@ class _Line:
     before: int
     cells: int
     alignment: Alignment = field(compare=False)
-    s: Array = field(compare=False)
+    s: Floats = field(compare=False)
 
 
-def _coefficients(line: _Line) -> Array:
+def _coefficients(line: _Line) -> Floats:
     """Position, heading, grade and cant angle over the cells, float64[n_cells, 6, 4]."""
     found = aligned_zeros((line.cells, 6, 4))
     for row, (value, rate) in enumerate(_centre_line(line.alignment, line.s, line.before)):
@@ -103,7 +104,7 @@ def usual_cell_length(track: Track, margin: float = BEFORE + AFTER) -> float:
     return min(longest, 0.25 * track.rounding, shortest_length(track))
 
 
-def hermite(value: Array, rate: Array, ds: float) -> Array:
+def hermite(value: Floats, rate: Floats, ds: float) -> Floats:
     """Cubic polynomials through values and derivatives at equally spaced nodes.
 
     Parameters
@@ -123,7 +124,7 @@ def hermite(value: Array, rate: Array, ds: float) -> Array:
     return np.stack((value[:-1], rate[:-1], c2, c3), axis=-1)
 
 
-def _angles(alignment: Alignment, s: Array) -> list[tuple[Array, Array]]:
+def _angles(alignment: Alignment, s: Floats) -> list[tuple[Floats, Floats]]:
     return [
         (alignment.heading(s), alignment.curvature(s)),
         (alignment.grade_angle(s), alignment.grade_angle_rate(s)),
@@ -131,13 +132,13 @@ def _angles(alignment: Alignment, s: Array) -> list[tuple[Array, Array]]:
     ]
 
 
-def _direction(alignment: Alignment, s: Array) -> Array:
+def _direction(alignment: Alignment, s: Floats) -> Floats:
     """Unit vector along the centre line in global axes, one row each for x, y, z."""
     psi, theta = alignment.heading(s), alignment.grade_angle(s)
     return np.stack((np.cos(psi) * np.cos(theta), np.sin(psi) * np.cos(theta), -np.sin(theta)))
 
 
-def _centre_line(alignment: Alignment, s: Array, origin: int) -> list[tuple[Array, Array]]:
+def _centre_line(alignment: Alignment, s: Floats, origin: int) -> list[tuple[Floats, Floats]]:
     """X, Y, Z with their derivatives at the nodes; node `origin` is the global origin [m]."""
     ds = s[1] - s[0]
     steps = np.zeros((3, s.size - 1))
@@ -148,7 +149,7 @@ def _centre_line(alignment: Alignment, s: Array, origin: int) -> list[tuple[Arra
     return list(zip(position, _direction(alignment, s), strict=True))
 
 
-def _rails(track: Track, moved: Displacement | None, s: Array) -> Array:
+def _rails(track: Track, moved: Displacement | None, s: Floats) -> Floats:
     """Displacements and friction of both rails, float64[n_cells, 6, 4]."""
     ds = s[1] - s[0]
     rail = np.zeros((s.size - 1, 6, 4))

@@ -4,8 +4,9 @@ from typing import Literal, Self
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Positive
-from railsim.definitions.excitations.base import Amplitude, Array, Displacement, Irregular, faded
+from railsim.definitions.excitations.base import Amplitude, Displacement, Irregular, faded
 
 
 class Joints(Irregular):
@@ -44,7 +45,7 @@ class Joints(Irregular):
         wave = 2.0 * np.pi / self.length
         shares = self.depth * np.array([0.0, 1.0, 0.0, 1.0])[:, None]
 
-        def moved(s: Array) -> tuple[Array, Array]:
+        def moved(s: Floats) -> tuple[Floats, Floats]:
             u = s - self.begin
             u = u - self.spacing * np.round(u / self.spacing)
             inside = np.abs(u) < 0.5 * self.length

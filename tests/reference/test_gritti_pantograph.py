@@ -372,7 +372,7 @@ def test_a24_six_bar_new(lifts):
     assert length[[0, -1]] == pytest.approx([456.354, 571.695], abs=1e-2)
     assert result.output["rate"][0] * 1e3 == pytest.approx(136.447, abs=1e-2)
     assert result.max_force == pytest.approx(10362.5, abs=1.0)
-    error = compare([lifts["atr95"], result]).rows[1].error
+    error = compare([lifts["atr95"], result])[1]["error"]
     assert error == pytest.approx(0.0031, abs=2e-4)
 
 

@@ -11,8 +11,8 @@ import matplotlib
 import pytest
 from selection import points
 
+from railsim.assessment.tables import assessment_csv
 from railsim.cli import main
-from railsim.cli.assess import assessment_csv
 
 sys.path.append(str(Path(__file__).parents[1] / "interface"))
 from example_result import ROOT, example_result

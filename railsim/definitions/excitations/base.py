@@ -9,13 +9,12 @@ from collections.abc import Callable
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Definition, Finite
 
-Array = NDArray[np.float64]
-Displacement = Callable[[Array], tuple[Array, Array]]
+Displacement = Callable[[Floats], tuple[Floats, Floats]]
 
 # Names of the columns of a measured irregularity, beside the arc length.
 COLUMNS = ("y_left", "z_left", "y_right", "z_right")
@@ -77,7 +76,7 @@ def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displac
     """Return a displacement that rises behind `begin` and falls before `end` over `fade` [m]."""
     length = min(fade, 0.5 * (end - begin))
 
-    def window(s: Array) -> tuple[Array, Array]:
+    def window(s: Floats) -> tuple[Floats, Floats]:
         inside = ((s >= begin) & (s < end)).astype(float)
         if length == 0.0:
             return inside, np.zeros_like(s)
@@ -87,7 +86,7 @@ def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displac
         rate = side * 0.5 * np.pi / length * np.sin(angle)
         return inside * 0.5 * (1.0 - np.cos(angle)), inside * rate
 
-    def within(s: Array) -> tuple[Array, Array]:
+    def within(s: Floats) -> tuple[Floats, Floats]:
         (value, rate), (share, slope) = moved(s), window(s)
         return share * value, share * rate + slope * value
 

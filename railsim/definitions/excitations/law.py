@@ -6,11 +6,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Name, NonNegative
 from railsim.definitions.excitations.base import (
     MIRROR,
     SHARES,
-    Array,
     Channel,
     Displacement,
     Irregular,
@@ -68,7 +68,7 @@ class ByLaw(Irregular):
         """Refuse: a definition executes nothing, see `railsim.track.irregularity`."""
         raise NotImplementedError
 
-    def displacement_by(self, function: Callable[[Array], Array], length: float) -> Displacement:
+    def displacement_by(self, function: Callable[[Floats], Floats], length: float) -> Displacement:
         """Return how it moves the rails, its rate by central differences of order 4.
 
         Parameters
@@ -83,7 +83,7 @@ class ByLaw(Irregular):
         if self.channel == "cross_level":
             shares *= 0.5  # each rail has half of the difference
 
-        def moved(s: Array) -> tuple[Array, Array]:
+        def moved(s: Floats) -> tuple[Floats, Floats]:
             at = {k: function(np.clip(s + k * h, begin, end)) for k in (-2, -1, 0, 1, 2)}
             return shares * at[0], shares * (8.0 * (at[1] - at[-1]) - at[2] + at[-2]) / (12.0 * h)
 

@@ -7,11 +7,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Flag, NonNegative, Positive, Text, rises
 from railsim.definitions.excitations.base import (
     COLUMNS,
     Amplitude,
-    Array,
     Displacement,
     Irregular,
     Wavelengths,
@@ -97,7 +97,7 @@ class Measured(Irregular):
         """Return that it is measured, and its number of rows."""
         return f"measured, {len(self.rows or ())} rows"
 
-    def interpolation(self) -> tuple[Array, Array, Array]:
+    def interpolation(self) -> tuple[Floats, Floats, Floats]:
         """Positions of the rows [m], and displacements [m] and slopes [1] there by columns."""
         rows = np.array(self.rows)
         positions = rows[:, 0] + self.shift
@@ -113,14 +113,14 @@ class Measured(Irregular):
         spline = CubicHermiteSpline(positions, values, slopes, axis=1)
         slope = spline.derivative()
 
-        def moved(s: Array) -> tuple[Array, Array]:
+        def moved(s: Floats) -> tuple[Floats, Floats]:
             at = np.clip(s, positions[0], positions[-1])
             return spline(at), slope(at)
 
         return faded(moved, positions[0], positions[-1], self.fade)
 
 
-def _between(positions: Array, values: Array, slopes: Array) -> Array:
+def _between(positions: Floats, values: Floats, slopes: Floats) -> Floats:
     """Cubic Hermite interpolation at seven positions within every interval between the rows."""
     h = np.diff(positions)
     t = _INNER
@@ -163,7 +163,7 @@ def largest_between_rows(part: Measured) -> Between:
     )
 
 
-def shape_preserving_slopes(positions: Array, values: Array) -> Array:
+def shape_preserving_slopes(positions: Floats, values: Floats) -> Floats:
     """Slopes at the rows for piecewise cubic interpolation without false waves.
 
     Those of the cubic spline where the rows resolve the wave; where the spline leaves the range of

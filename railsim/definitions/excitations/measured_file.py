@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from railsim.definitions.excitations.base import COLUMNS, Array
+from railsim.arrays import Floats
+from railsim.definitions.excitations.base import COLUMNS
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, InputError, counted, nearest
@@ -88,7 +89,7 @@ def _definition(table: dict[str, Any]) -> Measured | None:
         return None
 
 
-def recordings(tables: Iterable[Any]) -> list[tuple[str, Array, Array]]:
+def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
     """Recordings of valid irregularities: name of the file, rows as read, and rows as they act.
 
     Parameters

@@ -14,12 +14,12 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Flag, NonNegative
 from railsim.definitions.excitations.base import (
     CHANNELS,
     MIRROR,
     SHARES,
-    Array,
     Channel,
     Displacement,
     Irregular,
@@ -110,7 +110,7 @@ class Random(Irregular):
             for k in np.flatnonzero(shares):
                 lattice[:, k] += shares[k] * waves
 
-        def moved(s: Array) -> tuple[Array, Array]:
+        def moved(s: Floats) -> tuple[Floats, Floats]:
             return _periodic(lattice, period, s - begin)
 
         return faded(moved, begin, end, self.fade)
@@ -118,7 +118,7 @@ class Random(Irregular):
 
 def _amplitudes(
     spectrum: Spectrum, channel: str, wavelengths: Sequence[float], period: float
-) -> Array:
+) -> Floats:
     """Amplitude of each harmonic of the period, from the one of index 0 on."""
     step = 2.0 * np.pi / period
     low, high = 2.0 * np.pi / wavelengths[1], 2.0 * np.pi / wavelengths[0]
@@ -127,13 +127,13 @@ def _amplitudes(
     return np.sqrt(2.0 * spectrum.bin_variances(channel, begin, end))
 
 
-def _phases(seed: int, channel: str, number: int) -> Array:
+def _phases(seed: int, channel: str, number: int) -> Floats:
     """Random phases of a channel: the same for a seed whatever the other channels [rad]."""
     generator = np.random.default_rng([seed, CHANNELS.index(channel)])
     return generator.uniform(0.0, 2.0 * np.pi, number)
 
 
-def _waves(amplitudes: Array, phases: Array, period: float, n_points: int) -> Array:
+def _waves(amplitudes: Floats, phases: Floats, period: float, n_points: int) -> Floats:
     """Sum of all harmonics and its rate on a lattice over the period, shape (2, n_points)."""
     harmonics = np.zeros(n_points // 2 + 1, dtype=complex)
     harmonics[: amplitudes.size] = 0.5 * n_points * amplitudes * np.exp(1j * phases)
@@ -141,7 +141,7 @@ def _waves(amplitudes: Array, phases: Array, period: float, n_points: int) -> Ar
     return np.fft.irfft(np.stack((harmonics, 1j * omega * harmonics)), n_points)
 
 
-def _periodic(lattice: Array, period: float, u: Array) -> tuple[Array, Array]:
+def _periodic(lattice: Floats, period: float, u: Floats) -> tuple[Floats, Floats]:
     """Hermite interpolation of values and rates on a periodic lattice, shapes (4, len(u))."""
     n_points = lattice.shape[2]
     h = period / n_points

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Gain = Callable[[Array], NDArray[Any]]
+from railsim.arrays import Floats
+
+Gain = Callable[[Floats], NDArray[Any]]
 
 # Bands of wavelengths of EN 13848-1 [m].
 BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0), "D3": (70.0, 150.0)}
@@ -20,14 +21,14 @@ ORDER = 4  # of the Butterworth band pass
 BLIND = 0.1
 
 
-def equal_step(s: Array) -> float | None:
+def equal_step(s: Floats) -> float | None:
     """Step of equally spaced arc lengths [m]; None where the steps differ by more than 1 %."""
     steps = np.diff(s)
     mean = float(np.mean(steps))
     return mean if np.max(np.abs(steps - mean)) <= 0.01 * mean else None
 
 
-def band_passed(values: Array, step: float, wavelengths: tuple[float, float]) -> Array:
+def band_passed(values: Floats, step: float, wavelengths: tuple[float, float]) -> Floats:
     """Butterworth band pass of order 4 by its magnitude alone: no phase.
 
     |H| = 1 / sqrt((1 + (l/f)^8)(1 + (f/h)^8)) with the band's limits l, h and the spatial
@@ -43,7 +44,7 @@ def band_passed(values: Array, step: float, wavelengths: tuple[float, float]) ->
         Shortest and longest wavelength [m].
     """
 
-    def gain(f: Array) -> Array:
+    def gain(f: Floats) -> Floats:
         low, high = 1.0 / wavelengths[1], 1.0 / wavelengths[0]
         with np.errstate(divide="ignore"):
             below = np.where(f > 0.0, low / f, np.inf) ** (2 * ORDER)
@@ -53,7 +54,7 @@ def band_passed(values: Array, step: float, wavelengths: tuple[float, float]) ->
     return _filtered(reflected, step, gain)[:, : values.shape[1]]
 
 
-def from_chord(values: Array, step: float, chord: tuple[float, float]) -> Array:
+def from_chord(values: Floats, step: float, chord: tuple[float, float]) -> Floats:
     """Space curve of offsets measured at a chord.
 
     The offset at s over a chord from s - a to s + b is v(s) = y(s) - (b y(s - a) + a y(s + b))/(a +
@@ -71,7 +72,7 @@ def from_chord(values: Array, step: float, chord: tuple[float, float]) -> Array:
     """
     a, b = chord
 
-    def gain(f: Array) -> NDArray[np.complex128]:
+    def gain(f: Floats) -> NDArray[np.complex128]:
         turn = 2j * np.pi * f
         response = 1.0 - (b * np.exp(-turn * a) + a * np.exp(turn * b)) / (a + b)
         blind = np.abs(response) < BLIND * np.max(np.abs(response))
@@ -81,7 +82,7 @@ def from_chord(values: Array, step: float, chord: tuple[float, float]) -> Array:
     return _filtered(values, step, gain)
 
 
-def _filtered(values: Array, step: float, gain: Gain) -> Array:
+def _filtered(values: Floats, step: float, gain: Gain) -> Floats:
     n = values.shape[1]
     factors = gain(np.fft.rfftfreq(n, step).astype(float))
     return np.asarray(np.fft.irfft(np.fft.rfft(values, axis=1) * factors, n, axis=1))

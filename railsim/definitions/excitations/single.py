@@ -4,8 +4,9 @@ from typing import Literal
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Positive
-from railsim.definitions.excitations.base import Array, Displacement, Irregular
+from railsim.definitions.excitations.base import Displacement, Irregular
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 
@@ -41,19 +42,19 @@ class Single(Irregular):
         shares = np.array(middle)[:, None]
         shape = self._cosine if self.shape == "cosine" else self._triangle
 
-        def moved(s: Array) -> tuple[Array, Array]:
+        def moved(s: Floats) -> tuple[Floats, Floats]:
             value, rate = shape(s - self.s)
             return shares * value, shares * rate
 
         return moved
 
-    def _cosine(self, u: Array) -> tuple[Array, Array]:
+    def _cosine(self, u: Floats) -> tuple[Floats, Floats]:
         wave = 2.0 * np.pi / self.length
         inside = np.abs(u) < 0.5 * self.length
         value = np.where(inside, 0.5 + 0.5 * np.cos(wave * u), 0.0)
         return value, np.where(inside, -0.5 * wave * np.sin(wave * u), 0.0)
 
-    def _triangle(self, u: Array) -> tuple[Array, Array]:
+    def _triangle(self, u: Floats) -> tuple[Floats, Floats]:
         half = 0.5 * self.length
         up = Section("", "", 0.0, half, 0.0, 1.0)
         down = Section("", "", half, self.length, 1.0, 0.0)

@@ -14,13 +14,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Definition, NonNegative, Positive
 from railsim.definitions.excitations.base import CHANNELS
 
-Array = NDArray[np.float64]
-Density = Callable[[Array], Array]
+Density = Callable[[Floats], Floats]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
@@ -81,7 +80,7 @@ class Spectrum:
         """Irregularities that the source describes."""
         return tuple(channel for channel in CHANNELS if channel in self.densities)
 
-    def density(self, channel: str, omega: Array) -> Array:
+    def density(self, channel: str, omega: Floats) -> Floats:
         """One-sided power spectral density over the angular wave number.
 
         Parameters
@@ -102,7 +101,7 @@ class Spectrum:
             factor /= (2.0 * self.half_base) ** 2
         return np.asarray(factor * self.unit * self.densities[channel](variable))
 
-    def bin_variances(self, channel: str, begin: Array, end: Array) -> Array:
+    def bin_variances(self, channel: str, begin: Floats, end: Floats) -> Floats:
         """Integrals of S over the bins from `begin` to `end` [rad/m]: m2, of the cross level rad2.
 
         Gauss and Legendre with five nodes a bin.
@@ -163,7 +162,7 @@ def fra(A_v: float, A_a: float, omega_s: float, label: str) -> Spectrum:
     def level(A: float) -> Density:
         return lambda w: 0.25e-4 * A * omega_c**2 / (w**2 * (w**2 + omega_c**2))
 
-    def cross(w: Array) -> Array:
+    def cross(w: Floats) -> Floats:
         return 1e-4 * A_v * omega_c**2 / ((w**2 + omega_c**2) * (w**2 + omega_s**2))
 
     return Spectrum(
@@ -204,7 +203,7 @@ def power_laws(breaks: Sequence[float], A: Sequence[float], n: Sequence[float]) 
     """S = A_i / f^n_i, the i-th law up to the i-th break and the last one beyond."""
     edges, factors, powers = np.array(breaks), np.array(A), np.array(n)
 
-    def density(f: Array) -> Array:
+    def density(f: Floats) -> Floats:
         piece = np.searchsorted(edges, f)
         return np.asarray(factors[piece] / f ** powers[piece])
 

@@ -5,12 +5,12 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from railsim.arrays import Floats
 from railsim.definitions.base import Finite, NonNegative
 from railsim.definitions.excitations.base import (
     MIRROR,
     SHARES,
     Amplitude,
-    Array,
     Channel,
     Displacement,
     Irregular,
@@ -80,7 +80,7 @@ class Sweep(Irregular):
         if self.channel == "cross_level":
             shares *= 0.5  # each rail has half of the difference
 
-        def moved(s: Array) -> tuple[Array, Array]:
+        def moved(s: Floats) -> tuple[Floats, Floats]:
             u = np.clip((s - self.begin) / extent, 0.0, 1.0)
             waves = extent / first * u * exprel(octaves * u)
             rate = 2.0 * np.pi / first * np.exp(octaves * u)

@@ -49,7 +49,7 @@ from railsim.definitions.mechanism.parts import (
     TorsionSpring,
     by_key,
 )
-from railsim.errors import Fault
+from railsim.errors import Fault, InputError, argument_fault, nearest
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
 
@@ -405,17 +405,20 @@ class Mechanism(FileDefinition):
         """Return remarks on the mechanism."""
         from railsim.definitions.mechanism.faults import mechanism_remarks
 
-        return mechanism_remarks(self)
+        return [*mechanism_remarks(self)]
 
     def in_case(self, case: str | None) -> "Mechanism":
         """Return the mechanism with the parameters of a case; None is the base.
 
         Raises
         ------
-        KeyError : there is no such case.
+        InputError : there is no such case.
         """
         if case is None:
             return self
+        if case not in self.cases:
+            allowed = nearest(case, self.cases) if self.cases else "the file has no cases"
+            raise InputError([argument_fault("case", "", f"no case '{case}'", allowed)])
         return self.with_parameters(self.cases[case])
 
     @property

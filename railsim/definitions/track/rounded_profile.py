@@ -6,18 +6,17 @@ All means are differences of antiderivatives, so nothing is sampled.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.definitions.track.section import Section
 
-Array = NDArray[np.float64]
 
-
-def _array(s: ArrayLike) -> Array:
+def _array(s: ArrayLike) -> Floats:
     return np.asarray(s, dtype=np.float64)
 
 
-def _running(parts: Array) -> Array:
+def _running(parts: Floats) -> Floats:
     """Sum of all parts before each."""
     return np.concatenate([[0.0], np.cumsum(parts)[:-1]])
 
@@ -55,7 +54,7 @@ class RoundedProfile:
         self._half_window = 0.5 * rounding
         self._is_zero = not sections
 
-    def _plain(self, times: int, s: ArrayLike) -> Array:
+    def _plain(self, times: int, s: ArrayLike) -> Floats:
         """Derivative (-1), value (0), integral (1) or double integral (2) before rounding."""
         # scipy's PPoly does this too, but its package takes a quarter of a second to import
         at = _array(s)
@@ -64,37 +63,37 @@ class RoundedProfile:
         piece = np.clip(np.searchsorted(self._knots, at, side="right") - 1, 0, None)
         u = at - self._knots[piece]
         highest, *others = self._pieces[times + 1]
-        total: Array = highest[piece]
+        total: Floats = highest[piece]
         for coefficient in others:
             total = total * u + coefficient[piece]
         return total
 
-    def _mean(self, times: int, s: ArrayLike) -> Array:
+    def _mean(self, times: int, s: ArrayLike) -> Floats:
         at, h = _array(s), self._half_window
         if self._is_zero:
             return np.zeros_like(at)
-        mean: Array = (self._plain(times, at + h) - self._plain(times, at - h)) / (2.0 * h)
+        mean: Floats = (self._plain(times, at + h) - self._plain(times, at - h)) / (2.0 * h)
         return mean
 
-    def __call__(self, s: ArrayLike) -> Array:
+    def __call__(self, s: ArrayLike) -> Floats:
         """Value at the arc length `s` [m]."""
         if self._half_window == 0.0:
             return self._plain(0, s)
         return self._mean(1, s)
 
-    def rate(self, s: ArrayLike) -> Array:
+    def rate(self, s: ArrayLike) -> Floats:
         """Derivative along the track at `s`."""
         if self._half_window == 0.0:
             return self._plain(-1, s)
         return self._mean(0, s)
 
-    def second_rate(self, s: ArrayLike) -> Array:
+    def second_rate(self, s: ArrayLike) -> Floats:
         """Second derivative along the track."""
         if self._half_window == 0.0:
             return np.zeros_like(_array(s))
         return self._mean(-1, s)
 
-    def integral(self, s: ArrayLike) -> Array:
+    def integral(self, s: ArrayLike) -> Floats:
         """Integral from 0 to `s`."""
         if self._half_window == 0.0:
             return self._plain(1, s) - self._plain(1, 0.0)

@@ -5,10 +5,10 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 (preloads, forces) turn with them, stiffness and damping do not.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
@@ -274,83 +274,68 @@ def position_faults(vehicle: VehicleTables) -> list[Fault]:
     """Return which parts of a vehicle stand where they cannot; the faults' file is left empty."""
     if wrong := load_faults(vehicle):
         return wrong
-    flat = _flat(vehicle)
-    keys = _keys(vehicle)
-    faults = _height_faults(flat, keys) + _axlebox_faults(flat, keys)
+    found: dict[str, Fault] = {}
+    for fault in _position_faults(vehicle):  # a definition used several times is reported once
+        found.setdefault(fault.key, fault)
+    return list(found.values())
+
+
+def _position_faults(vehicle: VehicleTables) -> Iterator[Fault]:
+    flat, keys = _flat(vehicle), _keys(vehicle)
     wheelsets = flat.of_kind("wheelset")
-    for ahead, behind in pairwise(wheelsets):
-        if ahead.position[0] - behind.position[0] < POSITION_TOLERANCE:
-            found = f"'{ahead.name}' and '{behind.name}' stand at the same position"
-            key = f"{keys[behind.name]}.position"
-            faults.append(Fault("", key, found, "wheelsets one behind the other"))
-    for group, frame in _frames(vehicle, _Frame()):
-        faults += _side_faults(group, frame)
-        faults += _torque_faults(group, frame, {body.name: body.kind for body in flat.bodies})
-    # a definition used several times is reported once
-    return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
-
-
-def _keys(vehicle: VehicleTables) -> dict[str, str]:
-    keys: dict[str, str] = {}
-    for group, frame in _frames(vehicle, _Frame()):
-        for table in ("wheelsets", "axleboxes"):
-            for name, part in getattr(group, table).items():
-                for sided, _ in sided_names(name, {"sides": getattr(part, "sides", None)}):
-                    keys[frame.full(sided)] = frame.key(table, name)
-    return keys
-
-
-def _height_faults(flat: FlatVehicle, keys: dict[str, str]) -> list[Fault]:
-    faults = []
-    for body in flat.of_kind("wheelset"):
+    for body in wheelsets:
         assert body.wheelset is not None  # of its kind
         radius = 0.5 * sum(body.wheelset.radius)
         if abs(body.position[2] + radius) > POSITION_TOLERANCE:
             found = f"the axle of '{body.name}' is at z = {body.position[2]:g} m"
             allowed = f"z = {-radius:g} m, so that the wheels stand on the rails"
-            faults.append(Fault("", f"{keys[body.name]}.position", found, allowed))
-    return faults
-
-
-def _axlebox_faults(flat: FlatVehicle, keys: dict[str, str]) -> list[Fault]:
-    faults = []
+            yield Fault("", f"{keys[body.name]}.position", found, allowed)
     for box in flat.of_kind("axlebox"):
         axle = flat.body(box.parent or "").position
         if max(abs(box.position[i] - axle[i]) for i in (0, 2)) > POSITION_TOLERANCE:
             found = f"'{box.name}' is off its axle by more than {POSITION_TOLERANCE * 1e3:g} mm"
             allowed = f"x = {axle[0]:g} m, z = {axle[2]:g} m in vehicle axes"
-            faults.append(Fault("", f"{keys[box.name]}.position", found, allowed))
-    return faults
+            yield Fault("", f"{keys[box.name]}.position", found, allowed)
+    for ahead, behind in pairwise(wheelsets):
+        if ahead.position[0] - behind.position[0] < POSITION_TOLERANCE:
+            found = f"'{ahead.name}' and '{behind.name}' stand at the same position"
+            key = f"{keys[behind.name]}.position"
+            yield Fault("", key, found, "wheelsets one behind the other")
+    kinds = {body.name: body.kind for body in flat.bodies}
+    for group, frame in _frames(vehicle, _Frame()):
+        yield from _side_faults(group, frame)
+        yield from _torque_faults(group, frame, kinds)
 
 
-def _side_faults(group: Group, frame: _Frame) -> list[Fault]:
-    faults = []
+def _keys(vehicle: VehicleTables) -> dict[str, str]:
+    return {
+        frame.full(sided): frame.key(table, name)
+        for group, frame in _frames(vehicle, _Frame())
+        for table in ("wheelsets", "axleboxes")
+        for name, part in getattr(group, table).items()
+        for sided, _ in sided_names(name, {"sides": getattr(part, "sides", None)})
+    }
+
+
+def _side_faults(group: Group, frame: _Frame) -> Iterator[Fault]:
+    parts: list[tuple[str, Any, Sequence[Vector]]] = []
     for name, box in group.axleboxes.items():
-        if box.sides == "both" and box.position[1] <= 0.0:
-            faults.append(_not_on_the_right(frame.key("axleboxes", name, "position")))
+        parts.append((frame.key("axleboxes", name, "position"), box, [box.position]))
     for name, element in group.elements.items():
-        points = element.end_points()
-        if getattr(element, "sides", None) != "both" or points is None:
-            continue
-        if max(points[0][1], points[1][1]) <= 0.0:
-            faults.append(_not_on_the_right(frame.key("elements", name)))
-    return faults
+        parts.append((frame.key("elements", name), element, element.end_points() or ()))
+    for key, part, points in parts:
+        on_both = getattr(part, "sides", None) == "both"
+        if on_both and points and max(point[1] for point in points) <= 0.0:
+            found = 'sides = "both", but the part is not on the right'
+            yield Fault("", key, found, "y > 0: the left one is its mirror image")
 
 
-def _torque_faults(group: Group, frame: _Frame, kinds: dict[str, str]) -> list[Fault]:
-    faults = []
+def _torque_faults(group: Group, frame: _Frame, kinds: Mapping[str, str]) -> Iterator[Fault]:
     for name, element in group.elements.items():
         if not isinstance(element, AxleTorque) and getattr(element, "acts", "") != "axle":
             continue
-        ends = [resolve(body, frame.scope, None, kinds) or "" for body in element.bodies]
-        found = [kinds[end] for end in ends]
+        found = [kinds[resolve(body, frame.scope, None, kinds) or ""] for body in element.bodies]
         if found != ["body", "wheelset"]:
             key = frame.key("elements", name, "bodies")
             allowed = "first the body that takes the reaction, then the wheelset"
-            faults.append(Fault("", key, " and ".join(f"'{kind}'" for kind in found), allowed))
-    return faults
-
-
-def _not_on_the_right(key: str) -> Fault:
-    found = 'sides = "both", but the part is not on the right'
-    return Fault("", key, found, "y > 0: the left one is its mirror image")
+            yield Fault("", key, " and ".join(f"'{kind}'" for kind in found), allowed)

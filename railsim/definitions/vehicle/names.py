@@ -5,14 +5,17 @@ together with wrong numbers.  A name is looked for in the innermost assembly fir
 a dotted name reaches into other assemblies.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from railsim.errors import MOST_FAULTS, Fault, nearest
 from railsim.units import duration_in_words
 
 Scope = tuple[str, ...]
+Wrong = tuple[str, str, Callable[[], str]]
+"""Key, what was found, and what is allowed."""
 SIDES = ("left", "right")
 MOST_PARTS = 5000  # a train of twenty coaches has some 2000
 MOST_WHEELSETS = 200
@@ -46,6 +49,13 @@ class Group:
     def full(self, *names: str) -> str:
         """Return the full name of a part of this group."""
         return ".".join((*self.scope, *names))
+
+    def unknown(
+        self, name: Any, side: str | None, known: Mapping[str, Any], key: str, kind: str
+    ) -> Iterator[Wrong]:
+        """Yield what is wrong if a name means none of the known bodies here."""
+        if isinstance(name, str) and resolve(name, self.scope, side, known) is None:
+            yield key, f"no {kind} '{name}'", lambda: nearest(name, visible(self.scope, known))
 
 
 def _members(parts: Mapping[str, Any], key: str) -> dict[str, Mapping[str, Any]]:
@@ -172,80 +182,53 @@ def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
     if too_many := size_faults(parts):
         return too_many
     known, faults = body_names(parts)
+    for key, found, allowed in _wrong_names(parts, known):
+        # a hint takes time, and further faults are only counted
+        faults.append(Fault("", key, found, allowed() if len(faults) < MOST_FAULTS else ""))
+    return list(dict.fromkeys(faults))
+
+
+def _wrong_names(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator[Wrong]:
     wheelsets = {full: kind for full, kind in known.items() if kind == "wheelset"}
     if not wheelsets:
-        faults.append(Fault("", "wheelsets", "no wheelset", "a vehicle needs one at least"))
-    faults += _reference_faults(parts, known)
+        yield "wheelsets", "no wheelset", lambda: "a vehicle needs one at least"
+    yield from _wrong_references(parts, known)
     used: set[str] = set()
     for group in groups(parts):
         for name, axlebox in group.table("axleboxes").items():
             key = ".".join((*group.path, "axleboxes", name, "wheelset"))
-            hint = len(faults) < MOST_FAULTS  # takes time, and further ones are only counted
-            named = axlebox.get("wheelset")
-            faults += _unknown(named, group, None, wheelsets, key, "wheelset", hint=hint)
+            yield from group.unknown(axlebox.get("wheelset"), None, wheelsets, key, "wheelset")
         for name, element in group.table("elements").items():
             key = ".".join((*group.path, "elements", name))
             for sided, side in sided_names(name, element):
-                hint = len(faults) < MOST_FAULTS
-                faults += _element_faults(element, group, side, known, key, hint=hint)
+                yield from _wrong_ends(element, group, side, known, f"{key}.bodies")
                 if group.full(sided) in used:
                     found = f"the name '{group.full(sided)}' is used twice"
-                    faults.append(Fault("", key, found, "give each element a name of its own"))
+                    yield key, found, lambda: "give each element a name of its own"
                 used.add(group.full(sided))
-    return list(dict.fromkeys(faults))
 
 
-def _reference_faults(parts: Mapping[str, Any], known: Mapping[str, str]) -> list[Fault]:
-    """Faults of names outside assemblies: the reference body, sensors."""
+def _wrong_references(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator[Wrong]:
+    """Wrong names outside assemblies: the reference body, sensors."""
     candidates = {full for full, kind in known.items() if kind != "axlebox"}
     named = {"reference": parts.get("reference")}
     service = parts.get("service")
-    if isinstance(service, Mapping):
-        for point, table in _members(service, "points").items():
-            named[f"service.points.{point}.body"] = table.get("body")
-    for sensor, table in _members(parts, "sensors").items():
-        named[f"sensors.{sensor}.body"] = table.get("body")
-    wrong = [(key, name) for key, name in named.items() if isinstance(name, str)]
-    wrong = [(key, name) for key, name in wrong if name not in candidates]
-    return [
-        Fault("", key, f"no body '{name}'", nearest(name, candidates) if n < MOST_FAULTS else "")
-        for n, (key, name) in enumerate(wrong)
-    ]
+    points = _members(service, "points") if isinstance(service, Mapping) else {}
+    for table, members in (("service.points", points), ("sensors", _members(parts, "sensors"))):
+        named |= {f"{table}.{name}.body": point.get("body") for name, point in members.items()}
+    for key, name in named.items():
+        if isinstance(name, str) and name not in candidates:
+            yield key, f"no body '{name}'", partial(nearest, name, candidates)
 
 
-def _element_faults(
-    element: Mapping[str, Any],
-    group: Group,
-    side: str | None,
-    known: Mapping[str, str],
-    key: str,
-    *,
-    hint: bool,
-) -> list[Fault]:
+def _wrong_ends(
+    element: Mapping[str, Any], group: Group, side: str | None, known: Mapping[str, str], key: str
+) -> Iterator[Wrong]:
     bodies = element.get("bodies")
     if not isinstance(bodies, list | tuple):
-        return []
-    faults: list[Fault] = []
+        return
     for index, name in enumerate(bodies):
-        faults += _unknown(name, group, side, known, f"{key}.bodies.{index}", "body", hint=hint)
+        yield from group.unknown(name, side, known, f"{key}.{index}", "body")
     ends = [resolve(name, group.scope, side, known) for name in bodies if isinstance(name, str)]
     if len(ends) == 2 and ends[0] is not None and ends[0] == ends[1]:
-        found = f"both ends are on '{bodies[0]}'"
-        faults.append(Fault("", f"{key}.bodies", found, "two different bodies"))
-    return faults
-
-
-def _unknown(
-    name: Any,
-    group: Group,
-    side: str | None,
-    known: Mapping[str, str],
-    key: str,
-    kind: str,
-    *,
-    hint: bool,
-) -> list[Fault]:
-    if not isinstance(name, str) or resolve(name, group.scope, side, known) is not None:
-        return []
-    allowed = nearest(name, visible(group.scope, known)) if hint else ""
-    return [Fault("", key, f"no {kind} '{name}'", allowed)]
+        yield key, f"both ends are on '{bodies[0]}'", lambda: "two different bodies"
