@@ -123,11 +123,11 @@ def add_slopes(work, w, side, k, across):
 
 
 @compiled(python=False)
-def add_damping(work, b, k, across):
+def add_damping(work, b, k, across, damping):
     """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
 
     Across, -T_y t with the slope `across` of the creep law; along the normal, -(N n + T_y t) with
-    the contact damping, the creep force being nearly proportional to N.
+    the contact `damping`, the creep force being nearly proportional to N.
     """
     row, patch = work.contact_jacobian[b], work.patch
     s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
@@ -140,7 +140,6 @@ def add_damping(work, b, k, across):
     row[J_SLIP + 3] += across * s * s
     row[J_SLIP + 4] -= across * s * arm
     row[J_SLIP + 5] += across * arm * arm
-    damping = patch[NORMAL_DAMPING, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
     normal = s, c, lever
     add_to_row(row, J_NORMAL, damping * (s + share * c), normal)

@@ -110,14 +110,16 @@ def soften_across(jacobian, b, rate, before, v, mass, roll, h):
 
 
 @compiled(python=False)
-def soften_contact(bodies, jacobian, b, rate, before, h):
+def soften_contact(bodies, jacobian, b, rate, before, h, last):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
     The explicit acceleration a is evaluated with the extrapolated velocity; the acceleration a_n of
     the step solves a_n + theta h M^-1 D (a_n - b) = a, b as in `step_fast`, D an estimate of that
     damping (linearly implicit methods: Hairer and Wanner, Solving ODE II, IV.7): exact D gives the
     trapezoidal rule, and an error of D counts with h^2.  D of rank one for the slip along the
-    track, of x and spin; one matrix for y, z and roll; one number for yaw.
+    track, of x and spin; one matrix for y, z and roll; one number for yaw.  h is the length of the
+    step over which the velocity was extrapolated, `last`; for the spin, which a longer step than
+    that would not follow, the longer one.
     """
     v = 6 * b
     mass = 1.0 / bodies.row[b, MASS]
@@ -132,10 +134,10 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
             along,
             mass,
             1.0 / bodies.row[b, I_2],
-            h,
+            max(last, h),
         )
-    soften_across(jacobian, b, rate, before, v, mass, 1.0 / bodies.row[b, I_1], h)
-    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
+    soften_across(jacobian, b, rate, before, v, mass, 1.0 / bodies.row[b, I_1], last)
+    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], last)
 
 
 @compiled(python=False)
@@ -148,7 +150,7 @@ def remember(system, work, state, derivative, h):
         before[k] = 0.0
     for b in range(n):
         if system.bodies.kind[b] == WHEELSET:
-            soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h)
+            soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h, h)
     for k in range(6 * n):
         before[k] = rate[k]
     for i in range(m):
@@ -185,7 +187,7 @@ def step_fast(system, work, state, derivative, decay, h):
         follows = system.support.elastic and kind != AXLEBOX
         beta = spin = SMOOTHING_ELASTIC if follows else SMOOTHING
         if kind == WHEELSET:
-            soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
+            soften_contact(bodies, work.contact_jacobian, b, rate, before, h, last)
             for e in range(system.drives.body.shape[0]):
                 if system.drives.body[e, 1] == b:
                     spin = SMOOTHING

@@ -420,13 +420,27 @@ def complete_slopes(system, work, state):
         )
 
 
-@compiled(inline=True)
-def step_compliance(support, h, out):
-    """Velocity of a rail per force over a step `h`, lateral and vertical, the sleeper held."""
-    row = support.row
-    mass = 2.25 / h * row[M_RAIL]
-    out[0] = 1.0 / (mass + 1.5 * row[C_PAD_Y] + h * row[K_PAD_Y])
-    out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
+@compiled(python=False)
+def step_compliance(system, work, state):
+    """Velocity that a force at the contact adds to a rail after the last step, see `step_support`.
+
+    From (M c^2/h + c C + h K) r = F and u' = c r, c = 1 + g: 1/(c m/h + C + h K/c) of the rail on
+    its pads, in series with that of half of the sleeper below: both rails yield alike.  Of
+    `Work.compliance` lateral and vertical, and the time h/c in which a contact's stiffness counts
+    as damping; zeros where no step has been taken.
+    """
+    row, h, out = system.support.row, abs(state[LAST_STEP]), work.compliance
+    if h == 0.0:
+        out[0] = out[1] = out[2] = 0.0
+        return
+    lag = h / (1.0 + state[support_begin(system) + WEIGHT])
+    mass, sleeper = row[M_RAIL] / lag, row[M_SLEEPER] / lag
+    out[0] = 1.0 / (mass + row[C_PAD_Y] + lag * row[K_PAD_Y])
+    out[1] = 1.0 / (mass + row[C_PAD_Z] + lag * row[K_PAD_Z])
+    out[2] = lag
+    if system.support.sleeper:
+        out[0] += 2.0 / (sleeper + row[C_BALLAST_Y] + lag * row[K_BALLAST_Y])
+        out[1] += 2.0 / (sleeper + row[C_BALLAST_Z] + lag * row[K_BALLAST_Z])
 
 
 @compiled(python=False)

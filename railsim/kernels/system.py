@@ -63,9 +63,10 @@ N_PARTS = 6
 # Work.watch: time for which contact forces are foreseen [s]; share of the static wheel load by
 # which they may change in a step, and what a change of the lateral force counts against that of
 # the vertical one; shortest step that has the full tolerance of forces on elastic rails [s]; arc
-# length at which the rails of `Work.plane` and `Work.rail` are [m], no number where that is open
-AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE, LOCATED = range(5)
-N_WATCH = 5
+# length at which the rails of `Work.plane` and `Work.rail` are [m], no number where that is open;
+# share of the wheel load by which they may change in a part of a step
+AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE, LOCATED, PER_PART = range(6)
+N_WATCH = 6
 # Work.events, of each wheelset: loaded patches so far, how many of them were outside the range of
 # the creep law; the same kept over corrections; look-ups beyond the yaw of the contact table;
 # evaluations of its contact alone
@@ -432,8 +433,8 @@ class Work(NamedTuple):
     support : float64[w, 2, SUPPORT_COLUMNS];  support_step : float64[w, SUPPORT_STEP]
                                 of each wheelset's track, see `support`; w = 0 on rigid rails
     motion : float64[w, 2, LANES]   motion of the wheelsets before a step, see `support_step`
-    compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
-                                [m/(N s)]
+    compliance : float64[3]     of a rail over the last step [m/(N s), m/(N s), s], see
+                                `support.step_compliance`
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
     events : int64[w, N_EVENTS]   see there
     force_rate : float64[w]     largest rate of the contact forces of each wheelset, and of stops

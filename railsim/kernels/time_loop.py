@@ -10,7 +10,7 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.controllers import control
-from railsim.kernels.division import begin_division, end_division, prepare_steps, striking
+from railsim.kernels.division import begin_division, prepare_steps, striking
 from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.recording import record_row
 from railsim.kernels.rhs import mechanics
@@ -18,7 +18,7 @@ from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.step_fast import remember, step_fast
 from railsim.kernels.step_rk4 import all_rates, step_rk4
 from railsim.kernels.support import AFTER_STEP
-from railsim.kernels.system import ARC_LENGTH, PARTS, STEPS, WHOLE
+from railsim.kernels.system import ARC_LENGTH, STEPS, WHOLE
 from railsim.kernels.vibration import high_pass, watch
 
 FAST, RK4 = range(2)
@@ -103,12 +103,11 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                 if scheme == FAST and chunk.fresh and step == chunk.first:
                     remember(system, work, state, derivative, h)
                 decay, length, left = work.decay, h, np.int64(1)
-                w = striking(system, work, h)
+                w, parts = striking(system, work, h)
                 if w >= 0:
                     if system.bodies.references.shape[0] > 1:
                         return STRIKES, w, step - chunk.first, rows
-                    left = work.parts[PARTS]
-                    decay, length = work.decay_part, h / left
+                    decay, length, left = work.decay_part, h / parts, parts
                     begin_division(system, work, length)
             note_unloaded(work.wheel, length, work.unloaded)
             if scheme == FAST:
@@ -116,8 +115,6 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
             else:
                 status, where = step_rk4(system, work, state, derivative, stages, length)
             left -= 1
-            if left == 0 and length < h:
-                end_division(system, work, h)
         if status != RUNNING or (left == 0 and step % chunk.every == 0):
             bad = first_not_finite(state)
             if bad >= 0:

@@ -36,6 +36,8 @@ from railsim.kernels.contact_columns import (
     J_YAW,
     M_Z,
     NORMAL,
+    NORMAL_DAMPING,
+    NORMAL_STIFFNESS,
     NORMAL_Y,
     NORMAL_Z,
     PATCH_SPEED,
@@ -70,7 +72,7 @@ from railsim.kernels.own_laws import own_friction
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rails import locate_rails
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions
+from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions, step_compliance
 from railsim.kernels.system import ARC_LENGTH
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
@@ -113,15 +115,19 @@ def add_creep_forces(system, work, n, speed, state):
             wheel[w, side, W_C_Y] = cy
             wheel[w, side, W_C_Z] = cz
         along, across = patch[SLOPE_ALONG, k], patch[SLOPE_ACROSS, k]
+        damping = patch[NORMAL_DAMPING, k]
         if system.support.elastic:
             add_slopes(work, w, side, k, across)
             work.support[w, side, PATCHES] += float(1 << work.patch_index[k, 2])
-            # a rail that gives way is in series with the creep force
-            across /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
+            # a rail that gives way is in series with creep force and contact
+            y, z, lag = work.compliance[0], work.compliance[1], work.compliance[2]
+            across /= 1.0 + across * (c * c * y + s * s * z)
+            contact_damping = damping + lag * patch[NORMAL_STIFFNESS, k]
+            damping /= 1.0 + contact_damping * (s * s * y + c * c * z)
         work.contact_jacobian[b, J_ALONG] += along
         work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
         work.contact_jacobian[b, J_YAW] += along * cy * cy
-        add_damping(work, b, k, across)
+        add_damping(work, b, k, across, damping)
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
     if system.support.elastic:
@@ -142,6 +148,7 @@ def wheel_rail(system, work, speed, state):
     locate_rails(system, work, state[ARC_LENGTH])
     if system.support.elastic:
         rail_motions(system, work, state)
+        step_compliance(system, work, state)
         begin_support(work.support, work.support_step)
     status, w, n = normal_contact(system, work, speed, state)
     if status != RUNNING:

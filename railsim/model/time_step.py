@@ -8,6 +8,7 @@ margin leaves room for higher wheel loads.
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from railsim.kernels.recording import Recorder
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, PARTS, SHARE, SIDEWAYS, SPEED, System, Work
+from railsim.kernels.system import N_SCALARS, PARTS, PER_PART, SHARE, SIDEWAYS, SPEED, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
@@ -34,13 +35,14 @@ LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
 # the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
 LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 1.0 / 600.0}
 # m of track a step, on rigid and on elastic rails: the shortest waves of irregular track, 3 m, are
-# followed in some fifty steps
-LONGEST_TRAVEL, LONGEST_TRAVEL_ELASTIC = 0.06, 0.067
+# followed in some fifty steps; on elastic rails forty are enough for a vehicle below its critical
+# speed, while one above it lets errors of phase grow
+LONGEST_TRAVEL, LONGEST_TRAVEL_ELASTIC, LONGEST_TRAVEL_STABLE = 0.06, 0.067, 0.08
 SHORTEST_STEP = 1e-6  # s
 # a step is taken if one longer by this factor is stable too: a wheel load of twice the static one
 # raises the frequency of the contact, which goes with the sixth root of the load, by as much
 MARGIN = 2.0 ** (1.0 / 6.0)
-# Where a wheel lifts or strikes a step is divided into parts of at most this length (s): a fiftieth
+# Where a wheel lifts or strikes a step is divided into parts, down to this length (s): a fiftieth
 # of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
 PART = {FAST: 1e-4, RK4: 2.5e-4}
 # the same of the fast scheme on elastic rails, where a wheel has no such vibration
@@ -48,11 +50,15 @@ PART_ELASTIC = 2.5e-4
 # share of the static wheel load by which a contact force may change in a step that is not divided,
 # on rigid and on elastic rails, where no vibration follows: on smooth curves no step is
 FORCE_CHANGE, FORCE_CHANGE_ELASTIC = 0.1, 0.2
+# the same of a part of a divided step, which is no shorter than `PART` for it
+PART_CHANGE, PART_CHANGE_ELASTIC = 0.05, 0.2
 # what a change of the lateral force counts: flanges strike sideways
 SIDEWAYS_RIGID, SIDEWAYS_ELASTIC = 6.0, 4.0
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve
 GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
+# 1/s, growth up to which a vehicle is below its critical speed: bodies that nothing holds have none
+NEUTRAL = 1e-3
 _NEVER = 1 << 40
 
 
@@ -99,6 +105,7 @@ def divide_strikes(work: Work, scheme: int, step: float, longest: float = math.i
     parts = math.ceil(step / part * (1.0 - 1e-9))
     work.parts[PARTS] = parts if parts > 1 else 0
     work.watch[SHARE] = FORCE_CHANGE_ELASTIC if elastic else FORCE_CHANGE
+    work.watch[PER_PART] = PART_CHANGE_ELASTIC if elastic else PART_CHANGE
     work.watch[SIDEWAYS] = SIDEWAYS_ELASTIC if elastic else SIDEWAYS_RIGID
 
 
@@ -135,10 +142,20 @@ class Stability:
         self._flange: Situation | None = None
         self._settled = False
         self._allowed: dict[bool, float] = {}
-        longest, travel = LONGEST_STEP, LONGEST_TRAVEL
-        if system.support.elastic:
-            longest, travel = LONGEST_STEP_ELASTIC, LONGEST_TRAVEL_ELASTIC
-        self.longest = min(longest[scheme], travel / float(state[SPEED]))
+
+    @cached_property
+    def longest(self) -> float:
+        """Longest step that accuracy allows [s]."""
+        system, state = self._straight
+        speed = float(state[SPEED])
+        if not system.support.elastic:
+            return min(LONGEST_STEP[self._scheme], LONGEST_TRAVEL / speed)
+        most = LONGEST_STEP_ELASTIC[self._scheme]
+        usual, stable = LONGEST_TRAVEL_ELASTIC / speed, LONGEST_TRAVEL_STABLE / speed
+        if usual < most:
+            growth = _step_growth(self._model, system, state, self._scheme, usual)
+            usual = stable if growth < NEUTRAL else usual
+        return min(most, usual)
 
     def choose(self, interval: float) -> float:
         """Longest stable step that divides the output interval, with the margin.
