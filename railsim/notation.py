@@ -178,9 +178,11 @@ def plain_symbol(symbol: str) -> str:
 def frictional_power(values: Mapping[str, Any]) -> Any:
     """Power that the contact of each wheel turns into heat, P = V (T_gamma + T_gamma_spin) [W].
 
-    Both wear numbers are work per metre of the vehicle's way; V is its speed.
+    The wear numbers are work per metre of the vehicle's way; V is its speed.  Beside a check rail
+    that of the back of the flange is added.
     """
-    return values["speed"][:, None, None] * (values["T_gamma"] + values["T_gamma_spin"])
+    work = values["T_gamma"] + values["T_gamma_spin"] + values.get("check_rail_T_gamma", 0.0)
+    return values["speed"][:, None, None] * work
 
 
 def _requested(key: str, *rows: Quantity) -> tuple[Quantity, ...]:
@@ -440,7 +442,7 @@ REQUESTED = {
                 "P_f",
                 "kW",
                 _WHEEL,
-                "turned into heat in the contact, spin included, summed over the patches",
+                "turned into heat in the contact, with spin and the flange back on check rails",
                 frictional_power,
             ),
         ),

@@ -169,6 +169,8 @@ class Settings(FileDefinition):
     adhesion_curve: AdhesionRows | None = None
     """Measured curve of the law `adhesion_curve`: rows [creepage, T/(mu N)] from [0, 0] on, linear
     in between, constant beyond [1]"""
+    transient_creep: Flag = False
+    """Creep forces follow the creepages over the length of the patch, instead of steady rolling"""
     normal_contact: Literal["hertz", "kik-piotrowski"] = "hertz"
     """Normal contact: the Hertz ellipse of averaged curvatures, or non-elliptic patches"""
     contact_damping: NonNegative = 2e5
@@ -186,6 +188,10 @@ class Settings(FileDefinition):
     """Further quantities in the result"""
     initial: dict[str, InitialState] = Field(default_factory=dict)
     """Disturbance at the start by the body's full name"""
+
+    def in_steady_rolling(self) -> Self:
+        """Return the settings of analyses whose creep forces are those of steady rolling."""
+        return self.model_copy(update={"transient_creep": False})
 
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:

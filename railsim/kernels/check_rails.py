@@ -9,7 +9,9 @@ the flangeway (right side; the left one mirrored),
 
 y, roll and yaw psi against the rails.  The force acts at x_c, the slope of p over the yaw, which
 goes to +-c; along the track it has the part N df/ds, so that what an entry flare does to the side
-it takes from the run.  The friction mu N opposes the slip of the flange's back, which slides down
+it takes from the run.  As c grows where the axle sinks, dc/dz = z_c/c, the rim of a yawed wheel is
+lifted out of the flangeway by N z_c psi^2/(c (|psi| + psi_0)), and the normal force does no work on
+the spin.  The friction mu N opposes the slip of the flange's back, which slides down
 ahead of the axle, up behind it, and backwards below the rail's top.
 """
 
@@ -83,17 +85,21 @@ def check_rail(system, work, speed, state, w, c, flangeway, slope):
     if N <= 0.0:
         return
     # the wheel's material at the contact: forward and down
-    spin, cx = state[v + 4], -sign * lead
-    forward, down = speed + state[v] + spin * below, state[v + 2] - spin * cx
+    spin, ahead = state[v + 4], -sign * lead
+    forward, down = speed + state[v] + spin * below, state[v + 2] - spin * ahead
     slip = sqrt(forward * forward + down * down + SMALL_SLIP * SMALL_SLIP)
     friction = contact.check[c, FRICTION] * N / slip
     cy = sign * contact.check_wheel[w, c, BACK]
-    fx, fy, fz = N * slope - friction * forward, sign * N, -friction * down
-    force[b, 0] += fx
+    fx, fy, fz = -friction * forward, sign * N, -friction * down
+    force[b, 0] += fx + N * slope
     force[b, 1] += fy
     force[b, 2] += fz
-    force[b, 3] += cy * fz - below * fy
-    force[b, 4] += below * fx - cx * fz
-    force[b, 5] += cx * fy - cy * fx
+    if reach > 0.0:
+        force[b, 2] -= N * below * yaw * yaw / (size * reach)
+    # of the normal force about the wheelset's own axes, so that it does no work on the spin
+    roll_moment = -below * fy
+    force[b, 3] += roll_moment + cy * fz
+    force[b, 4] += yaw * roll_moment + below * fx - (ahead - yaw * cy) * fz
+    force[b, 5] += ahead * fy - cy * (fx + N * slope)
     wheel[w, side, W_CHECK] += N
     wheel[w, side, W_CHECK_GAMMA] += friction * (forward * forward + down * down) / speed

@@ -31,6 +31,7 @@ from railsim.kernels.system import (
     WHEELSET,
 )
 from railsim.kernels.track_frame import OMEGA_S
+from railsim.kernels.transient import keep_creepages
 from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector_at
 
 # Weight of the last acceleration in the smoothed one, by which speeds are extrapolated: high enough
@@ -175,6 +176,8 @@ def step_fast(system, work, state, derivative, decay, h):
     first = 12 * n + m
     rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
     frames, half = work.frames, 0.5 * h * state[SPEED] * state[SPEED]
+    if system.contact.transient != 0:
+        keep_creepages(system, work, state)
     if system.support.elastic:
         note_wheelsets(system, work, state)
     # negative in results of earlier versions

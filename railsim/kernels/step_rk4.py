@@ -5,6 +5,8 @@ from railsim.kernels.internal import MAXWELL_CURVE, PAD, hold_within, slides_tog
 from railsim.kernels.rhs import internal_rates, mechanics
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import BALANCED, support_rates
+from railsim.kernels.system import LAST_STEP
+from railsim.kernels.transient import creepage_rates, keep_creepages
 
 
 @compiled(python=False)
@@ -19,6 +21,8 @@ def all_rates(system, work, state, derivative):
     if status == RUNNING:
         internal_rates(system, work, state, derivative)
         support_rates(system, work, state, derivative)
+        if system.contact.transient != 0:
+            creepage_rates(system, work, state, derivative)
     return status, where, n_patches
 
 
@@ -39,6 +43,9 @@ def settle_limits(internal, curves, first, drive, state):
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
+    if system.contact.transient != 0:
+        keep_creepages(system, work, state)
+        state[LAST_STEP] = 0.0
     for k in range(state.shape[0]):
         total[k] = derivative[k]
         rate[k] = derivative[k]

@@ -23,6 +23,7 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
+from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.lanes import (
     any_beyond,
     beside,
@@ -51,6 +52,9 @@ LEARNT_SIZE = 9
 # and the weight of the mean rate before the last step, g in `support_step`
 WEIGHT = LEARNT + 2 * LEARNT_SIZE
 SUPPORT_SIZE = WEIGHT + 1
+# entries of a patch and of a wheelset's patches in the state before them, see `transient`
+PATCH_STATE = 7
+TRANSIENT_SIZE = 2 * N_PATCH * PATCH_STATE
 # what an evaluation does to the rails: nothing; settles them after a step of the fast scheme, see
 # `correct_support`; finds the rates of a massless track, see `settle_rates`
 # integers of numpy: a function called with literals of Python is compiled for each value
@@ -299,9 +303,16 @@ def imbalance(system, work, state, wheels):
 
 
 @compiled(inline=True)
+def transient_begin(system):
+    """Index of the first wheelset's patches in the state."""
+    return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
+
+
+@compiled(inline=True)
 def support_begin(system):
     """Index of the first wheelset's track in the state."""
-    return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
+    contact = system.contact
+    return transient_begin(system) + TRANSIENT_SIZE * contact.transient * contact.body.shape[0]
 
 
 @compiled(python=False)

@@ -8,6 +8,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
+    then 42w      of each wheelset whose creep forces follow the creepages: see `transient`
     then 54w      of each wheelset on elastic rails: track under it, see `support`
     LAST_STEP     memory of the fast scheme: length of the last step (s), 0 where there was none
     TIME, ARC_LENGTH, SPEED   t (s), s of the reference body's frame (m), V = s' (m/s)
@@ -36,7 +37,6 @@ CONSTANT, TABLE, FREE = range(3)
 # at the end of the state
 LAST_STEP, TIME, ARC_LENGTH, SPEED = range(-4, 0)
 N_SCALARS = 4
-
 
 # columns of Bodies.row
 MASS, I_1, I_2, I_3, Y_0, Z_0, RADIUS, SPINS = range(8)
@@ -146,6 +146,7 @@ class Contact(NamedTuple):
                              each wheel on them, else -1
     check : float64[c, CHECK_ROW];  check_flangeway : float64[..., 2];
     check_wheel : float64[w, c, CHECK_WHEEL]   check rails, see `check_rails`
+    transient : int              1 where creep forces follow the creepages, see `transient`
     friction_law : int           address of a law of one's own for it, else 0
     friction_block : float64[...]   its block, see `own_laws`
     """
@@ -175,6 +176,7 @@ class Contact(NamedTuple):
     check: np.ndarray
     check_flangeway: np.ndarray
     check_wheel: np.ndarray
+    transient: int
     friction_law: int
     friction_block: np.ndarray
 
@@ -445,6 +447,7 @@ class Work(NamedTuple):
     extremes : float64[6, w, EXTREMES]  see `extremes`
     present : float64[EXTREMES] scratch of the extremes
     unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]
+    transient : float64[w, 2, p, TRANSIENT]  of each patch, see `transient`; w = 0 in steady rolling
     bump : float64[p, BUMP_SIZE]  heights of the wheel at hand by patch, see `wheel_surface`
     decay_part : float64[m]     as `decay` for a part of a step
     memory : float64[...]       of commands, signals and laws of one's own, see `Own`
@@ -490,6 +493,7 @@ class Work(NamedTuple):
     extremes: np.ndarray
     present: np.ndarray
     unloaded: np.ndarray
+    transient: np.ndarray
     bump: np.ndarray
     decay_part: np.ndarray
     memory: np.ndarray

@@ -16,7 +16,8 @@ Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`
   + w_abs x c less that of the rail's material (none where the rail is rigid: a slope of its shape
   is no velocity), along d and at right angles to it, over V_p = V (1 + (omega x rho)_x) + x', the
   speed at which the patch runs along its rail;
-- tangential forces by the creep law for all patches of the vehicle in one call.
+- tangential forces by the creep law for all patches of the vehicle in one call; they may follow
+  the creepages (`transient`).
 
 Forces on the rail in the plane of the rails: Y = T_y cos g + N sin g, Q = -T_y sin g + N cos g with
 the angle g > 0 where the normal leans to the right; on the wheel the opposite, with moment c x F.
@@ -74,6 +75,7 @@ from railsim.kernels.rails import locate_rails
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions, step_compliance
 from railsim.kernels.system import ARC_LENGTH
+from railsim.kernels.transient import follow_creepages, give_back_creepages
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
 
@@ -175,8 +177,12 @@ def wheel_rail(system, work, speed, state):
         falling_friction(
             n, patches, patch[PATCH_SPEED], contact.friction_rest, contact.friction_decay
         )
+    if contact.transient != 0:
+        follow_creepages(system, work, n, state)
     creep_forces(n, contact.law, patches, work.creep)
     G = contact.law.k_adhesion * contact.law.G
     creep_slopes(n, patches, speed, G, patch[SLOPE_ALONG], patch[SLOPE_ACROSS])
+    if contact.transient != 0:
+        give_back_creepages(system, work, n, state)
     add_creep_forces(system, work, n, speed, state)
     return RUNNING, 0, n

@@ -2,10 +2,24 @@
 
 import math
 
+from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
+from railsim.model.uneven_wheels import UnevenWheels
 
 LENGTH = 50.0  # m; the tables reach beyond both ends
 POSITION = 25.0  # m, where a vehicle stands on it
+
+
+def left_out(track: Track, settings: Settings, wheels: UnevenWheels) -> tuple[str, ...]:
+    """Remark on what a track of constant curvature and steady rolling leave out."""
+    parts = {
+        "check rails": track.check_rail,
+        "sections of rails": track.sections,
+        "wheels that are not round": wheels.uneven,
+        "transient creep forces": settings.transient_creep,
+    }
+    found = [name for name, there in parts.items() if there]
+    return (f"left out here, where rolling is steady: {', '.join(found)}",) if found else ()
 
 
 def circle(
@@ -43,4 +57,6 @@ def circle(
         gauge_widening=None,
         friction_table=None,
         friction=both,
+        sections=[],
+        check_rail=[],
     )

@@ -16,7 +16,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
-from railsim.linear.circle import POSITION, circle
+from railsim.linear.circle import POSITION, circle, left_out
 from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.steady import SteadyRolling, SteadyState, led
@@ -195,11 +195,13 @@ class LinearVehicle:
         self._path = None
         if self.contact.linearisation == "harmonic" and not held:
             self._path = ContactPath(self.contact.amplitude)
-        assembled = assemble(vehicle, circle(track), settings or Settings(), known, SharedTables())
+        rolling = (settings or Settings()).in_steady_rolling()
+        assembled = assemble(vehicle, circle(track), rolling, known, SharedTables())
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
-        self._remarks = balance.remarks
+        omitted = left_out(track, settings or Settings(), assembled.wheels)
+        self._remarks = (*balance.remarks, *omitted)
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         _check_hold(self.model, hold)
         self.hold = tuple(hold)

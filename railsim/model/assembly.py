@@ -27,7 +27,7 @@ from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned
-from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE
+from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE, TRANSIENT_SIZE
 from railsim.kernels.system import (
     AXLEBOX,
     FIXED,
@@ -122,8 +122,13 @@ class Model:
     def n_state(self) -> int:
         """Length of the state vector."""
         system = self.system
-        track = SUPPORT_SIZE * system.support.elastic * len(system.contact.body)
-        return 18 * self.index.n_bodies + 2 * len(system.internal.kind) + track + N_SCALARS
+        first = 18 * self.index.n_bodies + 2 * len(system.internal.kind)
+        return first + sum(per_wheelset(system)) * len(system.contact.body) + N_SCALARS
+
+
+def per_wheelset(system: System) -> tuple[int, int]:
+    """Entries of a wheelset in the state: of its patches, then of its track."""
+    return TRANSIENT_SIZE * system.contact.transient, SUPPORT_SIZE * system.support.elastic
 
 
 def assemble(
@@ -458,6 +463,7 @@ def _contact(
         friction_decay=falling.decay if falling else 0.0,
         **ROUND._asdict(),
         **NONE._asdict(),
+        transient=int(settings.transient_creep),
         friction_law=0,
         friction_block=np.zeros(0),
     )

@@ -6,11 +6,11 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.curves import GAUGE_DEPTH, tape_circle_position
-from railsim.definitions.track.check_rail import CheckRail
+from railsim.definitions.track.check_rail import FAR, CheckRail
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.tables import Wheelset
-from railsim.kernels.check_rails import CHECK_ROW, CHECK_WHEEL
+from railsim.kernels.check_rails import CHECK_ROW, CHECK_WHEEL, FIRST, LAST
 from railsim.profiles.profile import Profile
 
 SPACING = 1e-4  # m, of the heights at which both contours are compared
@@ -25,6 +25,24 @@ class CheckRails(NamedTuple):
 
 
 NONE = CheckRails(np.zeros((0, CHECK_ROW)), np.zeros((0, 2)), np.zeros((0, 0, CHECK_WHEEL)))
+
+
+def standing_at(check: CheckRails, s: float) -> CheckRails:
+    """Return the check rails at `s` all along the track, as wide there as at `s`."""
+    kept, rows = [], []
+    table: list[tuple[float, float]] = []
+    for k, row in enumerate(check.check):
+        first, last = int(row[FIRST]), int(row[LAST])
+        at, width = check.check_flangeway[first : last + 1].T
+        if at[0] <= s <= at[-1]:
+            moved = row.copy()
+            moved[FIRST : LAST + 1] = len(table), len(table) + 1
+            table += [(-FAR, float(np.interp(s, at, width))), (FAR, float(np.interp(s, at, width)))]
+            kept.append(k)
+            rows.append(moved)
+    if not kept:
+        return NONE
+    return CheckRails(np.array(rows), np.array(table), check.check_wheel[:, kept])
 
 
 def check_rails(flat: FlatVehicle, track: Track, profiles: dict[str, Profile]) -> CheckRails:

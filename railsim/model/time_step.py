@@ -243,6 +243,10 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
         )
         return after if status == RUNNING else np.full_like(after, np.nan)
 
+    if system.contact.transient:  # of which steady rolling knows nothing before its first step
+        state = step(state)
+        if not np.isfinite(state).all():
+            return np.inf
     # without masses the reference scheme balances the track's forces to 0.01 N only
     iterates = scheme == "rk4" and system.support.elastic and system.support.massless
     columns = _jacobian(step, state, _moving(system, state), 1e-6 if iterates else 1e-8)

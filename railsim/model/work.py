@@ -29,6 +29,7 @@ from railsim.kernels.system import (
     Work,
 )
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
+from railsim.kernels.transient import TRANSIENT
 from railsim.kernels.vibration import VIBRATION
 from railsim.kernels.wheel_surface import BUMP_SIZE
 
@@ -94,6 +95,7 @@ def work_arrays(system: System) -> Work:
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),
+        transient=aligned_zeros((n_wheelsets * system.contact.transient, 2, N_PATCH, TRANSIENT)),
         bump=aligned_zeros((N_PATCH, BUMP_SIZE)),
         decay_part=aligned_zeros(len(system.internal.kind)),
         memory=system.own.memory.copy(),

@@ -72,7 +72,8 @@ def _friction(track: Track) -> str:
 def _creep_law(settings: Settings) -> str:
     law = CREEP_LAWS[settings.creep_law]
     nx, ny = settings.fastsim_grid
-    return f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
+    text = f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
+    return text + ", transient" * settings.transient_creep
 
 
 def _listed(names: Iterable[str]) -> str:

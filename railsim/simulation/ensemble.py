@@ -31,7 +31,6 @@ from railsim.kernels.status import (
     WHEEL_LIFT,
     YAW_RANGE,
 )
-from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import (
     N_SCALARS,
     Bodies,
@@ -42,7 +41,7 @@ from railsim.kernels.system import (
     falling_friction,
     mount_laws,
 )
-from railsim.model.assembly import Model, side_by_side
+from railsim.model.assembly import Model, per_wheelset, side_by_side
 from railsim.model.uneven_wheels import joined, rolling
 
 Floats = NDArray[np.float64]
@@ -107,9 +106,9 @@ class Ensemble:
         wheelsets = _slices(len(system.contact.body) for system in systems)
         elements = _slices(len(recorder.chosen) for recorder in recorders)
         n, m = bodies[-1].stop, internal[-1].stop
-        track = SUPPORT_SIZE * systems[0].support.elastic  # of each wheelset
+        sizes = per_wheelset(systems[0])
         self.parts = tuple(
-            Part(_indices(n, m, track, own, inner, axles, wheelsets[-1].stop), own, axles, chosen)
+            Part(_indices(n, m, sizes, own, inner, axles, wheelsets[-1].stop), own, axles, chosen)
             for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
         )
         if len(models) == 1:
@@ -117,7 +116,7 @@ class Ensemble:
             self.recorder = recorders[0]
             return
         self.system = joined_system(models)
-        n_state = 18 * n + 2 * m + track * wheelsets[-1].stop + N_SCALARS
+        n_state = 18 * n + 2 * m + sum(sizes) * wheelsets[-1].stop + N_SCALARS
         self.recorder = _joined_recorder(systems, recorders, n_state)
 
     def state(self, states: Sequence[Floats]) -> Floats:
@@ -334,13 +333,16 @@ def _slices(lengths: Iterable[int]) -> list[slice]:
 
 
 def _indices(
-    n: int, m: int, track: int, bodies: slice, internal: slice, wheelsets: slice, w: int
+    n: int, m: int, sizes: tuple[int, int], bodies: slice, internal: slice, wheelsets: slice, w: int
 ) -> Ints:
     """Indices of one vehicle's state in that of n bodies, m internal states, w wheelsets."""
     coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
     inner = np.arange(internal.start, internal.stop)
     first = 18 * n + 2 * m
-    end = first + track * w
+    blocks = []
+    for size in sizes:
+        blocks.append(first + np.arange(size * wheelsets.start, size * wheelsets.stop))
+        first += size * w
     return np.concatenate(
         [
             coordinates,
@@ -348,7 +350,7 @@ def _indices(
             12 * n + inner,
             12 * n + m + coordinates,
             18 * n + m + inner,
-            first + np.arange(track * wheelsets.start, track * wheelsets.stop),
-            np.arange(end, end + N_SCALARS),
+            *blocks,
+            np.arange(first, first + N_SCALARS),
         ]
     )

@@ -42,6 +42,7 @@ from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import POSITION, circle
 from railsim.linear.steady import NotConverged, led
 from railsim.model.assembly import Model
+from railsim.model.check_rails import CheckRails, standing_at
 from railsim.model.equilibrium import Equilibrium, initial_state
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
 from railsim.simulation.auxiliary_track import (
@@ -145,10 +146,15 @@ def _arrived(
     state[ARC_LENGTH] = s
     if steps:
         follow_rails(model, state)
-        system = without_loads(model.system)._replace(drive=CONSTANT_SPEED)
+        system = _guided(without_loads(model.system), model.check)._replace(drive=CONSTANT_SPEED)
         _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
     state[-3:] = 0.0, start, speed
     return state
+
+
+def _guided(system: System, check: CheckRails) -> System:
+    """Return the system with check rails."""
+    return system._replace(contact=system.contact._replace(**check._asdict()))
 
 
 def _friction(track: Track, s: float) -> tuple[float, float]:
@@ -291,7 +297,8 @@ def _steady(
             "The run begins with a run-in: what friction elements hold depends on the way there."
         )
         return None
-    level, speed, friction = model.system, float(balance.state[SPEED]), _friction(track, start)
+    speed, friction = float(balance.state[SPEED]), _friction(track, start)
+    level = _guided(model.system, standing_at(model.check, start))
     level = level._replace(support=level.support._replace(variation=level.support.variation[:0]))
 
     def along(share: float) -> tuple[System, float]:
@@ -345,7 +352,7 @@ def settled(
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
-    system = without_loads(model.system)._replace(
+    system = _guided(without_loads(model.system), standing_at(model.check, start))._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED
     )
     state = balance.state.copy()

@@ -26,7 +26,7 @@ from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import ARC_LENGTH, System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.linear.circle import POSITION, circle
+from railsim.linear.circle import POSITION, circle, left_out
 from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
@@ -326,12 +326,13 @@ class _Search:
         profiles: Mapping[str, Profile] | None,
     ) -> None:
         self.track, self.cant, self.vehicle = track, cant, vehicle.name
-        assembled = assemble(vehicle, circle(track), settings, profiles)
+        assembled = assemble(vehicle, circle(track), settings.in_steady_rolling(), profiles)
         check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0 = balance.Q0
-        self.remarks = (*balance.remarks, *_remarks(balance.model))
+        omitted = left_out(track, settings, assembled.wheels)
+        self.remarks = (*balance.remarks, *_remarks(balance.model), *omitted)
         self.parts = parts_of(self.model, coordinates(self.model))
         rest = balance.state.copy()
         rest[-2] = POSITION

@@ -122,3 +122,37 @@ def test_check_rail_that_is_out_of_reach_changes_nothing():
 def test_wrong_check_rails_are_refused(wrong, said):
     with pytest.raises(InputError, match=said):
         curve([{**RAIL, **wrong}])
+
+
+@pytest.mark.parametrize("how", ["run-in", "steady"])
+def test_run_begins_on_the_check_rail(how):
+    """In the curve the vehicle starts as a run over the whole track arrives there."""
+    coach = load_vehicle("coach_manchester")
+    track = load_track("depot_r150_check_rail").replace(gauge_widening=None, check_rail=[RAIL])
+    settings = load_settings().with_values({"start_state": how})
+    begun = simulate(coach, track, speed=8.0, start=105.0, duration=0.1, settings=settings)
+    arrived = simulate(coach, track, speed=8.0, start=105.0 - 8.0 * 5.0, until=105.5)
+    at = np.argmin(np.abs(arrived["distance"] - 105.0))
+    force = begun["check_rail_force"][0, :, 1]
+    assert force[0] > 2e4
+    np.testing.assert_allclose(force, arrived["check_rail_force"][at, :, 1], atol=1.5e3)
+    np.testing.assert_allclose(begun["check_rail_force"][-1, :, 1], force, atol=500.0)
+
+
+def test_work_at_the_check_rail_is_part_of_the_frictional_power():
+    """What a coasting coach loses in the curve, (m + sum(I/r0^2)) V V' = -P, within 1 %."""
+    coach = load_vehicle("coach_manchester")
+    track = load_track("depot_r150_check_rail")
+    settings = load_settings().with_values({"drive.mode": "free", "outputs.frictional_power": True})
+    result = simulate(coach, track, speed=8.6, start=110.0, duration=2.5, settings=settings)
+    t, s = result["time"], result["distance"]
+    late = t > 0.5
+    rate, speed = np.polyfit(t[late] - 1.5, s[late], 2)[:2] * (2.0, 1.0)
+    power = result["frictional_power"][late].sum(axis=(1, 2)).mean()
+    at_back = 8.6 * result["check_rail_T_gamma"][late].sum(axis=(1, 2)).mean()
+    assert at_back > 0.2 * power
+    bodies = flatten(coach).bodies
+    mass = sum(body.mass for body in bodies)
+    axles = [body for body in bodies if body.wheelset]
+    turning = sum(body.inertia[1] / body.wheelset.radius[0] ** 2 for body in axles)
+    assert power == pytest.approx(-(mass + turning) * speed * rate, rel=0.01)

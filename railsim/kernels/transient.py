@@ -1,0 +1,117 @@
+"""Creep forces that take the length of the patch to follow the creepages.
+
+The creep laws hold for steady rolling.  Material enters a patch free of traction and has to pass it
+before a changed creepage acts all along: the followed creepages c, which the laws take instead of
+those of the rigid bodies, xi, obey
+
+    a c' + c = xi
+
+with ' for the way of the patch along its rail and a its semi-axis in that direction, integrated
+exactly for a xi that is linear in time over a step: with z = V h/a and e = exp(-z)
+
+    c = xi - (xi - xi_0) (1 - e)/z + (c_0 - xi_0) e.
+
+The normal force acts at once.  Friction work and outputs are those of the creepages xi.
+
+In the state: c_0 and xi_0 of every patch at the last evaluation and whether it carried then; a
+patch that did not begins with c_0 = 0, without traction.  Where nothing is known, as in
+equilibrium and in linear analyses, rolling is steady: c = xi.  For the reference scheme c_0 is part
+of the state like any other, LAST_STEP being 0, with the rate V (xi - c)/a.
+
+Source: Knothe and Gross-Thebing (1986), Vehicle System Dynamics 15, 133-153: creep coefficients
+fall with the ratio of a to the wavelength; one order of delay as in Shen and Li (1996), Wear 191,
+242-244.
+"""
+
+from math import exp, expm1
+
+from railsim.kernels import compiled
+from railsim.kernels.contact_columns import PATCH_SPEED, SLOPE_ACROSS, SLOPE_ALONG, XI_X, A
+from railsim.kernels.contact_table import N_PATCH
+from railsim.kernels.support import PATCH_STATE, SKIP, TRANSIENT_SIZE, transient_begin
+from railsim.kernels.system import LAST_STEP
+
+# columns of Work.transient[w, side, patch], and of each patch in the state but for the last: c and
+# xi along, across and in spin; whether it carries; V/a [1/s]
+FOLLOWED, ROLLING, CARRIES, PER_TIME = 0, 3, 6, 7
+TRANSIENT = PATCH_STATE + 1
+CARRIED, LOST = 1.0, 2.0  # values of CARRIES; 0 before anything is known
+KNOWN, NEW = 0.5, 1.5  # beyond them there is a history, which is that of a patch that did not carry
+
+
+@compiled(python=False)
+def follow_creepages(system, work, n, state):
+    """Put the followed creepages of the active patches in place of their creepages."""
+    patch, now, h = work.patch, work.transient, state[LAST_STEP]
+    for w in range(now.shape[0]):
+        if system.support.elastic and work.support_step[w, SKIP] > 0.0:
+            continue
+        for side in range(2):
+            for p in range(N_PATCH):
+                for c in range(TRANSIENT):
+                    now[w, side, p, c] = 0.0
+                now[w, side, p, CARRIES] = LOST
+    for k in range(n):
+        w, side, p = work.patch_index[k, 0], work.patch_index[k, 1], work.patch_index[k, 2]
+        i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (N_PATCH * side + p)
+        per_time = patch[PATCH_SPEED, k] / patch[A, k]
+        z = per_time * h
+        mean, kept = 1.0, 1.0
+        if z > 0.0:
+            mean, kept = -expm1(-z) / z, exp(-z)
+        for c in range(3):
+            xi, before = patch[XI_X + c, k], state[i + ROLLING + c]
+            followed = xi
+            if state[i + CARRIES] > NEW:
+                followed -= xi * kept
+            elif state[i + CARRIES] > KNOWN:
+                followed += (before - xi) * mean + (state[i + FOLLOWED + c] - before) * kept
+            now[w, side, p, FOLLOWED + c] = followed
+            now[w, side, p, ROLLING + c] = xi
+            patch[XI_X + c, k] = followed
+        now[w, side, p, CARRIES] = CARRIED
+        now[w, side, p, PER_TIME] = per_time
+
+
+@compiled(python=False)
+def give_back_creepages(system, work, n, state):
+    """Put the creepages back, and into the slopes what follows them within a step."""
+    patch, now, h = work.patch, work.transient, state[LAST_STEP]
+    for k in range(n):
+        w, side, p = work.patch_index[k, 0], work.patch_index[k, 1], work.patch_index[k, 2]
+        for c in range(3):
+            patch[XI_X + c, k] = now[w, side, p, ROLLING + c]
+        i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (N_PATCH * side + p)
+        if state[i + CARRIES] > KNOWN:
+            z = now[w, side, p, PER_TIME] * h
+            at_once = 1.0 + expm1(-z) / z if z > 0.0 else 0.0
+            patch[SLOPE_ALONG, k] *= at_once
+            patch[SLOPE_ACROSS, k] *= at_once
+
+
+@compiled(python=False)
+def keep_creepages(system, work, state):
+    """Keep what the last evaluation found in the state, from which a step begins."""
+    now, i = work.transient, transient_begin(system)
+    for w in range(now.shape[0]):
+        for side in range(2):
+            for p in range(N_PATCH):
+                for c in range(PATCH_STATE):
+                    state[i] = now[w, side, p, c]
+                    i += 1
+
+
+@compiled(python=False)
+def creepage_rates(system, work, state, derivative):
+    """Rates of the followed creepages for the reference scheme."""
+    now, i = work.transient, transient_begin(system)
+    for w in range(now.shape[0]):
+        for side in range(2):
+            for p in range(N_PATCH):
+                per_time = now[w, side, p, PER_TIME]
+                for c in range(PATCH_STATE):
+                    derivative[i + c] = 0.0
+                for c in range(3):
+                    change = now[w, side, p, ROLLING + c] - now[w, side, p, FOLLOWED + c]
+                    derivative[i + FOLLOWED + c] = per_time * change
+                i += PATCH_STATE
