@@ -282,7 +282,7 @@ def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
     before, problem.weights = problem.weights, []
     for one, rows in zip(problem.placed(x), problem.residuals(x), strict=True):
         noise = problem.form.expected(one) if stated else [np.nan] * len(rows)
-        floors = problem.form.features(one, one.measured)
+        floors = problem.form.features(one, one.measured, measured=True)
         own = [
             level if np.isfinite(level) else max(_rms(row), (0.0 if before else FIRST) * _rms(all_))
             for row, level, all_ in zip(rows, noise, floors, strict=True)

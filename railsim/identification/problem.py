@@ -170,7 +170,9 @@ class Problem:
         """Return measured less simulated, unweighted, for each run and channel."""
         found = []
         for one, values in zip(self.placed(x), self.series(x), strict=True):
-            measured = self.form.features(one, np.where(np.isfinite(values), one.measured, np.nan))
+            measured = self.form.features(
+                one, np.where(np.isfinite(values), one.measured, np.nan), measured=True
+            )
             features = self.form.features(one, values)
             found.append([m - f for m, f in zip(measured, features, strict=True)])
         return found

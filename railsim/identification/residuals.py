@@ -5,8 +5,8 @@
     independent, so that no filter colours the residuals and their number is that of the
     independent values.  Gaps count as no difference; both ends fade by half a cosine.
 ``spectra``
-    Logarithms of the rms values in third-octave bands: where the place on the track, or the track
-    itself, is known by its spectrum only.
+    Logarithms of the rms values in third-octave bands, simulated ones with the noise that is stated
+    of a channel: where the place on the track, or the track itself, is known by its spectrum only.
 ``sections``
     Mean and rms of the channels in sections of 50 m.
 """
@@ -41,7 +41,9 @@ class Form:
     kind: str
     band: tuple[float, float]
 
-    def features(self, prepared: Prepared, values: Floats) -> list[Floats]:
+    def features(
+        self, prepared: Prepared, values: Floats, *, measured: bool = False
+    ) -> list[Floats]:
         """Return what is compared of each channel; `values` is float64[channel, time].
 
         Where nothing is measured, the values do not count.
@@ -62,9 +64,12 @@ class Form:
             np.log(self.band[1] / self.band[0]) / np.log(THIRD) + 1.0
         )
         rows = []
-        for row in scaled:
+        noise = 0.0 if measured else np.nan_to_num(prepared.noise * _density(prepared, self.band))
+        for row, level in zip(scaled, np.broadcast_to(noise, len(scaled)), strict=True):
             inside = [row[(f[own] >= a) & (f[own] < a * THIRD)] for a in edges]
-            means = [np.mean(np.abs(c) ** 2) for c in inside if len(c) >= FEWEST]
+            # both parts of a coefficient have the noise's variance
+            power = 2.0 * level**2
+            means = [np.mean(np.abs(c) ** 2) + power for c in inside if len(c) >= FEWEST]
             rows.append(0.5 * np.log(np.maximum(means, 1e-300)))
         return rows
 

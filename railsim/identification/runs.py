@@ -37,7 +37,8 @@ SHORTEST = 4.0  # s
 DEGREE = 5  # of the spline
 MARGIN = 0.85  # of the step of the model, for variants that are stiffer
 ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
-VARYING_RATE = 1000.0  # 1/s, where the speed varies and nothing is low-passed
+# where the speed varies nothing is low-passed: what is folded into the band lies far above it
+VARYING_RATE, FAR_ABOVE = 400.0, 10.0  # 1/s at least; times the end of the band
 
 
 @contextmanager
@@ -138,14 +139,14 @@ class Run:
 
     def with_step_of(self, model: Model) -> "Run":
         """Return the run with a fixed step for all variants: that of the model, and a margin."""
+        if self.settings.drive.mode != "constant":
+            return self
         interval = 1.0 / self.settings.output_rate
         short = self.settings
         probe = replace(self, until=self.start + max(1.0, self.speed * 0.1))
         with silent():
             step = float(probe._result(model.with_track(self.track), short).attributes["step"])
         count = int(np.ceil(interval / (MARGIN * step) - 1e-9))
-        if self.settings.drive.mode != "constant":
-            return self
         return replace(self, settings=short.replace(step=interval / count))
 
 
@@ -248,7 +249,7 @@ def prepared(
         rows = [[float(s), float(v)] for s, v in _profile(measurement, mean)]
         drive = {"mode": "table", "speed_table": rows}
         settings = Settings.model_validate(
-            {"output_rate": VARYING_RATE, "outputs": outputs, "drive": drive}
+            {"output_rate": max(VARYING_RATE, FAR_ABOVE * high), "outputs": outputs, "drive": drive}
         )
     run = Run(
         measurement.name, track, measurement.definition.load, settings, mean, start,
