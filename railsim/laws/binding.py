@@ -11,8 +11,10 @@ import linecache
 import logging
 import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from types import FunctionType
 from typing import Any
 
@@ -21,7 +23,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, InputError
-from railsim.laws.permission import digest, is_allowed
+from railsim.laws.permission import check_laws, digest
 
 MEMORY = "memory"
 KIND = "railsim_law"
@@ -157,14 +159,10 @@ def bind(name: str, law: Law, takes: Takes, gives: int | None = None, memory: in
     InputError
         It is not permitted, raises errors, has wrong arguments or cannot be compiled.
     """
-    source = law.source or ""
-    if not is_allowed(source):
-        found = f"'{name}' is code of {law.file or 'a result'}, which is not executed"
-        allowed = "--allow-code, or --law FILE with this file; in Python allow_code=True"
-        raise InputError([Fault("laws", name, found, allowed)])
+    check_laws([(name, law)])
     kept = (
         name,
-        digest(source),
+        digest(law.source or ""),
         str(law.function),
         str(law.compiled),
         repr((takes, gives, memory)),
@@ -194,12 +192,13 @@ class _Binding:
         if missing:
             self._refuse(f"has no argument '{missing[0]}'", f"arguments: {', '.join(names)}")
         if (MEMORY in names) != (self.memory > 0):
-            self._refuse("an argument 'memory' and the key 'memory' belong together", "")
-        defaults = {
-            n: float(arguments[n].default)
-            for n in further
-            if arguments[n].default is not inspect.Parameter.empty
-        }
+            has = ("an argument", "key") if MEMORY in names else ("a key", "argument")
+            self._refuse(f"has {has[0]} 'memory' but no {has[1]} of this name", "both or neither")
+        given = {n: arguments[n].default for n in further}
+        defaults = {n: v for n, v in given.items() if v is not inspect.Parameter.empty}
+        for n, value in defaults.items():
+            if not isinstance(value, Real) or not math.isfinite(value):
+                self._refuse(f"has '{n}' = {value!r}", "a finite number")
         allowed = (1 + len(states),) if states else self.takes.gives
         if self.gives is not None:  # one value may be for all
             allowed = (self.gives,) if self.gives == 1 else (1, self.gives)
@@ -237,7 +236,7 @@ class _Binding:
         space: dict[str, Any] = {"__name__": f"railsim_law_{self.name}"}
         try:
             exec(compile(tree, self.file, "exec"), space)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             line = _line_of(error, self.file)
             self._refuse(f"fails when it is read: {type(error).__name__}: {error}", "", line)
         function = space.get(name)
@@ -283,8 +282,8 @@ class _Binding:
         for other, helper in list(space.items()):
             own = isinstance(helper, FunctionType) and helper.__code__.co_filename == self.file
             if own and helper is not function:
-                space[other] = numba.njit(error_model="numpy")(helper)
-        compiled = numba.njit(error_model="numpy")(function)
+                space[other] = numba.njit(error_model="numpy", boundscheck=True)(helper)
+        compiled = numba.njit(error_model="numpy", boundscheck=True)(function)
         kinds = [types.float64[::1] if n == MEMORY else types.float64 for n in names]
         try:
             compiled.compile(tuple(kinds))
@@ -292,7 +291,7 @@ class _Binding:
             number = self._returned(given, types)
             self._check_number(number, allowed)
             text = _entry_text(names, place, number, self.memory, allowed[-1])
-            scope: dict[str, Any] = {"law": compiled, "carray": numba.carray}
+            scope: dict[str, Any] = {"law": compiled, "carray": numba.carray, "nan": math.nan}
             exec(text, scope)
             entry = numba.cfunc(types.void(types.CPointer(types.float64)), error_model="numpy")(
                 scope["entry"]
@@ -350,7 +349,7 @@ def _entry_text(
     first = place[MEMORY]
     view = f"v[{first}:{first + memory}]"
     given = ", ".join(view if n == MEMORY else f"x[{place[n]}]" for n in names)
-    lines = ["def entry(x):"]
+    lines = ["def entry(x):", "    x[0] = nan"]  # it stays where an index is out of bounds
     if memory:
         lines.append(f"    v = carray(x, ({first + memory},))")
     results = ", ".join(f"y{k}" for k in range(number))
@@ -374,7 +373,7 @@ def _line_of(error: BaseException, file: str) -> int | None:
 def _short(error: Exception) -> str:
     """Return the first sentence of numba's report that says something."""
     for line in str(error).splitlines():
-        text = line.strip()
+        text = re.sub(r"\x1b\[[0-9;]*m", "", line).strip()
         if text and not text.startswith(("Failed in", "File", "[", "During", "Overload", "-", "*")):
             return text[:200]
     return type(error).__name__

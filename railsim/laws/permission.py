@@ -2,12 +2,15 @@
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions.vehicle.laws import Law
+from railsim.errors import Fault, InputError
 
 D = TypeVar("D", Vehicle, Track)
 PERMITTED = "RAILSIM_LAWS"
@@ -48,10 +51,27 @@ def is_allowed(source: str) -> bool:
     return ALL in known or digest(source) in known
 
 
-def refused(definition: Vehicle | Track) -> list[str]:
+def refused(definition: Vehicle | Track | Settings) -> list[str]:
     """Return the names of its laws that are not permitted."""
     laws = (definition.laws or {}).items()
     return [name for name, one in laws if not is_allowed(one.source or "")]
+
+
+def check_laws(laws: Iterable[tuple[str, Law]]) -> None:
+    """Raise InputError with all of some named laws that are not permitted."""
+    allowed = "--allow-code, or --law FILE with this file; in Python allow_code=True"
+    faults = dict.fromkeys(
+        Fault(
+            "laws",
+            name,
+            f"'{name}' is code of {law.file or 'a result'}, which is not executed",
+            allowed,
+        )
+        for name, law in laws
+        if not is_allowed(law.source or "")
+    )
+    if faults:
+        raise InputError(faults)
 
 
 def permitted_part(definition: D) -> D:

@@ -27,6 +27,7 @@ from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned
+from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
 from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE, TRANSIENT_SIZE
 from railsim.kernels.system import (
     AXLEBOX,
@@ -85,6 +86,17 @@ class Index:
     def coordinate(self, body: str, component: int) -> int:
         """Index of a coordinate in the state vector."""
         return 6 * self.bodies.index(body) + component
+
+    def sentence(self, status: int, where: int) -> str:
+        """Why the time loop has ended, with the name of what it concerns."""
+        names = self.wheelsets
+        if status == LAW_NOT_FINITE:
+            laws = (f"the law of element {name}" for name in self.actuators)
+            names = (*laws, *(f"controller {name}" for name in self.controllers))
+        if status == NOT_FINITE:
+            body = where % (6 * self.n_bodies) // 6
+            names, where = self.bodies, min(body, self.n_bodies - 1)
+        return STATUS[status][1].format(where=names[where])
 
 
 @dataclass(frozen=True)

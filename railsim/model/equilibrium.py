@@ -27,7 +27,7 @@ from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import (
     ARC_LENGTH,
@@ -334,8 +334,7 @@ class _Balance:
         derivatives = np.empty_like(rows)
         status, where, _ = right_hand_sides(self.system, self.work, rows, derivatives)
         if status != RUNNING:
-            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
-            raise ModelError(f"no static equilibrium: {sentence}")
+            raise ModelError(f"no static equilibrium: {self.model.index.sentence(status, where)}")
         return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
 
     def _jacobian(self, state: Floats, rest: Floats) -> Floats:

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, NOT_FINITE, STATUS
+from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, STATUS
 from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS, TIME
-from railsim.model.assembly import Model
 from railsim.result import Result
 from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run
@@ -106,20 +105,6 @@ def verdict(run: Run) -> dict[str, str]:
             return {"status": "stopped", "status_reason": f"{where} {why}: {cause}"}
     return {
         "status": STATUS[run.status][0],
-        "status_reason": _sentence(model, run.status, run.where)
+        "status_reason": model.index.sentence(run.status, run.where)
         + (f" at {run.state[TIME]:.6g} s" if run.status == LAW_NOT_FINITE else ""),
     }
-
-
-def _sentence(model: Model, status: int, where: int) -> str:
-    names = model.index.wheelsets
-    if status == LAW_NOT_FINITE:
-        index = model.index
-        names = (
-            *(f"the law of element {name}" for name in index.actuators),
-            *(f"controller {name}" for name in index.controllers),
-        )
-    if status == NOT_FINITE:
-        body = where % (6 * model.index.n_bodies) // 6
-        names, where = model.index.bodies, min(body, model.index.n_bodies - 1)
-    return STATUS[status][1].format(where=names[where])

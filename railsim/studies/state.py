@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from railsim.errors import Fault, InputError, argument_fault
+from railsim.laws.permission import check_laws
 from railsim.result import open_result
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Journal, Records
@@ -80,6 +81,12 @@ class State:
             raise InputError(faults)
         found = {point for point, _ in self.found}
         self.cases = [case for point, case in self._waiting.items() if point not in found]
+        check_laws(
+            law
+            for case in self.cases
+            for definition in (case.vehicle, case.track, case.settings)
+            for law in (definition.laws or {}).items()
+        )
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""
