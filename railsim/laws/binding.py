@@ -353,10 +353,11 @@ def _entry_text(
     if memory:
         lines.append(f"    v = carray(x, ({first + memory},))")
     results = ", ".join(f"y{k}" for k in range(number))
-    lines.append(f"    {results} = law({given})")
-    lines += [f"    x[{k}] = y{k}" for k in range(number)]
+    lines += ["    try:", f"        {results} = law({given})"]
+    lines += [f"        x[{k}] = y{k}" for k in range(number)]
     rest = "y0" if number == 1 else "0.0"
-    lines += [f"    x[{k}] = {rest}" for k in range(number, most)]
+    lines += [f"        x[{k}] = {rest}" for k in range(number, most)]
+    lines += ["    except Exception:", "        pass"]
     return "\n".join(lines) + "\n"
 
 

@@ -106,6 +106,17 @@ def test_a_law_of_a_package_runs_by_permission(executed, capsys):
     assert not executed.exists()
 
 
+def test_studies_refuse_before_they_begin(executed, capsys, tmp_path):
+    runs = ["--vehicles", "coach.toml", "--tracks", "curve_r250", "--speeds", "20", "25"]
+    assert main(["study", *runs, "--until", "2", "--out", "study", "--quiet"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert main(["study", "--scenario", "en14363", *runs[:2], "--out", "campaign", "--quiet"]) == 2
+    assert "'their_damper' is code of their_damper.py" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+    assert not (tmp_path / "campaign").exists()
+    assert not executed.exists()
+
+
 def test_whoever_gives_a_wrong_name_is_told(executed):
     assert "damper" in railsim.load_vehicle("coach.toml").elements
     with pytest.raises(InputError, match=r"damper.law: no law 'their_dampr'; .*'their_damper'"):

@@ -7,6 +7,7 @@ import pytest
 
 import railsim
 from railsim import laws
+from railsim.definitions.vehicle.laws import Law
 from railsim.description.rest import describe_statics
 from railsim.errors import InputError
 from railsim.laws import binding
@@ -220,6 +221,42 @@ def test_faults_are_one_line(coach, track, element, words):
     with pytest.raises(InputError, match=words) as raised:
         railsim.simulate(with_element(coach, element), track, **WAY)
     assert len(str(raised.value).splitlines()) == 1
+
+
+CONTROLLER = binding.Takes("a controller", ("time",), ("v",))
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("def x(time):\n    return 0.0", "has no argument 'v'; arguments: time"),
+        ("def x(v):\n    pass", "returns none; a number"),
+        ("def x(v):\n    assert v\n    return v", "line 2: .* cannot 'assert' an error"),
+        ("def x(v):\n    return q", "line 2: .* cannot be compiled: NameError: name 'q' is not"),
+        ("def x(v, c='a'):\n    return v", "has 'c' = 'a'; a finite number"),
+        ("def x(v, memory):\n    return v", "has an argument 'memory' but no key of this name"),
+        ("def y(v):\n    return v", "is no function 'x' of this file; allowed: y"),
+        ("raise SystemExit(7)", "line 1: .* fails when it is read: SystemExit: 7"),
+        ("n = 0\ndef x(v):\n    global n\n    n += 1\n    return v", "cannot be compiled"),
+    ],
+)
+def test_wrong_laws_are_one_line(source, words):
+    laws.allow(source)
+    with pytest.raises(InputError, match=words) as raised:
+        binding.bind("x", Law(source=source, file="mine.py"), CONTROLLER)
+    assert str(raised.value).startswith("mine.py: ")
+    assert len(str(raised.value).splitlines()) == 1
+    assert "\x1b" not in str(raised.value)
+
+
+def test_an_index_beyond_the_memory_ends_the_run(coach, track):
+    """And does not write where it must not."""
+    source = "def sky(time, v, c, memory):\n    memory[int(time > 0.1)] = v\n    return -c * v\n"
+    laws.allow(source)
+    vehicle = skyhook(coach).with_values({"laws.sky.source": source})
+    result = railsim.simulate(vehicle, track, **WAY)
+    reason = result.attributes["status_reason"]
+    assert reason.startswith("controller sky gave a value that is not finite at 0.1")
 
 
 def test_nothing_is_executed_without_permission(coach, track, capsys, monkeypatch):
