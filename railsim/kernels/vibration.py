@@ -4,20 +4,28 @@ Each wheel load passes a Butterworth high-pass filter of order two at 40 Hz (bil
 Oppenheim and Schafer, Discrete-Time Signal Processing, 7.2); its mean square and that of its
 differences fade with a time constant of 0.1 s, so that a single blow counts little.  Of a harmonic
 vibration of the angular frequency w they are A^2/2 and A^2 (1 - cos w h).
+
+A guiding force that alternates from step to step is no motion of the vehicle: the step is too long.
+Its second difference is then 4 A with changing sign: minus the product with the one before is
+16 A^2, on average and faded likewise; of what a step follows, below a quarter of the steps'
+frequency, the product is positive.
 """
 
 from math import acos, exp, pi, sqrt, tan
 
 from railsim.kernels import compiled
+from railsim.kernels.contact_columns import W_Y
 
 CUT_OFF = 40.0  # Hz
 MEMORY = 0.1  # s
 
 # columns of Work.vibration[w, side]: 1 once begun, memory of the filter, last value, mean squares
 # of value and difference; then of the largest vibration so far its amplitude [N], where it was [m]
-# and its frequency [Hz]
+# and its frequency [Hz]; of the guiding force last value, last difference and second difference,
+# 16 A^2 of its alternation, of the largest so far, and where that was [m]
 BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, POSITION, FREQUENCY = range(9)
-VIBRATION = 9
+LAST_Y, SLOPE, BEND, TURNS, ALTERNATION, ALTERNATES_AT = range(9, 15)
+VIBRATION = 16  # whole cache lines
 
 
 @compiled(python=False)
@@ -31,6 +39,18 @@ def high_pass(h):
         (1.0 - sqrt(2.0) * k + k * k) * scale,
         exp(-h / MEMORY),
     )
+
+
+@compiled(inline=True)
+def note_alternation(row, guiding, fading, s):
+    """Take up the guiding force of a wheel."""
+    slope = guiding - row[LAST_Y]
+    bend = slope - row[SLOPE]
+    turns = fading * row[TURNS] - (1.0 - fading) * bend * row[BEND]
+    row[LAST_Y], row[SLOPE], row[BEND], row[TURNS] = guiding, slope, bend, turns
+    if turns > row[ALTERNATION]:
+        row[ALTERNATION] = turns
+        row[ALTERNATES_AT] = s
 
 
 @compiled(python=False)
@@ -48,6 +68,8 @@ def watch(work, coefficients, h, s):
                 vibration[w, side, BEGUN] = 1.0
                 vibration[w, side, Z_1] = -b0 * load
                 vibration[w, side, Z_2] = b0 * load
+                vibration[w, side, LAST_Y] = wheel[w, side, W_Y]
+            note_alternation(vibration[w, side], wheel[w, side, W_Y], fading, s)
             value = b0 * load + vibration[w, side, Z_1]
             vibration[w, side, Z_1] = vibration[w, side, Z_2] - 2.0 * b0 * load - a1 * value
             vibration[w, side, Z_2] = b0 * load - a2 * value

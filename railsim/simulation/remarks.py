@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 
 from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.system import TIME, UNSETTLED, Support
-from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
+from railsim.kernels.system import DIVIDED, TIME, UNSETTLED, Support
+from railsim.kernels.vibration import (
+    ALTERNATES_AT,
+    ALTERNATION,
+    AMPLITUDE,
+    CUT_OFF,
+    FREQUENCY,
+    POSITION,
+)
 from railsim.notation import SIDES
 from railsim.result.hunting import Hunting
 from railsim.simulation.advance import Run
@@ -27,6 +34,9 @@ MOST_Q = 5.0  # times the static wheel load
 # Track shift forces: this many times the limit 10 kN + P0/3 of EN 14363, P0 the axle load
 MOST_SUM_Y = 3.0
 VIBRATES = 0.05  # amplitude of a wheel load over the static one
+# amplitude of a guiding force from step to step over the static wheel load; the second where steps
+# are divided: flanges that strike have part of it
+ALTERNATES = 0.005, 0.02
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
 YAW_MAX = TableGrid().yaw_max
@@ -58,6 +68,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             elastic=bool(model.system.support.elastic),
             hunts=swings is not None,
         ),
+        *alternation(run.vibration, Q0, wheelsets, int(run.parts[DIVIDED])),
         *creep_range(int(run.events[1]), int(run.events[0])),
         *yaw_range(int(run.events[2])),
         *unsettled_rails(int(run.parts[UNSETTLED])),
@@ -218,6 +229,28 @@ def yaw_range(look_ups: int) -> tuple[str, ...]:
         f"In {_evaluations(look_ups)} a wheel was yawed against its rail by more than "
         f"{1e3 * YAW_MAX:g} mrad, where the contact table ends: it was continued linearly in the "
         "square of the yaw.",
+    )
+
+
+def alternation(
+    measured: NDArray[np.float64], Q0: NDArray[np.float64], wheelsets: Sequence[str], divided: int
+) -> tuple[str, ...]:
+    """Remark on a guiding force that alternates from step to step.
+
+    Arguments as of `vibration`; `divided`: number of divided steps.
+    """
+    if not len(measured):
+        return ()
+    amplitude = 0.25 * np.sqrt(measured[..., ALTERNATION])
+    w, side = _largest(amplitude / Q0)
+    if not amplitude[w, side] > ALTERNATES[divided > 0] * Q0[w, side]:
+        return ()
+    return (
+        f"The guiding force of the {SIDES[side]} wheel of {wheelsets[w]} alternates from step to "
+        f"step by {1e-3 * amplitude[w, side]:.1f} kN, vehicle at s = "
+        f"{measured[w, side, ALTERNATES_AT]:.0f} m: the step is too long there, and the vehicle "
+        f"may be held in a state that is none of its own; compare with half the step "
+        f"(--check-step).",
     )
 
 
