@@ -9,6 +9,7 @@ module         job
 `geometry`     rigid contact functions of a wheelset
 `out_of_round` surfaces of wheels that are not round
 `rail_sections` rails whose section changes: parts, blending, contact ahead of the axle
+`section_tables` contact tables of such rails
 `table`        the contact table: generator, cache on disk
 `kalker`       creepage coefficients of linear theory
 `creep`        creep force by every law, for scripts and plots

@@ -297,7 +297,11 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     -------
     RailCurve
     """
-    y, z = inclined_to_track(profile, gauge, inclination)
+    return contour_curve(*inclined_to_track(profile, gauge, inclination))
+
+
+def contour_curve(y: Array, z: Array) -> RailCurve:
+    """Rail of a contour: lateral positions in the track and heights below the rail tops [m]."""
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
     spline = contour_spline(y[part], z[part])
     n = int((y[part.stop - 1] - y[part.start]) / RAIL_SPACING)

@@ -103,12 +103,6 @@ def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape:
     return Surface(values, y, ahead, flats, waves)
 
 
-def path_surface(heights: Array, y: Array) -> Surface:
-    """Return heights of a rail over a range and lateral positions as a surface with this range."""
-    nowhere = np.full(heights.shape[0], TURN)
-    return Surface(_with_slopes(heights, y), y, nowhere, np.inf, np.inf)
-
-
 def surface_arrays(surfaces: Iterable[Surface]) -> tuple[Array, Array, Array]:
     """Return rows, values and angles to the next flat of several surfaces, see the kernel."""
     rows, values, aheads = [np.zeros((0, SURFACE_ROW))], [np.zeros((0, 4))], [np.zeros(0)]

@@ -20,13 +20,20 @@ the axle.  For a rolling radius that differs from r by the depth of a flange, 6 
 or low by 6 % of x^2/2r, some micrometres.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.contact.curves import RAIL_SPACING, STEEPEST, RailCurve, WheelCurve, averaged_curvature
+from railsim.contact.curves import (
+    RAIL_SPACING,
+    STEEPEST,
+    RailCurve,
+    averaged_curvature,
+    contour_curve,
+)
 from railsim.definitions.section_files import SectionList
 
 Array = NDArray[np.float64]
@@ -40,6 +47,8 @@ ACROSS = 1e-4  # m, distance of the points
 JUMP = 0.01  # m between neighbouring sections
 WINDOW = 0.06  # m ahead of and behind the axle that is searched
 STEP = 1e-3  # m, of the search
+NOWHERE = 1.0  # m, height of a rail where it is not
+AHEAD = STEP * np.arange(-round(WINDOW / STEP), round(WINDOW / STEP) + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +61,13 @@ class RailPart:
         Arc lengths of its sections [m].
     contours : ndarray, shape (n, 2, k)
         y and z of the points [m].
+    given : tuple of ndarray, shape (2, k)
+        y and z of the sections as they were given [m].
     """
 
     positions: Array
     contours: Array
+    given: tuple[Array, ...]
 
     @cached_property
     def _slopes(self) -> Array:
@@ -87,6 +99,16 @@ class RailPart:
             return np.full(Y.shape, np.inf)
         y, z = self.contour(s)
         return np.interp(Y, *_upper(y, z), left=np.inf, right=np.inf)
+
+    def unchanged(self, s: float) -> Array | None:
+        """Points of its sections as given where they do not change around `s`, else None."""
+        first = int(np.searchsorted(self.positions, s - WINDOW, "right")) - 1
+        last = int(np.searchsorted(self.positions, s + WINDOW, "left"))
+        if first < 0 or last >= self.positions.size:
+            return None
+        around = self.given[max(first - 1, 0) : last + 2]
+        same = all(np.array_equal(points, around[0]) for points in around)
+        return around[0] if same else None
 
 
 def _upper(y: Array, z: Array) -> tuple[Array, Array]:
@@ -128,7 +150,7 @@ def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
             going_on.append(best)
         open_chains = going_on
     return tuple(
-        RailPart(np.array(positions), np.array([_shares(part) for part in parts]))
+        RailPart(np.array(positions), np.array([_shares(part) for part in parts]), tuple(parts))
         for positions, parts in chains
         if len(positions) > 1
     )
@@ -186,12 +208,15 @@ class RolledRail:
 
 def rolled_rail(part: RailPart, s: float, radius: float, Y: Array) -> RolledRail:
     """Return the section of a rail on which a wheel of some radius stands at `s`."""
-    x = STEP * np.arange(-round(WINDOW / STEP), round(WINDOW / STEP) + 1)
-    drop = radius - np.sqrt(radius**2 - x**2)
-    heights = np.array([part.height(s + ahead, Y) for ahead in x]) + drop[:, None]
+    return _rolled(np.array([part.height(s + ahead, Y) for ahead in AHEAD]), radius, Y)
+
+
+def _rolled(heights: Array, radius: float, Y: Array) -> RolledRail:
+    """As `rolled_rail`, of the heights at `AHEAD`."""
+    heights = heights + (radius - np.sqrt(radius**2 - AHEAD**2))[:, None]
     best = np.argmin(heights, axis=0)
     columns = np.arange(Y.size)
-    inner = np.clip(best, 1, x.size - 2)
+    inner = np.clip(best, 1, AHEAD.size - 2)
     a, b, c = (heights[inner + k, columns] for k in (-1, 0, 1))
     known = np.isfinite(a) & np.isfinite(b) & np.isfinite(c) & (best == inner)
     a, b, c = (np.where(known, value, 0.0) for value in (a, b, c))
@@ -199,15 +224,18 @@ def rolled_rail(part: RailPart, s: float, radius: float, Y: Array) -> RolledRail
     offset = np.where(bend > 0.0, 0.5 * (a - c) / np.where(bend > 0.0, bend, 1.0), 0.0)
     offset = np.clip(offset, -0.5, 0.5)
     z = heights[best, columns] - 0.25 * (a - c) * offset
-    return RolledRail(Y, z, x[best] + STEP * offset)
+    return RolledRail(Y, z, AHEAD[best] + STEP * offset)
 
 
-def rolled_curve(part: RailPart, s: float, radius: float) -> RailCurve:
+def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> RailCurve:
     """Return the section of a rail on which a wheel stands as the contact search takes it.
 
-    In the frame of the right rail in the track whose tops are 750 mm beside its middle where
-    y = 0: positions count from the rail's own y = 0 here.
+    In the frame of the right rail in the track, whose y = 0 lies `zero` beside its middle [m].
+    Where the rail does not change it is the section as given.
     """
+    given = part.unchanged(s)
+    if given is not None:
+        return contour_curve(given[0] + zero, given[1])
     y, _ = part.contour(float(np.clip(s, part.positions[0], part.positions[-1])))
     Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * RAIL_SPACING)
     rolled = rolled_rail(part, s, radius, Y)
@@ -225,8 +253,9 @@ def rolled_curve(part: RailPart, s: float, radius: float) -> RailCurve:
     spline = make_smoothing_spline(1e3 * Y[first:last], 1e3 * z[first:last], lam=1e-4)
     nodes = np.arange(Y[first], Y[last - 1], RAIL_SPACING)
     slope = spline.derivative()(1e3 * nodes)
+    slope[0], slope[-1] = -STEEPEST, STEEPEST  # walls, or where the section ends
     return RailCurve(
-        Y0=float(nodes[0]),
+        Y0=float(nodes[0]) + zero,
         dY=RAIL_SPACING,
         z=1e-3 * spline(1e3 * nodes),
         slope=slope,
@@ -234,71 +263,43 @@ def rolled_curve(part: RailPart, s: float, radius: float) -> RailCurve:
     )
 
 
-HEIGHTS = np.linspace(-0.012, 0.012, 97)  # m, lateral positions of the wheel
-SPACING = 2e-3  # m, along the track
-FADE = 0.05  # m at both ends of a range
-FACE = 1.0  # steepest slope of the wheel's tread and flange root
-
-
-def path_heights(
-    parts: tuple[RailPart, ...],
-    wheel: WheelCurve,
-    radius: float,
-    begin: float,
-    end: float,
-    y: Array,
-) -> tuple[Array, Array]:
-    """Heights of the section on which tread and flange root stand above that at `begin`.
+def rigid_gaps(
+    part: RailPart, s: Array, radius: float, wheels: Sequence[tuple[Array, Array]], y: Array
+) -> Array:
+    """Heights at which parts of a wheel touch one rail, neither deforming.
 
     Parameters
     ----------
-    parts : tuple of RailPart
-        Rails.
-    wheel : WheelCurve
-        Its candidates; flank and tip of the flange are left out.
+    part : RailPart
+        Rail.
+    s : ndarray, shape (n_s,)
+        Positions of the axle, a whole number of `STEP` apart [m].
     radius : float
         Nominal rolling radius [m].
-    begin, end : float
-        Range in the arc length of the sections [m].
+    wheels : sequence of (ndarray, ndarray), shape (n,)
+        Lateral position from the nominal rolling circle, and radius, of each part of the wheel [m].
     y : ndarray, shape (n_y,)
         Lateral positions of the nominal rolling circle from y = 0 of the rails [m].
 
     Returns
     -------
-    ndarray, shape (n_s,)
-        Arc lengths from `begin` on, `end` left out [m].
-    ndarray, shape (n_s, n_y)
-        Heights, positive upwards; faded to zero within `FADE` of both ends [m].
+    ndarray, shape (n_s, n_wheels, n_y)
+        Height of the wheel below that on a level rail at the tops [m]; `NOWHERE` without contact.
     """
-    n = int(np.ceil((end - begin) / SPACING))
-    step = (end - begin) / n
-    reach = int(np.ceil(WINDOW / step))
-    tread = np.abs(wheel.t) < FACE
-    u, drop = wheel.y[tread], wheel.r[tread] - radius
-    touch = np.empty((n + 2 * reach, y.size))
-    first = min(float(part.positions[0]) for part in parts)
-    last = max(float(part.positions[-1]) for part in parts)
-    for i in range(touch.shape[0]):
-        s = min(max(begin + step * (i - reach), first), last)
-        contours = [
-            _upper(*part.contour(s))
-            for part in parts
-            if part.positions[0] <= s <= part.positions[-1]
-        ]
-        for j, aside in enumerate(y):
-            touch[i, j] = min(
-                float((np.interp(u + aside, *line, left=1.0, right=1.0) - drop).min())
-                for line in contours
-            )
-    best = touch[reach : n + reach].copy()
-    for k in range(1, reach + 1):
-        fall = radius - np.sqrt(radius**2 - (k * step) ** 2)
-        for ahead in (k, -k):
-            np.minimum(best, touch[reach + ahead : n + reach + ahead] + fall, out=best)
-    along = np.linspace(begin, end, n, endpoint=False)
-    depth = np.clip(np.minimum(along - begin, end - along) / FADE, 0.0, 1.0)
-    heights = (best[0] - best) * (0.5 - 0.5 * np.cos(np.pi * depth))[:, None]
-    return along, heights
+    present = [(k, u, r) for k, (u, r) in enumerate(wheels) if u.size]
+    low, high = min(u[0] for _, u, _ in present), max(u[-1] for _, u, _ in present)
+    Y = np.arange(low + y.min(), high + y.max() + ACROSS, ACROSS)
+    every, reach = round((s[1] - s[0]) / STEP), AHEAD.size // 2
+    along = s[0] + STEP * np.arange(-reach, every * s.size + reach)
+    heights = np.array([part.height(at, Y) for at in along])
+    gaps = np.full((s.size, len(wheels), y.size), NOWHERE)
+    for i in range(s.size):
+        around = heights[every * i : every * i + AHEAD.size]
+        z = np.minimum(_rolled(around, radius, Y).z, NOWHERE)
+        for k, u, r in present:
+            for j, aside in enumerate(y):
+                gaps[i, k, j] = (np.interp(u + aside, Y, z) - r).min() + radius
+    return np.asarray(np.minimum(gaps, NOWHERE))
 
 
 def kinematic_height(

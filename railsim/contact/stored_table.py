@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -62,23 +63,31 @@ def cached_contact_table(
     digest.update(repr((numbers, grid)).encode())
     digest.update(wheel.key())
     digest.update(rail.key())
+    return kept_table(
+        digest.hexdigest(),
+        lambda: build_contact_table(
+            wheel,
+            rail,
+            radius,
+            gauge,
+            inclination,
+            back_to_back,
+            tape_circle_distance,
+            G,
+            nu,
+            centre_height=centre_height,
+            grid=grid,
+        ),
+    )
+
+
+def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
+    """Return the table stored under a hash of all that enters, or build and store it."""
     folder = cache.own_folder("tables")
-    path = folder and folder / f"{digest.hexdigest()[:32]}.npy"
+    path = folder and folder / f"{digest[:32]}.npy"
     if path and (stored := _stored_table(path)):
         return stored
-    table = build_contact_table(
-        wheel,
-        rail,
-        radius,
-        gauge,
-        inclination,
-        back_to_back,
-        tape_circle_distance,
-        G,
-        nu,
-        centre_height=centre_height,
-        grid=grid,
-    )
+    table = build()
     if path:
         _store_table(table, path)
     return table

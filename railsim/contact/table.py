@@ -287,41 +287,10 @@ def build_contact_table(
     half = max(int(np.ceil(stretched_roll(grid.roll_max)[0] / grid.droll)), 2)
     stretched_nodes = grid.droll * np.arange(-half, half + 1, dtype=np.float64)
     roll_nodes = unstretched_roll(stretched_nodes)
-    n_roll = roll_nodes.size
-    s_nodes = s_min + grid.ds * np.arange(n_y)
+    s_nodes = s_min + grid.ds * np.arange(n_y, dtype=np.float64)
     w_nodes = yaw_nodes(grid)
-    values = np.empty((3, grid.n_w, n_roll, n_y, N_FIELD))
-    arguments = (
-        height,
-        _wheel_arrays(wheel_points, rail_nodes),
-        kernel.Rail(
-            rail_nodes.Y0, rail_nodes.dY, rail_nodes.z, rail_nodes.slope, rail_nodes.curvature
-        ),
-        kernel.Elastic(
-            G / (1.0 - nu),
-            HALF_WIDTHS,
-            grid.reference,
-            grid.floor_ratio,
-            grid.normal == "kik-piotrowski",
-        ),
-        ellipse_functions(G, nu),
-        strip_influence(),
-    )
-
-    def fill(task: tuple[int, int]) -> None:
-        i_w, i_roll = task
-        part = np.empty((3, n_y, N_FIELD))
-        y_nodes = s_nodes + radius * roll_nodes[i_roll]
-        yaw = float(np.sqrt(w_nodes[i_w]))
-        kernel.fill_table_slice(part, y_nodes, roll_nodes[i_roll], yaw, *arguments)
-        values[:, i_w, i_roll] = part
-
-    tasks = [(i_w, i_roll) for i_w in range(grid.n_w) for i_roll in range(n_roll)]
-    fill(tasks[0])  # compile once, not in every thread
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        list(pool.map(fill, tasks[1:]))
-    # a zone of a single candidate, at the end of the contour, has no width to carry anything
-    values[~np.isfinite(values).all(axis=-1)] = NOTHING
+    generator = Generator.of(wheel_points, rail_nodes, radius, height, G, nu, grid)
+    values = generator.values(rail_nodes, s_nodes, roll_nodes, w_nodes, workers or os.cpu_count())
     values = spline_coefficients(values, stretched_nodes)
     # as from the cache: the time loop is compiled once, not for both kinds of arrays
     values.setflags(write=False)
@@ -355,6 +324,70 @@ def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
     """Return the grid of a table, with another normal contact if requested."""
     grid = grid or TableGrid()
     return replace(grid, normal=normal) if normal else grid
+
+
+@dataclass(frozen=True, eq=False)
+class Generator:
+    """A wheel with its zones, and what its contact with any rail is computed with.
+
+    Attributes
+    ----------
+    wheel, elastic, hertz, strips : see `railsim.kernels.table_slice`
+    radius, height : float
+        Rolling radius; height of the wheelset's centre above the rail tops at z = 0 [m].
+    """
+
+    wheel: kernel.Wheel
+    elastic: kernel.Elastic
+    hertz: kernel.Hertz
+    strips: kernel.Strips
+    radius: float
+    height: float
+
+    @classmethod
+    def of(
+        cls,
+        wheel: WheelCurve,
+        rail: RailCurve,
+        radius: float,
+        height: float,
+        G: float,
+        nu: float,
+        grid: TableGrid,
+    ) -> "Generator":
+        """Generator of a wheel whose zones are those on a rail."""
+        elastic = kernel.Elastic(
+            G / (1.0 - nu),
+            HALF_WIDTHS,
+            grid.reference,
+            grid.floor_ratio,
+            grid.normal == "kik-piotrowski",
+        )
+        wheels = _wheel_arrays(wheel, rail)
+        return cls(wheels, elastic, ellipse_functions(G, nu), strip_influence(), radius, height)
+
+    def values(
+        self, rail: RailCurve, s: Array, roll: Array, w: Array, workers: int | None
+    ) -> Array:
+        """Fields of the three patches on a rail, shape (3, w.size, roll.size, s.size, N_FIELD)."""
+        values = np.empty((3, w.size, roll.size, s.size, N_FIELD))
+        nodes = kernel.Rail(rail.Y0, rail.dY, rail.z, rail.slope, rail.curvature)
+
+        def fill(task: tuple[int, int]) -> None:
+            i_w, i_roll = task
+            part = np.empty((3, s.size, N_FIELD))
+            y, yaw = s + self.radius * roll[i_roll], float(np.sqrt(w[i_w]))
+            arguments = self.wheel, nodes, self.elastic, self.hertz, self.strips
+            kernel.fill_table_slice(part, y, roll[i_roll], yaw, self.height, *arguments)
+            values[:, i_w, i_roll] = part
+
+        tasks = [(i_w, i_roll) for i_w in range(w.size) for i_roll in range(roll.size)]
+        fill(tasks[0])  # compile once, not in every thread
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(fill, tasks[1:]))
+        # a zone of a single candidate, at the end of the contour, has no width to carry anything
+        values[~np.isfinite(values).all(axis=-1)] = NOTHING
+        return values
 
 
 NOTHING = np.array([1.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""Rows and columns of what the wheel-rail contact writes: patches, wheels, damping of wheelsets."""
+"""Rows and columns of what the wheel-rail contact writes: patches, wheels, wheelsets, heights."""
 
 # rows of Work.patch: one column per active patch.  Angle and foot are in the plane of the rails:
 # position of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal
@@ -68,3 +68,9 @@ WHEEL_COLUMNS = 13
 # follows them
 J_ALONG, J_ALONG_LEVER, J_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 9
 CONTACT_JACOBIAN = 18
+
+# columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
+# [1], change of the rate over `AHEAD` [m/s]; what is added to the radius [m]; where a rail's
+# section changes, its rise [1], rates of K and K2 over s, lateral position of the wheel [m]
+B_HEIGHT, B_RATE, B_LEAD, B_ACROSS, B_CHANGE, B_RADIUS, B_RISE, B_K, B_K2, B_LEVER = range(10)
+BUMP_SIZE = 16

@@ -23,12 +23,14 @@ see `railsim.contact.table`.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_table_simd import sum_of_nodes
+from railsim.kernels.record import record
 
 TREAD, FLANGE_ROOT, FLANGE = range(3)
 N_PATCH = 3
@@ -63,6 +65,40 @@ MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
 SETTLED = 1e-8
 FURTHEST_W = 2.0  # over the last node of w: as far is the table continued
+
+
+@record
+class RailTables(NamedTuple):
+    """Contact tables of rails whose section changes, see `railsim.kernels.rail_parts`.
+
+    Attributes
+    ----------
+    values : float64[z, 3, n_w, n_roll, n_y, 12]   zones, three to a table, each by its number
+    shear : float64[z]           lever of roll in the tables' lateral coordinate [m]
+    y0, dy, roll0, droll : float;  w : float64[n_w]   grid [m, rad, rad2]
+    range_of : int64[k, w, 2]    piece of each range of the track for each wheel, else -1
+    range_row : float64[k, 2]    begin and end of each range [m]
+    piece : int64[p, 3]          first part and number of parts; first zone of the plain rail
+    lever : float64[p]           lateral position of the nominal rolling circle [m]
+    part : int64[q, 2]           first node and number of nodes of each rail
+    node_s : float64[n]          positions from the begin of the range [m]
+    node_zone : int64[n, 3]      numbers of their zones, -1 where nothing is near
+    """
+
+    values: np.ndarray
+    shear: np.ndarray
+    y0: float
+    dy: float
+    roll0: float
+    droll: float
+    w: np.ndarray
+    range_of: np.ndarray
+    range_row: np.ndarray
+    piece: np.ndarray
+    lever: np.ndarray
+    part: np.ndarray
+    node_s: np.ndarray
+    node_zone: np.ndarray
 
 
 @compiled

@@ -12,6 +12,7 @@ STANDSTILL = 8
 STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; it goes on alone
 BESIDE_RAIL = 10
 LAW_NOT_FINITE = 11
+RAIL_RANGE = 12
 
 # code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
 STATUS = {
@@ -24,6 +25,10 @@ STATUS = {
     ),
     INWARD_RANGE: ("stopped", "{where} moved a wheel inwards beyond the range of the table"),
     WHEEL_LIFT: ("stopped", "{where} lifted a wheel beyond the range of the model"),
+    RAIL_RANGE: (
+        "stopped",
+        "{where} moved a wheel to the side beyond the range of the tables of the rail's sections",
+    ),
     ROLL_RANGE: ("stopped", "{where} rolled beyond the range of the contact table"),
     YAW_RANGE: ("stopped", "{where} yawed beyond the range of the contact table"),
     NOT_FINITE: (

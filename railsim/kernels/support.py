@@ -54,7 +54,8 @@ WEIGHT = LEARNT + 2 * LEARNT_SIZE
 SUPPORT_SIZE = WEIGHT + 1
 # entries of a patch and of a wheelset's patches in the state before them, see `transient`
 PATCH_STATE = 7
-TRANSIENT_SIZE = 2 * N_PATCH * PATCH_STATE
+TRACED = 2 * N_PATCH  # patches of a wheel that are followed, of two rails side by side
+TRANSIENT_SIZE = 2 * TRACED * PATCH_STATE
 # what an evaluation does to the rails: nothing; settles them after a step of the fast scheme, see
 # `correct_support`; finds the rates of a massless track, see `settle_rates`
 # integers of numpy: a function called with literals of Python is compiled for each value

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels.commands import Actuators, Controllers, Own, Signals
+from railsim.kernels.contact_table import RailTables
 from railsim.kernels.element_columns import FRICTION, LINK_COLUMNS, MOUNT_COLUMNS, ONE_SIDED
 from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
@@ -142,8 +143,7 @@ class Contact(NamedTuple):
     surface_of : int64[w, 2, 3]  surface of each wheel that is not round, by patch, -1 where round;
                              w = 0 where all wheels are round, see `wheel_surface`
     surface_row : float64[k, SURFACE_ROW];  surface : float64[..., 4];  flat_ahead : float64[...]
-    range_of : int64[k, w, 2];  range_row : float64[k, 2]   ranges of rails' sections, surface of
-                             each wheel on them, else -1
+    rails : RailTables           rails whose section changes
     check : float64[c, CHECK_ROW];  check_flangeway : float64[..., 2];
     check_wheel : float64[w, c, CHECK_WHEEL]   check rails, see `check_rails`
     transient : int              1 where creep forces follow the creepages, see `transient`
@@ -171,8 +171,7 @@ class Contact(NamedTuple):
     surface_row: np.ndarray
     surface: np.ndarray
     flat_ahead: np.ndarray
-    range_of: np.ndarray
-    range_row: np.ndarray
+    rails: RailTables
     check: np.ndarray
     check_flangeway: np.ndarray
     check_wheel: np.ndarray

@@ -27,8 +27,7 @@ from math import exp, expm1
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import PATCH_SPEED, SLOPE_ACROSS, SLOPE_ALONG, XI_X, A
-from railsim.kernels.contact_table import N_PATCH
-from railsim.kernels.support import PATCH_STATE, SKIP, TRANSIENT_SIZE, transient_begin
+from railsim.kernels.support import PATCH_STATE, SKIP, TRACED, TRANSIENT_SIZE, transient_begin
 from railsim.kernels.system import LAST_STEP
 
 # columns of Work.transient[w, side, patch], and of each patch in the state but for the last: c and
@@ -47,13 +46,13 @@ def follow_creepages(system, work, n, state):
         if system.support.elastic and work.support_step[w, SKIP] > 0.0:
             continue
         for side in range(2):
-            for p in range(N_PATCH):
+            for p in range(TRACED):
                 for c in range(TRANSIENT):
                     now[w, side, p, c] = 0.0
                 now[w, side, p, CARRIES] = LOST
     for k in range(n):
         w, side, p = work.patch_index[k, 0], work.patch_index[k, 1], work.patch_index[k, 2]
-        i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (N_PATCH * side + p)
+        i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (TRACED * side + p)
         per_time = patch[PATCH_SPEED, k] / patch[A, k]
         z = per_time * h
         mean, kept = 1.0, 1.0
@@ -81,7 +80,7 @@ def give_back_creepages(system, work, n, state):
         w, side, p = work.patch_index[k, 0], work.patch_index[k, 1], work.patch_index[k, 2]
         for c in range(3):
             patch[XI_X + c, k] = now[w, side, p, ROLLING + c]
-        i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (N_PATCH * side + p)
+        i = transient_begin(system) + TRANSIENT_SIZE * w + PATCH_STATE * (TRACED * side + p)
         if state[i + CARRIES] > KNOWN:
             z = now[w, side, p, PER_TIME] * h
             at_once = 1.0 + expm1(-z) / z if z > 0.0 else 0.0
@@ -95,7 +94,7 @@ def keep_creepages(system, work, state):
     now, i = work.transient, transient_begin(system)
     for w in range(now.shape[0]):
         for side in range(2):
-            for p in range(N_PATCH):
+            for p in range(TRACED):
                 for c in range(PATCH_STATE):
                     state[i] = now[w, side, p, c]
                     i += 1
@@ -107,7 +106,7 @@ def creepage_rates(system, work, state, derivative):
     now, i = work.transient, transient_begin(system)
     for w in range(now.shape[0]):
         for side in range(2):
-            for p in range(N_PATCH):
+            for p in range(TRACED):
                 per_time = now[w, side, p, PER_TIME]
                 for c in range(PATCH_STATE):
                     derivative[i + c] = 0.0

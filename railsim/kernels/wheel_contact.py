@@ -9,6 +9,17 @@ from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
+    B_ACROSS,
+    B_CHANGE,
+    B_HEIGHT,
+    B_K,
+    B_K2,
+    B_LEAD,
+    B_LEVER,
+    B_RADIUS,
+    B_RATE,
+    B_RISE,
+    BUMP_SIZE,
     CONTACT_JACOBIAN,
     FOOT_X,
     FOOT_X_PER_YAW,
@@ -59,6 +70,7 @@ from railsim.kernels.contact_table import (
     under_load,
 )
 from railsim.kernels.elements import RATE_OF_STOPS
+from railsim.kernels.rail_parts import COUNT, FIRST_PART, look_up_part, place_on_rails
 from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
@@ -83,34 +95,16 @@ from railsim.kernels.rails import (
     SLOPE_Z,
     predict_rate_changes,
 )
-from railsim.kernels.status import (
-    BESIDE_RAIL,
-    DERAILED,
-    INWARD_RANGE,
-    ROLL_RANGE,
-    RUNNING,
-    WHEEL_LIFT,
-    YAW_RANGE,
-)
+from railsim.kernels.status import RAIL_RANGE, ROLL_RANGE, RUNNING, WHEEL_LIFT, YAW_RANGE
 from railsim.kernels.support import SKIP
 from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, SIN_ROLL, SPEED, Y_0, Z_0
+from railsim.kernels.table_ends import LIFT_RANGE, all_far, outside
 from railsim.kernels.track_frame import OMEGA
-from railsim.kernels.wheel_surface import (
-    B_ACROSS,
-    B_CHANGE,
-    B_HEIGHT,
-    B_LEAD,
-    B_RADIUS,
-    B_RATE,
-    B_RISE,
-    note_surfaces,
-)
+from railsim.kernels.wheel_surface import note_surfaces
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
-DEEPEST = 1e-3  # penetration under some 2 MN, more than any wheel that climbs carries (m)
-LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
 
 @compiled(python=False)
@@ -233,6 +227,10 @@ def wheel_contact(system, work, w, side, state, n):
     table = contact.table[w, side]
     bumpy = contact.surface_of.shape[0] > 0
     highest = note_surfaces(system, work, state, w, side, wheel) if bumpy else 0.0
+    for k in range(contact.rails.range_of.shape[0]):
+        s, piece = place_on_rails(system, state, w, side, k, above[3])
+        if piece >= 0:
+            return wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n)
     where, iy, ir, iw, ty, tr, tw = locate(
         contact, table, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
     )
@@ -264,6 +262,62 @@ def wheel_contact(system, work, w, side, state, n):
     if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
     return RUNNING, n
+
+
+@compiled(python=False)
+def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
+    """As `wheel_contact`, at the position `s` of a piece whose rails' sections change."""
+    contact, above, bump, approach = system.contact, work.above, work.bump, work.approach
+    rails, table = contact.rails, contact.table[w, side]
+    where, iy, ir, iw, ty, tr, tw = locate(
+        rails, 0, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
+    )
+    if where in (BELOW_Y, ABOVE_Y):
+        return RAIL_RANGE, n
+    if where != INSIDE:
+        return ROLL_RANGE if where == OUTSIDE_ROLL else YAW_RANGE, n
+    if tw > 1.0:
+        work.events[w, 4] += 1
+    cell_weights(rails, ty, tr, above[9], work.weights)
+    count = rails.piece[piece, COUNT]
+    for patch in range(N_PATCH, N_PATCH * count):
+        for k in range(BUMP_SIZE):
+            bump[patch, k] = bump[patch % N_PATCH, k]
+    lever = wheel.sign * rails.lever[piece]
+    rate = state[SPEED] + state[6 * system.bodies.kind.shape[0] + 6 * contact.body[w]]
+    rate -= lever * above[7]
+    lift, nearest = 1.0, -1.0
+    for number in range(count):
+        first = N_PATCH * number
+        over = look_up_part(
+            system,
+            work,
+            (iy, ir, iw, tw, wheel.z + highest),
+            (s, rate, lever),
+            rails.piece[piece, FIRST_PART] + number,
+            first,
+        )
+        nearest = max(nearest, over)
+        for patch in range(first, first + N_PATCH):
+            if approach[patch] == 0.0:
+                k = patch * LOOK_UP_SIZE
+                raise_gap(work.look_up, k, bump, patch, rails.shear[0])
+                work.stiffness[first + patch] = work.look_up[k + 1]
+                work.stiffness[first + patch + N_PATCH] = work.look_up[k + 2]
+                approach[patch] = wheel.z - work.look_up[k]
+                lift = min(lift, -approach[patch])
+        stiffness = work.stiffness[2 * first : 2 * first + 2 * N_PATCH]
+        coupled_approaches(contact.coupling, table, stiffness, approach[first : first + N_PATCH])
+    clear_wheel(work.wheel, w, side, lift)
+    for patch in range(N_PATCH * count):
+        p = approach[patch]
+        if p > -NEAR:
+            n = patch_contact(system, work, w, side, patch, wheel, n)
+        if p > 0.0:
+            along = 0.4 * p * p * sqrt(p) * bump[patch, B_K] + p * p * p / 3.0 * bump[patch, B_K2]
+            work.rail_force[contact.body[w], 0] -= along
+            work.rail_force[contact.body[w], 5] += lever * along
+    return WHEEL_LIFT if nearest < -LIFT_RANGE else RUNNING, n
 
 
 @compiled(inline=True)
@@ -334,7 +388,9 @@ def patch_contact(system, work, w, side, patch, wheel, n):
         add_normal_force(work, contact.body[w], w, side, wheel, p, k, vertical)
         # moment about the axle
         work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_LEAD]
-        work.rail_force[contact.body[w], 0] -= vertical * work.bump[patch, B_RISE]
+        along = vertical * work.bump[patch, B_RISE]
+        work.rail_force[contact.body[w], 0] -= along
+        work.rail_force[contact.body[w], 5] += work.bump[patch, B_LEVER] * along
         cos_g = sqrt(cos_2)
         N = vertical / cos_g
         if N > 0.0:
@@ -381,47 +437,6 @@ def add_normal_force(work, b, w, side, wheel, p, k, vertical):
     force[b, 5] += q_yaw
     work.wheel[w, side, W_Q] += vertical
     work.wheel[w, side, W_Y] -= q_y
-
-
-@compiled(python=False)
-def all_far(contact, table, iy, ir, iw, tr, z):
-    """Whether every patch is more than LIFT_RANGE away from its rail."""
-    for patch in range(N_PATCH):
-        if z - contact.values[table, patch, iw, ir, iy, 0] > -LIFT_RANGE:
-            return False
-    return True
-
-
-@compiled
-def outside(contact, table, where, wheel, stretched):
-    """Status code for a look-up outside the contact table."""
-    if where == ABOVE_Y:
-        return DERAILED if has_climbed(contact, table, wheel, stretched) else BESIDE_RAIL
-    if where == BELOW_Y:
-        return INWARD_RANGE
-    if where == OUTSIDE_ROLL:
-        return ROLL_RANGE
-    return YAW_RANGE
-
-
-@compiled
-def has_climbed(contact, table, wheel, stretched):
-    """Whether a wheel stands as high as the end of the table, its flange's tip over the rail's top.
-
-    A wheel that is beyond without having been lifted there, or presses itself into the rail deeper
-    than any load does, was not carried there by its rail: the step or the model is unstable.
-    """
-    shape = contact.values.shape
-    tr = (stretched - contact.roll0) / contact.droll
-    ir = min(max(int(tr), 0), shape[3] - 2)
-    last = shape[4] - 3  # the last node of the range
-    for patch in range(N_PATCH):
-        # the top is level: yaw does not change how high the tip stands on it
-        here = contact.values[table, patch, 0, ir, last, 0]
-        following = contact.values[table, patch, 0, ir + 1, last, 0]
-        if wheel.z > here + (tr - ir) * (following - here) + DEEPEST:
-            return False
-    return True
 
 
 @compiled(python=False)

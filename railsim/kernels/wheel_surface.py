@@ -10,11 +10,6 @@ and the patch lies e_phi ahead of the axle: the path of the centre over the angl
 of the wheel's surface, max over psi of r(psi) cos(psi - phi), whose slope is r sin(psi - phi).  The
 normal force has the moment N e_phi about the axle, so that it does no work over a turn.
 
-**Rails whose section varies** have the same tables over the arc length from the begin of their
-range, a turn being its length: e is the height of the section on which the wheel stands over that
-of the first one, and the rail rises by e_s, which turns the normal back and the direction of
-rolling up (`railsim.contact.rail_sections`).
-
 Tables hold e, e_phi, e_y and e_phi_y at the nodes of an even grid, periodic in phi; bicubic between
 them (Hermite), constant beyond the ends in y.
 """
@@ -22,7 +17,17 @@ them (Hermite), constant beyond the ends in y.
 from math import floor, pi
 
 from railsim.kernels import compiled
-from railsim.kernels.contact_table import FLANGE
+from railsim.kernels.contact_columns import (
+    B_ACROSS,
+    B_CHANGE,
+    B_HEIGHT,
+    B_LEAD,
+    B_RADIUS,
+    B_RATE,
+    BUMP_SIZE,
+)
+from railsim.kernels.contact_table import N_PATCH
+from railsim.kernels.rail_parts import place_on_rails, rigid_height
 from railsim.kernels.rails import ASIDE, ROLL
 from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
 
@@ -31,14 +36,7 @@ from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
 # of the shortest wave all around it, which steps resolve [m]
 FIRST, FIRST_AHEAD, N_PHI, N_Y, Y0, DY, FLAT, WAVE = range(8)
 SURFACE_ROW = 8
-# columns of Contact.range_row, of each range of sections: wheelsets' sides are in `range_of`; begin
-# and end [m]
-BEGIN, END = range(2)
-# columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
-# [1], change of the rate over `AHEAD` [m/s]; part of e that is the wheel's [m]; rise of the rail
-# [1]
-B_HEIGHT, B_RATE, B_LEAD, B_ACROSS, B_CHANGE, B_RADIUS, B_RISE = range(7)
-BUMP_SIZE = 8
+HELD = 5e-4  # m, lateral way on which foreseen heights of rails keep their lateral position
 AT_ONCE = 1e12  # N/s, rate of a force that has its step divided
 
 
@@ -121,7 +119,7 @@ def note_surfaces(system, work, state, w, side, wheel):
     phi, rate = wheel_angle(system, state, w)
     rate -= work.acceleration[contact.body[w], 4]
     most = 0.0
-    for patch in range(bump.shape[0]):
+    for patch in range(N_PATCH):
         table = contact.surface_of[w, side, patch]
         for k in range(BUMP_SIZE):
             bump[patch, k] = 0.0
@@ -141,53 +139,19 @@ def note_surfaces(system, work, state, w, side, wheel):
             bump[patch, B_CHANGE] = (later - lead) * rate
             if angle_to_flat(contact, table, phi) < rate * h:
                 work.force_rate[w] = AT_ONCE
-    for k in range(contact.range_of.shape[0]):
-        most = max(most, note_sections(system, work, state, w, side, wheel, k))
-    return most
-
-
-@compiled(python=False)
-def note_sections(system, work, state, w, side, wheel, k):
-    """Add the height of range `k` of a rail's sections to `work.bump`, but not under the flange.
-
-    Returns
-    -------
-    float
-        Largest e of the patches [m].
-    """
-    contact, bump, h = system.contact, work.bump, work.watch[AHEAD]
-    table = contact.range_of[k, w, side]
-    begin, end = contact.range_row[k, BEGIN], contact.range_row[k, END]
-    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[contact.body[w]]]
-    if table < 0 or s < begin or s > end:
-        return 0.0
-    scale, speed = 2.0 * pi / (end - begin), state[SPEED]
-    y = wheel.y - contact.shear[contact.table[w, side]] * wheel.roll
-    e, rise, across = surface_at(contact, table, scale * (s - begin), y)
-    change = 0.0
-    if h > 0.0 and s + speed * h < end:
-        _, later, _ = surface_at(contact, table, scale * (s + speed * h - begin), y)
-        change = scale * (later - rise) * speed
-    rise *= scale
-    most = 0.0
-    for patch in range(FLANGE):
-        bump[patch, B_HEIGHT] += e
-        bump[patch, B_RATE] += rise * speed
-        bump[patch, B_ACROSS] += across
-        bump[patch, B_CHANGE] += change
-        bump[patch, B_RISE] += rise
-        most = max(most, bump[patch, B_HEIGHT])
     return most
 
 
 @compiled(python=False)
 def foreseen_heights(system, work, state, w, track, first):
-    """Heights e of both treads and their rates into ``track[first:first + 4]``."""
+    """Heights e of both treads and their rates into ``track[first:first + 4]``.
+
+    The next two are the lateral positions at which heights of rails are taken [m].
+    """
     contact = system.contact
     b = contact.body[w]
     n = system.bodies.kind.shape[0]
     phi, _ = wheel_angle(system, state, w)
-    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]]
     rate = -state[6 * n + 6 * b + 4]  # the turn of the track's frame left out
     for side in range(2):
         sign = 2.0 * side - 1.0
@@ -200,11 +164,12 @@ def foreseen_heights(system, work, state, w, track, first):
             e, lead, _ = surface_at(contact, table, phi, y)
             track[first + side] = e
             track[first + 2 + side] = lead * rate
-        for k in range(contact.range_of.shape[0]):
-            table = contact.range_of[k, w, side]
-            begin, end = contact.range_row[k, BEGIN], contact.range_row[k, END]
-            if table >= 0 and s >= begin and s <= end:
-                scale = 2.0 * pi / (end - begin)
-                e, rise, _ = surface_at(contact, table, scale * (s - begin), y)
+        for k in range(contact.rails.range_of.shape[0]):
+            s, piece = place_on_rails(system, state, w, side, k, state[6 * b + 5])
+            if piece >= 0:
+                # at the lateral position before the step: the rest is in the slopes of the forces
+                if abs(track[first + 4 + side] - y) > HELD:
+                    track[first + 4 + side] = y
+                e, rise = rigid_height(contact.rails, piece, s, track[first + 4 + side])
                 track[first + side] += e
-                track[first + 2 + side] += scale * rise * state[SPEED]
+                track[first + 2 + side] += rise * state[SPEED]

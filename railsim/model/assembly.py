@@ -25,10 +25,11 @@ from railsim.definitions.track.support import Support as SupportDefinition
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, Faults, ModelError
+from railsim.errors import Fault, Faults, InputError, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned
+from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
-from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE, TRANSIENT_SIZE
+from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE, TRACED, TRANSIENT_SIZE
 from railsim.kernels.system import (
     AXLEBOX,
     FIXED,
@@ -47,8 +48,9 @@ from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails
 from railsim.model.contact_laws import settings_creep_law, with_own_laws
 from railsim.model.element_arrays import ElementArrays, LawBlocks
+from railsim.model.rail_ranges import PLAIN, RailRanges, rail_ranges
 from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
-from railsim.model.work import CONSTANT_SPEED, NO_CONTROLLERS, NO_SIGNALS
+from railsim.model.work import CONSTANT_SPEED, NO_CONTROLLERS, NO_SIGNALS, parts_of_wheel
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.tables import track_tables
@@ -119,6 +121,8 @@ class Model:
         Wheels that are not round, which `system` leaves out: see `railsim.model.uneven_wheels`.
     check : CheckRails
         Check rails, likewise.
+    rails : RailRanges
+        Rails whose section changes, likewise.
     """
 
     system: System
@@ -129,6 +133,7 @@ class Model:
     design: "Model | None" = None
     wheels: UnevenWheels = ROUND
     check: CheckRails = NONE
+    rails: RailRanges = PLAIN
 
     @property
     def n_state(self) -> int:
@@ -194,7 +199,12 @@ def assemble(
         design = assemble(unloaded, track, settings, profiles, shared)
     wheels = uneven_wheels(flat, track, book.used)
     check = check_rails(flat, track, book.used)
-    return Model(system, index, flat, tables, book.used, design, wheels, check)
+    served = (tables, contact.table)
+    rails = rail_ranges(flat, track, book.used, served, settings.normal_contact)
+    if settings.transient_creep and N_PATCH * parts_of_wheel(rails.arrays) > TRACED:
+        found = "sections of more than two rails side by side"
+        raise InputError([Fault("track", "sections", found, "two with settings.transient_creep")])
+    return Model(system, index, flat, tables, book.used, design, wheels, check, rails)
 
 
 def without_rails(vehicle: Vehicle) -> Model:
@@ -476,6 +486,7 @@ def _contact(
         **ROUND._asdict(),
         **NONE._asdict(),
         transient=int(settings.transient_creep),
+        rails=PLAIN.arrays,
         friction_law=0,
         friction_block=np.zeros(0),
     )

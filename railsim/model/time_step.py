@@ -25,7 +25,7 @@ from railsim.kernels.support import LEARNT, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS, PARTS, PER_PART, SHARE, SIDEWAYS, SPEED, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
-from railsim.model.work import work_arrays
+from railsim.model.work import parts_of_wheel, work_arrays
 
 Situation = tuple[System, Floats]
 
@@ -76,13 +76,14 @@ def empty_recorder(
     """
     n = model.index.n_bodies
     wheelsets = len(model.index.wheelsets)
+    of_wheel = N_PATCH * parts_of_wheel(model.rails.arrays)
     chosen = np.zeros((0, 2), dtype=np.int64) if chosen is None else chosen
     return Recorder(
         state=np.zeros((rows, model.n_state)),
         rates=np.zeros((rows, 6 * n)),
         acceleration=np.zeros((rows, n, 6)),
         wheel=np.zeros((rows, wheelsets, 2, WHEEL_COLUMNS)),
-        patch=np.zeros((rows if patches else 0, wheelsets, 2, N_PATCH, PATCH_ROWS)),
+        patch=np.zeros((rows if patches else 0, wheelsets, 2, of_wheel, PATCH_ROWS)),
         chosen=chosen,
         element=np.zeros((rows, len(chosen), ELEMENT_COLUMNS)),
     )

@@ -10,25 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.arrays import Floats
-from railsim.contact.curves import gauge_face, rail_curve, tape_circle_position, wheel_curve
-from railsim.contact.out_of_round import (
-    Surface,
-    parts_by_wheel,
-    path_surface,
-    surface_arrays,
-    wheel_surface,
-)
-from railsim.contact.rail_sections import HEIGHTS, path_heights, rail_parts
-from railsim.definitions.section_files import SectionList
+from railsim.contact.curves import rail_curve, tape_circle_position
+from railsim.contact.out_of_round import Surface, parts_by_wheel, surface_arrays, wheel_surface
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.rail_sections import RailSections
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.out_of_round import Flat, Sections, Uneven
-from railsim.definitions.vehicle.tables import Wheelset
 from railsim.kernels.contact_table import FLANGE, N_PATCH
 from railsim.kernels.system import System
 from railsim.kernels.wheel_surface import FLAT, SURFACE_ROW, WAVE
 from railsim.model.check_rails import CheckRails
+from railsim.model.rail_ranges import RailRanges
 from railsim.profiles.profile import Profile
 
 PER_LENGTH = 20.0  # steps over a flat or wave
@@ -41,8 +32,6 @@ class UnevenWheels(NamedTuple):
     surface_row: Floats
     surface: Floats
     flat_ahead: Floats
-    range_of: NDArray[np.int64]
-    range_row: Floats
 
     @property
     def uneven(self) -> bool:
@@ -59,8 +48,6 @@ ROUND = UnevenWheels(
     np.zeros((0, SURFACE_ROW)),
     np.zeros((0, 4)),
     np.zeros(0),
-    np.zeros((0, 0, 2), dtype=np.int64),
-    np.zeros((0, 2)),
 )
 
 
@@ -95,41 +82,12 @@ def uneven_wheels(flat: FlatVehicle, track: Track, profiles: dict[str, Profile])
             # flats are on the tread
             whole = tuple(part for part in parts if not isinstance(part, Flat | Sections))
             surface_of[w, side, FLANGE] = number(whole, radius, rail, tape)
-    range_of = np.full((len(track.sections), len(wheelsets), 2), -1)
-    for k, part in enumerate(track.sections):
-        side = 0 if part.rail == "left" else 1
-        for w, wheelset in enumerate(wheelsets):
-            assert wheelset is not None
-            own = (wheelset.profile[side], wheelset.radius[side], wheelset.back_to_back)
-            if (k, own) not in known:
-                known[k, own] = len(surfaces)
-                surfaces.append(_path(part, wheelset, side, track.gauge, profiles))
-            range_of[k, w, side] = known[k, own]
-    ranges = np.array([[part.begin, part.end] for part in track.sections]).reshape(-1, 2)
-    return UnevenWheels(surface_of, *surface_arrays(surfaces), range_of, ranges)
+    return UnevenWheels(surface_of, *surface_arrays(surfaces))
 
 
-def _path(
-    part: RailSections, wheelset: Wheelset, side: int, gauge: float, profiles: dict[str, Profile]
-) -> Surface:
-    """Heights of a rail's sections under a wheel, over lateral displacements of its wheelset."""
-    assert part.contours is not None
-    contours = [np.array([contour.y, contour.z]) for contour in part.contours]
-    positions = np.array([contour.s for contour in part.contours])
-    sections = SectionList(positions, tuple(contours), np.zeros((len(contours), 0)))
-    radius, tape = wheelset.radius[side], tape_circle_position(wheelset.back_to_back)
-    wheel = wheel_curve(profiles[wheelset.profile[side]], radius, tape)
-    y, z = contours[0]
-    face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face
-    aside = tape - (0.5 * gauge - face)
-    begin, end = part.begin - part.shift, part.end - part.shift
-    _, heights = path_heights(rail_parts(sections), wheel, radius, begin, end, aside + HEIGHTS)
-    return path_surface(heights, HEIGHTS)
-
-
-def rolling(system: System, wheels: UnevenWheels, check: CheckRails) -> System:
-    """Return the system with its wheels as they are, and check rails."""
-    contact = system.contact._replace(**wheels._asdict(), **check._asdict())
+def rolling(system: System, wheels: UnevenWheels, check: CheckRails, rails: RailRanges) -> System:
+    """Return the system with its wheels and rails as they are, and check rails."""
+    contact = system.contact._replace(**wheels._asdict(), **check._asdict(), rails=rails.arrays)
     return system._replace(contact=contact)
 
 
@@ -137,12 +95,11 @@ def joined(wheels: list[UnevenWheels], counts: list[int]) -> UnevenWheels:
     """Return those of several vehicles with some numbers of wheelsets as one."""
     if not any(len(one.surface_of) for one in wheels):
         return ROUND
-    surface_of, row, range_of = [], [], []
+    surface_of, row = [], []
     first = values = aheads = 0
     for one, count in zip(wheels, counts, strict=True):
         own = one.surface_of if len(one.surface_of) else np.full((count, 2, N_PATCH), -1)
         surface_of.append(np.where(own >= 0, own + first, -1))
-        range_of.append(np.where(one.range_of >= 0, one.range_of + first, -1))
         moved = one.surface_row.copy()
         moved[:, :2] += (values, aheads)
         row.append(moved)
@@ -153,8 +110,6 @@ def joined(wheels: list[UnevenWheels], counts: list[int]) -> UnevenWheels:
         np.concatenate(row),
         np.concatenate([one.surface for one in wheels]),
         np.concatenate([one.flat_ahead for one in wheels]),
-        np.concatenate(range_of, axis=1) if len(wheels[0].range_row) else ROUND.range_of,
-        wheels[0].range_row,
     )
 
 

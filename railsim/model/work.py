@@ -6,15 +6,16 @@ from railsim.arrays import Floats
 from railsim.contact.creep import creep_scratch
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.commands import Controllers, Signals
-from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
-from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
+from railsim.kernels.contact_columns import BUMP_SIZE, CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
+from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT, RailTables
 from railsim.kernels.controllers import CONTROLLER_WHICH, SIGNAL_ROW, SIGNAL_WHICH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
+from railsim.kernels.rail_parts import COUNT, NODE_WEIGHTS
 from railsim.kernels.rails import CHANGES, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
 from railsim.kernels.registers import LANES
-from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
+from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP, TRACED
 from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
@@ -31,7 +32,6 @@ from railsim.kernels.system import (
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.transient import TRANSIENT
 from railsim.kernels.vibration import VIBRATION
-from railsim.kernels.wheel_surface import BUMP_SIZE
 
 # shortest step that has the full tolerance of forces on elastic rails (s), see `Work.watch`
 FULL_TOLERANCE = 1.25e-3
@@ -52,7 +52,8 @@ def work_arrays(system: System) -> Work:
     """Scratch arrays for `system`."""
     n = len(system.bodies.kind)
     n_wheelsets = len(system.contact.body)
-    n_patches = 2 * N_PATCH * n_wheelsets
+    of_wheel = N_PATCH * parts_of_wheel(system.contact.rails)
+    n_patches = 2 * of_wheel * n_wheelsets
     n_frames = len(system.frame_offset)
     n_tracks = n_wheelsets * system.support.elastic
     return Work(
@@ -74,10 +75,10 @@ def work_arrays(system: System) -> Work:
         rail_cell=aligned_zeros(n_wheelsets, np.int64),
         rail_u=aligned_zeros(n_wheelsets),
         above=aligned_zeros(10),
-        look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
-        weights=aligned_zeros(N_WEIGHT),
-        stiffness=aligned_zeros(2 * N_PATCH),
-        approach=aligned_zeros(N_PATCH),
+        look_up=aligned_zeros((of_wheel + 1) * LOOK_UP_SIZE),
+        weights=aligned_zeros(N_WEIGHT + NODE_WEIGHTS),
+        stiffness=aligned_zeros(2 * of_wheel),
+        approach=aligned_zeros(of_wheel),
         patch_index=aligned_zeros((n_patches, 3), np.int64),
         patch=aligned_zeros((PATCH_ROWS, n_patches)),
         creep=creep_scratch(n_patches, system.contact.law),
@@ -95,12 +96,17 @@ def work_arrays(system: System) -> Work:
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),
-        transient=aligned_zeros((n_wheelsets * system.contact.transient, 2, N_PATCH, TRANSIENT)),
-        bump=aligned_zeros((N_PATCH, BUMP_SIZE)),
+        transient=aligned_zeros((n_wheelsets * system.contact.transient, 2, TRACED, TRANSIENT)),
+        bump=aligned_zeros((of_wheel, BUMP_SIZE)),
         decay_part=aligned_zeros(len(system.internal.kind)),
         memory=system.own.memory.copy(),
         element=np.zeros((1, ELEMENT_COLUMNS)),
     )
+
+
+def parts_of_wheel(rails: RailTables) -> int:
+    """Most rails that lie side by side under one wheel."""
+    return int(rails.piece[:, COUNT].max(initial=1))
 
 
 def smooth_planes(n_wheelsets: int) -> Floats:

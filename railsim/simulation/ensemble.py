@@ -41,6 +41,7 @@ from railsim.kernels.system import (
     falling_friction,
     mount_laws,
 )
+from railsim.model import rail_ranges
 from railsim.model.assembly import Model, per_wheelset, side_by_side
 from railsim.model.uneven_wheels import joined, rolling
 
@@ -112,7 +113,7 @@ class Ensemble:
             for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
         )
         if len(models) == 1:
-            self.system = rolling(systems[0], models[0].wheels, models[0].check)
+            self.system = rolling(systems[0], models[0].wheels, models[0].check, models[0].rails)
             self.recorder = recorders[0]
             return
         self.system = joined_system(models)
@@ -271,6 +272,7 @@ def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
         shear=np.array(shear),
         coupling=np.array(coupling),
         **joined([model.wheels for model in models], [len(c.body) for c in contacts])._asdict(),
+        rails=rail_ranges.joined([model.rails for model in models]).arrays,
         check=models[0].check.check,
         check_flangeway=models[0].check.check_flangeway,
         check_wheel=np.concatenate([model.check.check_wheel for model in models]),

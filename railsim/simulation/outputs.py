@@ -36,7 +36,7 @@ from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS, Z_0
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
-from railsim.model.work import smooth_planes
+from railsim.model.work import parts_of_wheel, smooth_planes
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
 from railsim.simulation.own_outputs import OwnOutputs
@@ -345,7 +345,10 @@ class OutputPlan:
         if self.elements:
             names["element"] = self.elements
         if self._asked.contact_patches:
-            names["patch"] = PATCHES
+            count = parts_of_wheel(self._model.rails.arrays)
+            names["patch"] = PATCHES + tuple(
+                f"{name}, rail {k + 1}" for k in range(1, count) for name in PATCHES
+            )
         if self._sensors:
             names |= {"sensor": tuple(self._sensors), "axis": COMPONENTS[:3]}
         return names

@@ -63,7 +63,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             run.vibration,
             Q0,
             wheelsets,
-            irregular=bool(model.system.track.has_irregularity or len(model.wheels.range_row)),
+            irregular=bool(model.system.track.has_irregularity or len(model.rails.ends)),
             uneven=uneven,
             elastic=bool(model.system.support.elastic),
             hunts=swings is not None,

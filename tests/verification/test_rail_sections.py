@@ -5,7 +5,6 @@ tests/data/sections (licence beside them).
 """
 
 import csv
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +12,10 @@ import pytest
 from scipy.optimize import brentq
 
 from railsim.contact.curves import HALF_WIDTHS, wheel_curve
-from railsim.contact.rail_sections import (
-    HEIGHTS,
-    kinematic_height,
-    path_heights,
-    rail_parts,
-    rolled_curve,
-)
+from railsim.contact.rail_sections import kinematic_height, rail_parts, rolled_curve
 from railsim.contact.table import _wheel_arrays, ellipse_functions, strip_influence
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
-from railsim.definitions.section_files import SectionList, read_sections
+from railsim.definitions.section_files import read_sections
 from railsim.errors import InputError
 from railsim.kernels import table_slice as kernel
 from railsim.profiles import load_profile
@@ -99,7 +91,6 @@ def carried(parts, wheel, y, s=0.239):
     tables = []
     for part in parts:
         rail = rolled_curve(part, s, RADIUS)
-        rail = replace(rail, Y0=rail.Y0 + 0.75)
         fields = np.empty((3, 1, 12))
         kernel.fill_table_slice(
             fields,
@@ -142,40 +133,7 @@ def test_wing_and_nose_share_the_load_as_in_contact(parts, wheel):
         assert z == pytest.approx(float(row["z_mm"]), abs=0.005)
 
 
-def test_constant_sections_are_plain_rail(wheel):
-    plain = read_sections(LIST, "rail").points[0]
-    sections = SectionList(np.array([0.0, 0.4, 1.0]), (plain,) * 3, np.zeros((3, 0)))
-    _, heights = path_heights(rail_parts(sections), wheel, RADIUS, 0.1, 0.9, HEIGHTS[::12])
-    assert np.abs(heights).max() < 1e-12
-
-
-HOW = {"start": 37.5, "until": 42.0}
-
-
 @pytest.mark.further
-def test_run_on_constant_sections_is_the_run_on_plain_track():
-    plain = read_sections(LIST, "rail").points[0].tolist()
-    contours = [{"s": s, "y": plain[0], "z": plain[1]} for s in (30.0, 45.0, 60.0)]
-    part = {"rail": "right", "contours": contours, "begin": 40.0, "end": 55.0}
-    track = load_track("crossing_56e1_r245_1in9.25").replace(sections=[], check_rail=[])
-    coach = load_vehicle("coach_manchester")
-    mine = simulate(coach, track.replace(sections=[part]), speed=20.0, **HOW)
-    other = simulate(coach, track, speed=20.0, **HOW)
-    np.testing.assert_allclose(mine["Q"], other["Q"], rtol=1e-9)
-
-
-def test_crossing_in_the_mirror():
-    coach, track = load_vehicle("coach_manchester"), load_track("crossing_56e1_r245_1in9.25")
-    settings = load_settings().with_values({"output_rate": 1000.0})
-    mine = simulate(coach, track, speed=25.0, settings=settings, **HOW)
-    other = simulate(
-        mirrored_vehicle(coach), mirrored_track(track), speed=25.0, settings=settings, **HOW
-    )
-    Q = mine["Q"][:, 0, 1]
-    assert Q.max() > 1.5 * Q[0]
-    np.testing.assert_allclose(mine["Q"], other["Q"][:, :, ::-1], rtol=1e-3, atol=100.0)
-
-
 def test_impact_has_the_size_of_the_formula():
     """Contact force below 90 Hz on the nose: 0.7 to 1.1 times the P2 formula, dip 18.15 mrad.
 

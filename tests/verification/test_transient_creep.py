@@ -14,6 +14,7 @@ from railsim.kernels.transient import (
     LOST,
     PATCH_STATE,
     PER_TIME,
+    TRACED,
     TRANSIENT_SIZE,
     transient_begin,
 )
@@ -108,7 +109,7 @@ def test_new_patch_begins_without_traction(patch):
     steady, _, memory = patch.evaluate(state)
     rows = memory.reshape(-1, PATCH_STATE)
     assert np.count_nonzero(rows[:, CARRIES] == CARRIED) == 8
-    assert np.count_nonzero(rows[:, CARRIES] == LOST) == 16
+    assert np.count_nonzero(rows[:, CARRIES] == LOST) == 8 * (TRACED - 1)
     rows[:, CARRIES] = LOST
     state[patch.kept] = rows.ravel()
     assert patch.evaluate(state)[:2] == (0.0, 0.0)

@@ -53,7 +53,7 @@ class RailSections(Definition):
     begin: Finite
     """Where the range begins [m]; before it, and behind its end, the rail is that of `rail`"""
     end: Finite
-    """Where it ends [m]; at both ends the height of the path is that of the plain rail"""
+    """Where it ends [m]; at both ends the contact is that of the plain rail"""
 
     @model_validator(mode="after")
     def _range(self) -> Self:

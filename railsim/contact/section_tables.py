@@ -1,0 +1,301 @@
+"""Contact tables of rails whose section changes: one for each rail under the wheel, over s.
+
+At nodes along the track the fields of `railsim.contact.table` are those of the wheel on the section
+on which it stands there, that of `railsim.contact.rail_sections.rolled_curve`, over the lateral
+displacement, roll and squared yaw, for each rail on its own: wing and nose are two rails with three
+patches each.  Between the nodes `railsim.kernels.rail_parts` interpolates.
+
+**Nodes** lie so close that the heights at which the rigid wheel touches, of every zone that is near
+the lowest, are met by cubics within `TOLERANCE`, and within `SHARED` where two rails may carry.
+
+**Ends.**  At begin and end of the range the rail that carries is the plain rail: its table there is
+that of plain track, and over `FADE` it becomes that of the sections.  Heights are those above the
+section at `begin`.
+
+The grid is that of the plain table, of which only the middle is kept.
+"""
+
+import hashlib
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact import rail_sections
+from railsim.contact.curves import (
+    RailCurve,
+    WheelCurve,
+    rail_curve,
+    tape_circle_position,
+    wheel_curve,
+)
+from railsim.contact.rail_sections import WINDOW, RailPart, rail_parts, rigid_gaps, rolled_curve
+from railsim.contact.stored_table import generator_hash, kept_table
+from railsim.contact.table import (
+    ContactTable,
+    Generator,
+    Normal,
+    chosen_grid,
+    spline_coefficients,
+    unstretched_roll,
+)
+from railsim.contact.zones import zone_windows
+from railsim.definitions.section_files import SectionList
+from railsim.kernels.contact_table import N_PATCH, G
+from railsim.profiles.profile import Profile
+
+Array = NDArray[np.float64]
+
+INWARDS, OUTWARDS = 0.012, 0.012  # m, lateral positions that a table covers
+ROLLS, YAWS = 4, 2  # nodes of the plain table to each side of no roll, and from no yaw on
+FADE = 0.05  # m, from the plain rail to the sections
+TOLERANCE, SHARED = 4e-6, 5e-7  # m, of the heights between nodes; where two rails may carry
+CLOSEST, FARTHEST = 4e-3, 64e-3  # m, distances of nodes
+NEAR = 1.5e-3  # m, zones that touch so much later than the lowest do not carry
+BOTH = 3e-4  # m, two rails that touch so close to one another may carry together
+TRIED = np.linspace(-0.012, 0.012, 17)  # m, lateral positions at which zones are near
+USUAL = np.abs(TRIED) < 7e-3  # those at which nodes are chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Range:
+    """Sections of a rail over a range of the track, as one kind of wheel meets them.
+
+    Attributes
+    ----------
+    sections : SectionList
+        Sections, in their own arc length.
+    begin, end : float
+        Range in that arc length [m].
+    zero : float
+        Where y = 0 of the sections lies beside the middle of the track [m].
+    wheel, rail : Profile
+        The wheel's, and that of the plain rail.
+    plain : ContactTable
+        Contact of the two.
+    normal : "hertz" or "kik-piotrowski"
+        Kind of normal contact.
+    """
+
+    sections: SectionList
+    begin: float
+    end: float
+    zero: float
+    wheel: Profile
+    rail: Profile
+    plain: ContactTable
+    normal: Normal
+
+
+def cached_section_table(given: Range) -> ContactTable:
+    """Contact tables of the rails of a range, built once and kept on disk.
+
+    Returns
+    -------
+    ContactTable
+        Its `values` are those of zones one after the other, three to a table: shape (n, 3, n_w,
+        n_roll, n_y, n_field); `description` has under `parts` for each rail its nodes: position
+        from the begin of the range [m], and the zones of tread, flange root and flange, -1 where
+        nothing is near.
+    """
+    digest = hashlib.sha256(generator_hash().encode())
+    for module in (rail_sections.__file__, __file__):
+        digest.update(Path(module).read_bytes())
+    plain = given.plain
+    facts = (plain.description, plain.centre_height, plain.G, plain.nu, given.normal)
+    digest.update(repr((facts, given.begin, given.end, given.zero)).encode())
+    for part in (given.wheel.key(), given.rail.key(), given.sections.positions.tobytes()):
+        digest.update(part)
+    for points in given.sections.points:
+        digest.update(points.tobytes())
+    return kept_table(digest.hexdigest(), lambda: section_table(given))
+
+
+def section_table(given: Range, workers: int | None = None) -> ContactTable:
+    """As `cached_section_table`, built anew."""
+    plain, about = given.plain, given.plain.description
+    gauge, inclination, apart = (
+        float(str(about[key])) for key in ("gauge", "inclination", "back_to_back")
+    )
+    tape, radius = tape_circle_position(apart), plain.r0
+    grid = chosen_grid(None, given.normal)
+    wheel = wheel_curve(given.wheel, radius, tape, min(grid.spacing, grid.ds))
+    level = rail_curve(given.rail, gauge, inclination)
+    generator = Generator.of(wheel, level, radius, plain.centre_height, plain.G, plain.nu, grid)
+    parts = rail_parts(given.sections)
+    nodes, running = chosen_nodes(parts, wheel, level, tape - given.zero, given)
+    rise = _height(generator, level) - _height(
+        generator, rolled_curve(parts[running[0]], given.begin, radius, given.zero)
+    )
+    cut = _Cut.of(plain)
+    wanted: list[tuple[RailPart, float]] = []
+    known: dict[tuple[int, bytes], int] = {}
+    rows: list[list[tuple[float, int, Array]]] = []
+    for number, part in enumerate(parts):
+        along = []
+        for s, near in nodes[number]:
+            same = part.unchanged(s)
+            key = number, repr(s).encode() if same is None else same.tobytes()
+            if key not in known:
+                known[key] = len(wanted) + 1
+                wanted.append((part, s))
+            along.append((s, known[key], near))
+        whole = np.ones(3, dtype=bool)
+        if along and number == running[0]:
+            along = [(given.begin - FADE, 0, whole), (given.begin, 0, whole), *along]
+        if along and number == running[1]:
+            along = [*along, (given.end, 0, whole), (given.end + FADE, 0, whole)]
+        rows.append(along)
+    kept, described = _kept_zones(rows, given.begin)
+
+    def fill(task: tuple[int, list[int]]) -> Array:
+        table, zones = task
+        if table == 0:
+            return cut.plain[zones]
+        rail = rolled_curve(*wanted[table - 1], radius, given.zero)
+        return cut.table(generator, replace(rail, z=rail.z + rise))[zones]
+
+    first = fill(kept[-1])  # compile once, not in every thread
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        found = [*pool.map(fill, kept[:-1]), first]
+    missing = -sum(map(len, found)) % N_PATCH
+    values = np.concatenate([*found, np.zeros((missing, *first.shape[1:]))])
+    values = values.reshape(-1, N_PATCH, *values.shape[1:])
+    values.setflags(write=False)
+    return replace(
+        plain,
+        values=values,
+        y0=plain.y0 + plain.dy * cut.y.start,
+        roll0=plain.roll0 + plain.droll * cut.roll.start,
+        w=plain.w[:YAWS],
+        description={**about, "parts": described, "tape": tape, "rise": rise},
+    )
+
+
+def _kept_zones(
+    rows: list[list[tuple[float, int, Array]]], begin: float
+) -> tuple[list[tuple[int, list[int]]], list[list[list[float]]]]:
+    """Tables with the zones that are kept of each, and where those of each node lie.
+
+    A zone is kept at the nodes next but one to where it is near, so that a cubic has all it needs.
+    """
+    zones: dict[int, set[int]] = {}
+    masks = []
+    for along in rows:
+        near = np.array([mask for _, _, mask in along]).reshape(-1, 3)
+        for _ in range(2):
+            around = np.pad(near, ((1, 1), (0, 0)))
+            near = near | around[:-2] | around[2:]
+        masks.append(near)
+        for (_, table, _), mask in zip(along, near, strict=True):
+            zones.setdefault(table, set()).update(np.flatnonzero(mask).tolist())
+    kept = [(table, sorted(found)) for table, found in sorted(zones.items()) if found]
+    place, count = {}, 0
+    for table, found in kept:
+        for k in found:
+            place[table, k] = count
+            count += 1
+    described = [
+        [
+            [round(s - begin, 9), *(place[table, k] if mask[k] else -1 for k in range(3))]
+            for (s, table, _), mask in zip(along, near, strict=True)
+        ]
+        for along, near in zip(rows, masks, strict=True)
+    ]
+    return kept, described
+
+
+def _height(generator: Generator, rail: RailCurve) -> float:
+    """Height at which a wheelset in the middle of the track touches a rail [m]."""
+    zero = np.zeros(1)
+    return float(generator.values(rail, zero, zero, zero, 1)[:, 0, 0, 0, G].min())
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """The middle of a plain table: ranges of the lateral position and of the roll."""
+
+    whole: ContactTable
+    y: slice
+    roll: slice
+
+    @classmethod
+    def of(cls, plain: ContactTable) -> "_Cut":
+        middle = plain.values.shape[2] // 2
+        first, last = (round((end - plain.y0) / plain.dy) for end in (-INWARDS, OUTWARDS))
+        last = min(last, plain.values.shape[3] - 3)
+        return cls(plain, slice(max(first, 1), last + 1), slice(middle - ROLLS, middle + ROLLS + 1))
+
+    @property
+    def plain(self) -> Array:
+        """The plain rail's table."""
+        return self.whole.values[:, :YAWS, self.roll, self.y]
+
+    def table(self, generator: Generator, rail: RailCurve) -> Array:
+        """Table of another rail; coefficients at its ends need a node more."""
+        plain = self.whole
+        rolls = np.arange(self.roll.start - 1, self.roll.stop + 1)
+        stretched = plain.roll0 + plain.droll * rolls
+        s = plain.y0 + plain.dy * np.arange(self.y.start - 1, self.y.stop + 1)
+        roll = unstretched_roll(stretched)
+        values = generator.values(rail, s, roll, plain.w[:YAWS], 1)
+        return spline_coefficients(values, stretched)[:, :, 1:-1, 1:-1]
+
+
+def chosen_nodes(
+    parts: tuple[RailPart, ...], wheel: WheelCurve, level: RailCurve, tape: float, given: Range
+) -> tuple[list[list[tuple[float, Array]]], tuple[int, int]]:
+    """Where along the track each rail has a table and of which zones, and which carry at the ends.
+
+    `level`: the plain rail; `tape`: position of the nominal rolling circle from y = 0 [m].
+    """
+    zone = np.argmax(zone_windows(wheel, level), axis=0)
+    wheels = [(wheel.y[zone == k], wheel.r[zone == k]) for k in range(N_PATCH)]
+    s = np.arange(given.begin, given.end, 0.5 * CLOSEST)
+    radius, y = given.plain.r0, tape + TRIED
+    gaps = np.array([rigid_gaps(part, s, radius, wheels, y) for part in parts])
+    near = gaps < gaps.min(axis=(0, 2))[None, :, None] + NEAR
+    usual = near & USUAL
+    of_part = gaps[..., USUAL].min(axis=2)
+    both = ((of_part < of_part.min(axis=0) + BOTH).sum(axis=0) > 1).any(axis=1)
+    tolerance = np.where(both, SHARED, TOLERANCE)[:, None, None]
+    lowest = gaps[:, :, :, TRIED.size // 2].min(axis=2)
+    running = int(np.argmin(lowest[:, 0])), int(np.argmin(lowest[:, -1]))
+    nodes = []
+    for number, part in enumerate(parts):
+        beyond = WINDOW - CLOSEST
+        low, high = part.positions[0] - beyond, part.positions[-1] + beyond
+        if number == running[0]:
+            low = given.begin + FADE
+        if number == running[1]:
+            high = given.end - FADE
+        first, last = np.searchsorted(s, (low, high))
+        last = min(int(last), s.size - 1)
+        limit = np.where(usual[number], tolerance, np.inf)
+        found = _split(s, gaps[number], limit, int(first), last) if first < last else []
+        nodes.append([(float(s[i]), near[number, i].any(axis=1)) for i in found])
+    return nodes, running
+
+
+def _split(s: Array, gaps: Array, limit: Array, first: int, last: int) -> list[int]:
+    """Indices from `first` to `last` between which cubics meet the gaps within a limit."""
+    slope = np.gradient(gaps, s, axis=0)
+
+    def between(a: int, b: int) -> list[int]:
+        h = s[b] - s[a]
+        u = ((s[a + 1 : b] - s[a]) / h)[:, None, None]
+        cubic = (
+            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * gaps[a]
+            + u**2 * (3.0 - 2.0 * u) * gaps[b]
+            + h * u * (1.0 - u) * ((1.0 - u) * slope[a] - u * slope[b])
+        )
+        met = (np.abs(cubic - gaps[a + 1 : b]) <= limit[a + 1 : b]).all()
+        if b - a < 2 or (met and h <= FARTHEST):
+            return [a]
+        middle = (a + b) // 2
+        return between(a, middle) + between(middle, b)
+
+    return [*between(first, last), last]

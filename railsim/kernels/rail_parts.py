@@ -1,0 +1,243 @@
+"""Rails whose section changes along the track, several side by side, such as wing and nose.
+
+Each rail, a part, has contact tables at nodes along the track (`railsim.contact.section_tables`).
+Between them the fields are cubics whose slopes at the nodes are those of parabolas through three
+neighbours, zero beside a node with the same table: once continuously differentiable.  The position
+is that of the wheel itself,
+
+    s_w = s + x - y_w yaw,
+
+with the lateral position y_w of its nominal rolling circle, and the forces are the gradient of the
+potential through all interpolations: along the track -dU/ds, which has the lever y_w in yaw.  The
+gap's slope dg/ds is the fall of the rail where the wheel touches it, ahead of or behind the axle.
+"""
+
+import numpy as np
+
+from railsim.kernels import compiled
+from railsim.kernels.contact_columns import B_CHANGE, B_K, B_K2, B_LEVER, B_RADIUS, B_RATE, B_RISE
+from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT, look_up
+from railsim.kernels.system import AHEAD, ARC_LENGTH
+
+BEGIN, END = range(2)  # columns of RailTables.range_row
+FIRST_PART, COUNT, PLAIN = range(3)  # of RailTables.piece
+FIRST_NODE, N_NODES = range(2)  # of RailTables.part
+NODES = 4  # of a cubic
+NODE_WEIGHTS = 2 * NODES  # weights of the nodes and of their derivative, in `Work.weights`
+FAR = 2e-3  # m, a patch whose gap exceeds the wheel's height by more is left out
+NO_HEIGHT = 1.0  # m
+
+
+@compiled(python=False)
+def place_on_rails(system, state, w, side, k, yaw):
+    """Position of a wheel from the begin of range `k` [m], and its piece, -1 where it has none."""
+    rails = system.contact.rails
+    piece = rails.range_of[k, w, side]
+    if piece < 0:
+        return 0.0, piece
+    b = system.contact.body[w]
+    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]] + state[6 * b]
+    s -= (2.0 * side - 1.0) * rails.lever[piece] * yaw
+    begin = rails.range_row[k, BEGIN]
+    if s < begin or s > rails.range_row[k, END]:
+        return 0.0, np.int64(-1)
+    return s - begin, piece
+
+
+@compiled(python=False)
+def cell_of(rails, part, s):
+    """Node before `s` of a rail, -1 where the rail is not."""
+    first = rails.part[part, FIRST_NODE]
+    last = first + rails.part[part, N_NODES] - 1
+    if last < first or s < rails.node_s[first] or s > rails.node_s[last]:
+        return np.int64(-1)
+    while last - first > 1:
+        middle = (first + last) // 2
+        if rails.node_s[middle] <= s:
+            first = middle
+        else:
+            last = middle
+    return first
+
+
+@compiled(python=False)
+def neighbour(rails, part, i, k):
+    """Node `k` of the four around the cell behind node `i`: the rail's last one beyond its ends."""
+    first = rails.part[part, FIRST_NODE]
+    return min(max(i - 1 + k, first), first + rails.part[part, N_NODES] - 1)
+
+
+@compiled(inline=True)
+def gap_at(rails, number, iw, ir, iy):
+    """Gap of a zone at a node of its table [m]."""
+    return rails.values[number // N_PATCH, number % N_PATCH, iw, ir, iy, 0]
+
+
+@compiled(inline=True)
+def zone_at(rails, part, i, k, zone):
+    """Number of a zone at node `k` of the four around the cell behind node `i`."""
+    return rails.node_zone[neighbour(rails, part, i, k), zone]
+
+
+@compiled(python=False)
+def fall_at(rails, part, zone, s, otherwise, cell):
+    """Slope of a zone's gap at another position, at the nearest node in y and roll [1]."""
+    i = cell_of(rails, part, s)
+    if i < 0:
+        return otherwise
+    here, there = rails.node_zone[i, zone], rails.node_zone[i + 1, zone]
+    if here < 0 or there < 0:
+        return otherwise
+    iy, ir, iw = cell[0], cell[1], cell[2]
+    step = gap_at(rails, there, iw, ir, iy) - gap_at(rails, here, iw, ir, iy)
+    return step / (rails.node_s[i + 1] - rails.node_s[i])
+
+
+@compiled(python=False)
+def same_tables(rails, i, j):
+    """Whether two nodes have the same tables."""
+    zone = rails.node_zone
+    return zone[i, 0] == zone[j, 0] and zone[i, 1] == zone[j, 1] and zone[i, 2] == zone[j, 2]
+
+
+@compiled(python=False)
+def node_weights(rails, part, i, s, out, first):
+    """Weights of the four nodes around a cell at `s`, then of the derivative over s [1/m].
+
+    With u = (s - s_1)/h and the slopes m_1, m_2 at the cell's ends,
+
+        f = (1 + 2u)(1 - u)^2 f_1 + u^2 (3 - 2u) f_2 + h u (1 - u)((1 - u) m_1 - u m_2).
+    """
+    before, after = neighbour(rails, part, i, 0), neighbour(rails, part, i, 3)
+    x = rails.node_s
+    h = x[i + 1] - x[i]
+    u = (s - x[i]) / h
+    v = 1.0 - u
+    out[first] = out[first + 3] = out[first + 4] = out[first + 7] = 0.0
+    out[first + 1], out[first + 2] = (1.0 + 2.0 * u) * v * v, u * u * (3.0 - 2.0 * u)
+    out[first + 5], out[first + 6] = -6.0 * u * v / h, 6.0 * u * v / h
+    for end in range(2):
+        beyond, inner = (after, i + 1) if end else (before, i)
+        if beyond != inner and same_tables(rails, beyond, inner):
+            continue
+        # slope at this end: a (f_2 - f_1)/h + (1 - a) (f_1 - f_0)/h_0, and likewise
+        turn = -h * u * u * v if end else h * u * v * v
+        d_turn = u * (3.0 * u - 2.0) if end else v * (1.0 - 3.0 * u)
+        away = abs(x[beyond] - x[inner])
+        a = away / (away + h) if away > 0.0 else 1.0
+        out[first + 1] -= a * turn / h
+        out[first + 2] += a * turn / h
+        out[first + 5] -= a * d_turn / h
+        out[first + 6] += a * d_turn / h
+        if away > 0.0:
+            c = (1.0 - a) / away
+            c = -c if end else c
+            out[first + 1 + end] += c * turn
+            out[first + 3 * end] -= c * turn
+            out[first + 5 + end] += c * d_turn
+            out[first + 4 + 3 * end] -= c * d_turn
+
+
+@compiled(python=False)
+def rigid_height(rails, piece, s, y):
+    """Height of the highest rail over the plain one's for a wheel at `y`, and its rise.
+
+    At the nearest node in y, without roll and yaw: for what is foreseen.
+
+    Returns
+    -------
+    float, float
+        Height, upwards [m], and its derivative over s [1].
+    """
+    shape = rails.values.shape
+    iy = min(max(int((y - rails.y0) / rails.dy + 0.5), 0), shape[4] - 1)
+    roll = shape[3] // 2
+    level, best, rise = NO_HEIGHT, NO_HEIGHT, 0.0
+    for zone in range(N_PATCH):
+        number = rails.piece[piece, PLAIN] + zone
+        level = min(level, gap_at(rails, number, 0, roll, iy))
+    for part in range(rails.piece[piece, COUNT]):
+        part += rails.piece[piece, FIRST_PART]
+        i = cell_of(rails, part, s)
+        if i < 0:
+            continue
+        h = rails.node_s[i + 1] - rails.node_s[i]
+        u = (s - rails.node_s[i]) / h
+        for zone in range(N_PATCH):
+            here, there = rails.node_zone[i, zone], rails.node_zone[i + 1, zone]
+            if here < 0 or there < 0:
+                continue
+            g, step = gap_at(rails, here, 0, roll, iy), gap_at(rails, there, 0, roll, iy)
+            step -= g
+            if g + u * step < best:
+                best, rise = g + u * step, -step / h
+    return level - best, rise
+
+
+@compiled(python=False)
+def look_up_part(system, work, cell, place, part, first):
+    """Look up one rail of a piece for a wheel: patches from `first` on.
+
+    `work.approach` is 0 for what was looked up and -1 for what is far.
+
+    Parameters
+    ----------
+    cell : (int, int, int, float, float)
+        iy, ir, iw, tw of the tables, and the wheel's height with what its surface adds [m].
+    place : (float, float, float)
+        Position from the begin of the range [m], its rate [m/s], lever [m].
+
+    Returns
+    -------
+    float
+        Greatest height of the wheel over a gap [m], at most 1 m below.
+    """
+    rails, weights, out, bump = system.contact.rails, work.weights, work.look_up, work.bump
+    iy, ir, iw, tw, height = cell
+    s, rate, lever = place
+    for zone in range(N_PATCH):
+        work.approach[first + zone] = -1.0
+        work.stiffness[2 * first + zone] = work.stiffness[2 * first + N_PATCH + zone] = 0.0
+    i = cell_of(rails, part, s)
+    if i < 0:
+        return -NO_HEIGHT
+    node_weights(rails, part, i, s, weights, N_WEIGHT)
+    scratch, nearest = out.shape[0] - LOOK_UP_SIZE, -NO_HEIGHT
+    for zone in range(N_PATCH):
+        here, there = rails.node_zone[i, zone], rails.node_zone[i + 1, zone]
+        before, after = zone_at(rails, part, i, 0, zone), zone_at(rails, part, i, 3, zone)
+        if min(here, there, before, after) < 0:
+            continue
+        over = height - min(gap_at(rails, here, iw, ir, iy), gap_at(rails, there, iw, ir, iy))
+        nearest = max(nearest, over)
+        if over < -FAR:
+            continue
+        patch = first + zone
+        work.approach[patch] = 0.0
+        begin = patch * LOOK_UP_SIZE
+        for q in range(LOOK_UP_SIZE):
+            out[begin + q] = 0.0
+        fall = K_rate = K2_rate = 0.0
+        for k in range(NODES):
+            share, slope = weights[N_WEIGHT + k], weights[N_WEIGHT + NODES + k]
+            if share == 0.0 and slope == 0.0:
+                continue
+            number = zone_at(rails, part, i, k, zone)
+            table, row = number // N_PATCH, number % N_PATCH
+            look_up(rails, table, row, iy, ir, iw, tw, weights, out, scratch)
+            for q in range(LOOK_UP_SIZE):
+                out[begin + q] += share * out[scratch + q]
+            fall += slope * out[scratch]
+            K_rate += slope * out[scratch + 1]
+            K2_rate += slope * out[scratch + 2]
+        bump[patch, B_RISE] = -fall
+        bump[patch, B_K] = K_rate
+        bump[patch, B_K2] = K2_rate
+        bump[patch, B_LEVER] = lever
+        # the wheel's radius is that at the patch; what is below the axle of it is less
+        bump[patch, B_RADIUS] -= 0.5 * fall * fall * rails.shear[0]
+        bump[patch, B_RATE] -= fall * rate
+        later = s + rate * work.watch[AHEAD]
+        if later > s:
+            bump[patch, B_CHANGE] += rate * (fall - fall_at(rails, part, zone, later, fall, cell))
+    return nearest

@@ -1,0 +1,162 @@
+"""Rails whose section changes along the track, in the arrays of a run.
+
+Equilibrium, linear analyses and the choice of the step see the plain rails.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact.curves import gauge_face
+from railsim.contact.section_tables import Range, cached_section_table
+from railsim.contact.table import ContactTable, Normal
+from railsim.definitions.section_files import SectionList
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.rail_sections import RailSections
+from railsim.definitions.vehicle.flatten import FlatVehicle
+from railsim.errors import ModelError
+from railsim.kernels.contact_table import N_FIELD, N_PATCH, RailTables
+from railsim.profiles.profile import Profile
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RailRanges:
+    """Ranges of a track over which the section of a rail changes.
+
+    Attributes
+    ----------
+    tables : tuple of ContactTable
+        One for each range and kind of wheel, see `railsim.contact.section_tables`.
+    which : int64[k, w, 2]
+        Which of them serves each wheel on each range, else -1.
+    ends : float64[k, 2]
+        Begin and end of the ranges [m].
+    """
+
+    tables: tuple[ContactTable, ...]
+    which: Ints
+    ends: Floats
+
+    @cached_property
+    def arrays(self) -> RailTables:
+        """The same as the time loop reads it."""
+        piece: list[tuple[int, int, int]] = []
+        part: list[tuple[int, int]] = []
+        nodes: list[list[float]] = []
+        first = 0
+        for table in self.tables:
+            described: list[list[list[float]]] = table.description["parts"]  # type: ignore[assignment]
+            piece.append((len(part), len(described), first))
+            for rows in described:
+                part.append((len(nodes), len(rows)))
+                nodes += [[s, *(k + first if k >= 0 else -1 for k in zones)] for s, *zones in rows]
+            first += N_PATCH * len(table.values)
+        grid = self.tables[0] if self.tables else None
+        if any((t.y0, t.values.shape[1:]) != (grid.y0, grid.values.shape[1:]) for t in self.tables):  # type: ignore[union-attr]
+            raise ModelError("tables of rails' sections differ in their grids")
+        listed = np.array(nodes).reshape(-1, 1 + N_PATCH)
+        return RailTables(
+            values=_one_after_another([t.values for t in self.tables]),
+            shear=np.array([t.shear for t in self.tables for _ in t.values]),
+            y0=grid.y0 if grid else 0.0,
+            dy=grid.dy if grid else 1.0,
+            roll0=grid.roll0 if grid else 0.0,
+            droll=grid.droll if grid else 1.0,
+            w=grid.w if grid else np.zeros(2),
+            range_of=self.which,
+            range_row=self.ends,
+            piece=np.array(piece, dtype=np.int64).reshape(-1, 3),
+            lever=np.array([float(str(t.description["tape"])) for t in self.tables]),
+            part=np.array(part, dtype=np.int64).reshape(-1, 2),
+            node_s=np.ascontiguousarray(listed[:, 0]),
+            node_zone=listed[:, 1:].astype(np.int64),
+        )
+
+
+PLAIN = RailRanges((), np.zeros((0, 0, 2), dtype=np.int64), np.zeros((0, 2)))
+
+
+def _one_after_another(values: list[Floats]) -> Floats:
+    if len(values) == 1:
+        return values[0]
+    empty = np.zeros((0, N_PATCH, 2, 2, 2, N_FIELD))
+    joined = np.concatenate(values) if values else empty
+    joined.setflags(write=False)  # as on disk
+    return joined
+
+
+def rail_ranges(
+    flat: FlatVehicle,
+    track: Track,
+    profiles: dict[str, Profile],
+    plain: tuple[tuple[ContactTable, ...], Ints],
+    normal: Normal,
+) -> RailRanges:
+    """Return the ranges of a track for the wheels of a vehicle.
+
+    `plain`: contact tables on the plain rails, and which of them serves each wheel, [w, 2].
+    """
+    if not track.sections:
+        return PLAIN
+    wheelsets = [body.wheelset for body in flat.of_kind("wheelset")]
+    tables: list[ContactTable] = []
+    known: dict[tuple[int, int], int] = {}
+    which = np.full((len(track.sections), len(wheelsets), 2), -1)
+    for k, part in enumerate(track.sections):
+        side = 0 if part.rail == "left" else 1
+        for w, wheelset in enumerate(wheelsets):
+            assert wheelset is not None
+            key = k, int(plain[1][w, side])
+            if key not in known:
+                known[key] = len(tables)
+                pair = profiles[wheelset.profile[side]], profiles[track.rail[side]]
+                given = _range(part, track.gauge, pair, plain[0][key[1]], normal)
+                tables.append(cached_section_table(given))
+            which[k, w, side] = known[key]
+    ends = np.array([[part.begin, part.end] for part in track.sections]).reshape(-1, 2)
+    return RailRanges(tuple(tables), which, ends)
+
+
+def _range(
+    part: RailSections,
+    gauge: float,
+    pair: tuple[Profile, Profile],
+    plain: ContactTable,
+    normal: Normal,
+) -> Range:
+    assert part.contours is not None
+    contours = tuple(np.array([contour.y, contour.z]) for contour in part.contours)
+    positions = np.array([contour.s for contour in part.contours])
+    sections = SectionList(positions, contours, np.zeros((len(contours), 0)))
+    y, z = contours[0]
+    face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face
+    return Range(
+        sections=sections,
+        begin=round(part.begin - part.shift, 9),
+        end=round(part.end - part.shift, 9),
+        zero=0.5 * gauge - face,
+        wheel=pair[0],
+        rail=pair[1],
+        plain=plain,
+        normal=normal,
+    )
+
+
+def joined(ranges: list[RailRanges]) -> RailRanges:
+    """Return those of several vehicles on one track as one."""
+    tables: list[ContactTable] = []
+    which = []
+    for one in ranges:
+        places = []
+        for table in one.tables:
+            found = [k for k, known in enumerate(tables) if known is table]
+            places.append(found[0] if found else len(tables))
+            if not found:
+                tables.append(table)
+        which.append(np.where(one.which >= 0, np.array([*places, -1])[one.which], -1))
+    return RailRanges(tuple(tables), np.concatenate(which, axis=1), ranges[0].ends)

@@ -1,0 +1,228 @@
+"""Wing and nose of a crossing carry at once, each as its own contact: against CONTACT.
+
+The range is cut to the transfer from wing to nose, which builds the tables in some seconds.
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dynamics import Settings, advance, energy, undamped
+from scipy.optimize import brentq
+
+from railsim.contact.curves import inclined_to_track
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.kernels import contact_columns as column
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.system import RADIUS
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
+from railsim.model.uneven_wheels import rolling
+from railsim.model.work import work_arrays
+from railsim.profiles import load_profile
+from railsim.simulation import simulate
+
+DATA = Path(__file__).parents[1] / "data" / "sections"
+NOSE = 50.0  # m, the theoretical nose on the track
+ASIDE = 2.5e-3  # m: the results count y from rails 1.430 m apart, the track has 1.435 m
+TREAD, ROOT = 0, 1
+
+
+def crossing(**changes):
+    track = load_track("crossing_56e1_r245_1in9.25")
+    part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.9, "end": 50.5}
+    return track.replace(sections=[part], check_rail=[], **changes)
+
+
+def rows_of(name):
+    with (DATA / name).open() as lines:
+        return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(lines)]
+
+
+class OneWheel:
+    """The leading right wheel held at a position over the crossing, V = 2 m/s; mm and N."""
+
+    def __init__(self):
+        settings = load_settings().with_values({"contact_damping": 0.0, "creep_law": "table"})
+        track = crossing(support={"preset": "rigid"}, friction=0.3)
+        self.model = assemble(load_vehicle("coach_manchester"), track, settings)
+        model = self.model
+        self.system = rolling(model.system, model.wheels, model.check, model.rails)
+        self.rise = model.rails.tables[0].description["rise"]
+        self.work = work_arrays(self.system)
+
+    def at(self, s, y, z):
+        """Forces on the rail x, y, z, then the patches of wing and nose: number and column."""
+        system, work = self.system, self.work
+        b, n = int(system.contact.body[0]), len(system.bodies.kind)
+        state = np.zeros(self.model.n_state)
+        state[-2] = NOSE + 1e-3 * s - system.frame_offset[system.bodies.frame[b]]
+        state[-1] = 2.0
+        for other in system.contact.body:
+            state[6 * other + 2] = -0.02
+            state[6 * n + 6 * other + 4] = -4.3481181
+        assert system.bodies.row[b, RADIUS] == 0.46
+        state[6 * b + 1 : 6 * b + 3] = 1e-3 * y + ASIDE, 1e-3 * z + self.rise
+        status, _, count = right_hand_side(system, work, state, np.zeros_like(state))
+        assert status == 0
+        wheel, patches, x = work.wheel[0, 1], {}, 0.0
+        for k in range(count):
+            patch = work.patch[:, k]
+            if tuple(work.patch_index[k, :2]) != (0, 1):
+                continue  # the other wheel, far from any load
+            sine, cosine = patch[column.NORMAL_Y], patch[column.NORMAL_Z]
+            across = patch[column.TURN_Y] * cosine - patch[column.TURN_Z] * sine
+            x += patch[column.T_X] - patch[column.T_Y] * across
+            x += patch[column.NORMAL] * cosine * patch[column.RISE]
+            patches[int(work.patch_index[k, 2])] = patch.copy()
+        return np.array([x, wheel[column.W_Y], wheel[column.W_Q]]), patches
+
+    def under(self, load, s, y):
+        z = brentq(lambda z: self.at(s, y, z)[0][2] - load, -1.5, 0.0, xtol=1e-9)
+        return z, *self.at(s, y, z)
+
+
+@pytest.fixture(scope="module")
+def wheel():
+    return OneWheel()
+
+
+def shares(patches):
+    """Normal forces of wing and nose."""
+    return [
+        sum(patch[column.NORMAL] for k, patch in patches.items() if k // 3 == rail)
+        for rail in range(2)
+    ]
+
+
+@pytest.fixture(scope="module")
+def equal(wheel):
+    def difference(y):
+        wing, nose = shares(wheel.under(10e3, 239.0, y)[2])
+        return wing - nose
+
+    return brentq(difference, 0.93, 1.02, xtol=1e-3)
+
+
+def test_wing_and_nose_share_the_load_equally_where_they_do_in_contact(equal):
+    assert equal == pytest.approx(0.975, abs=0.02)
+
+
+def test_transfer_from_wing_to_nose(wheel, equal):
+    """Each share within 300 N, along the track 200 N, z 0.005 mm; patches within 0.5 mm.
+
+    Across, 350 N of 10 kN: CONTACT takes the angle of the wing's surface 0.2 mm beside the first
+    contact, 0.097; the force here is the gradient of the energy, and on the wheel's cone of 1:15
+    it has the angle 0.067.
+    """
+    rows = rows_of("crossing_s239_dev.csv")
+    both = [row for row in rows if 0.85 <= row["y_mm"] <= 1.09]
+    assert len(both) == 26
+    for row in both:
+        z, force, patches = wheel.under(10e3, 239.0, row["y_mm"] + equal - 0.975)
+        patch = patches[TREAD if row["patch"] == 1 else 3 + ROOT]
+        assert patch[column.NORMAL] == pytest.approx(row["Fn_N"], abs=300.0)
+        assert force[0] == pytest.approx(row["Fx_N"], abs=200.0)
+        assert force[1] == pytest.approx(row["Fy_N"], abs=350.0)
+        assert z == pytest.approx(row["z_mm"], abs=0.005)
+        assert 1e3 * patch[column.C_X] == pytest.approx(row["xcp_tr_mm"], abs=0.5)
+        y = 1e3 * (patch[column.C_Y] + ASIDE) + row["y_mm"]
+        assert y == pytest.approx(row["ycp_tr_mm"] + 1e3 * ASIDE, abs=0.5)
+
+
+def test_heights_along_the_wing(wheel):
+    """Under the load that CONTACT has at a given height, within 0.003 mm."""
+    for row in rows_of("crossing_along_dev.csv"):
+        z, _, _ = wheel.under(row["Fz_N"], row["s_mm"], row["y_mm"])
+        assert z == pytest.approx(row["z_mm"], abs=0.003)
+
+
+def test_wing_and_flank_of_the_nose(wheel):
+    """Two patches of different rails and zones: vertical shares within 600 N, places 0.5 mm.
+
+    A millimetre along the track changes the shares by 2 kN.
+    """
+    wing, nose = rows_of("wing_rail_two_patches_dev.csv")
+    z, _, patches = wheel.under(10e3, wing["s_mm"], wing["y_mm"])
+    assert z == pytest.approx(wing["z_mm"], abs=0.005)
+    for row, number in ((wing, TREAD), (nose, 3 + ROOT)):
+        patch, angle = patches[number], -row["deltcp_rad"]
+        vertical = row["Fn_N"] * np.cos(angle) - row["patch_Fs_N"] * np.sin(angle)
+        found = patch[column.NORMAL] * patch[column.ANGLE_COS]
+        found -= patch[column.T_Y] * patch[column.ANGLE_SIN]
+        assert found == pytest.approx(vertical, abs=600.0)
+        assert 1e3 * patch[column.C_Y] + row["y_mm"] == pytest.approx(row["ycp_tr_mm"], abs=0.5)
+        assert 1e3 * patch[column.C_X] == pytest.approx(row["xcp_tr_mm"], abs=0.5)
+
+
+def test_energy_is_conserved_over_the_crossing():
+    """Without friction and damping, by 0.1 % of the elastic energy of a wheel's contact, 4 J.
+
+    One wheelset runs over it; the others stand on plain rails before and after.
+    """
+    settings = Settings(contact_damping=0.0, drive={"mode": "free"})
+    track = crossing(support={"preset": "rigid"}, friction=(0.0, 0.0))
+    balance = equilibrium(assemble(undamped(load_vehicle("coach_manchester")), track, settings), 20)
+    model = balance.model
+    system = rolling(model.system, model.wheels, model.check, model.rails)
+    state = balance.state.copy()
+    state[model.index.coordinate("carbody", 0) + 1] += 0.002
+    state[-2] = 49.88 - system.frame_offset[system.bodies.frame[system.contact.body[0]]]
+    before = energy(model.system, state)
+    after = advance(system, state, 3.125e-5, 1040, model=model)
+    assert after[-2] - state[-2] > 0.64
+    assert abs(energy(model.system, after) - before) < 0.004
+
+
+HOW = {"start": 38.6, "until": 40.2, "speed": 20.0}
+
+
+def test_constant_sections_are_plain_rail():
+    """A run over sections that are those of the plain rail, to round-off."""
+    track = load_track("crossing_56e1_r245_1in9.25").replace(sections=[], check_rail=[])
+    rail = load_profile(track.rail[1], kind="rail")
+    y, z = inclined_to_track(rail, track.gauge, track.inclination)
+    points = {"y": (y - 0.5 * track.gauge - 0.035).tolist(), "z": z.tolist()}
+    part = {
+        "rail": "right",
+        "contours": [{"s": s, **points} for s in (40.0, 50.0, 60.0)],
+        "gauge_face": -0.035,
+        "begin": 49.9,
+        "end": 50.5,
+    }
+    coach = load_vehicle("coach_manchester")
+    mine = simulate(coach, track.replace(sections=[part]), **HOW)
+    other = simulate(coach, track, **HOW)
+    np.testing.assert_allclose(mine["Q"], other["Q"], rtol=1e-10)
+
+
+def test_crossing_in_the_mirror():
+    coach, track = load_vehicle("coach_manchester"), crossing()
+    settings = load_settings().with_values({"output_rate": 1000.0})
+    mine = simulate(coach, track, settings=settings, **HOW)
+    other = simulate(mirrored_vehicle(coach), mirrored_track(track), settings=settings, **HOW)
+    Q = mine["Q"][:, 0, 1]
+    assert Q.max() > 1.5 * Q[0]
+    # round-off may decide whether a step is divided
+    np.testing.assert_allclose(mine["Q"], other["Q"][:, :, ::-1], rtol=5e-3, atol=100.0)
+
+
+def test_shares_of_the_rails_add_up():
+    """Patches of wing and nose are outputs of their own, and Q is their sum."""
+    coach, track = load_vehicle("coach_manchester"), crossing()
+    settings = load_settings().with_values({"outputs.contact_patches": True, "output_rate": 4000.0})
+    run = simulate(coach, track, settings=settings, **HOW)
+    assert tuple(run.coordinates["patch"][3:]) == (
+        "tread, rail 2",
+        "flange root, rail 2",
+        "flange, rail 2",
+    )
+    N, angle, T_y = (run[name][:, 0, 1] for name in ("patch_N", "patch_angle", "patch_T_y"))
+    of_rail = (N * np.cos(angle) - T_y * np.sin(angle)).reshape(-1, 2, 3).sum(axis=2)
+    # of forces on elastic rails some are changed by their slopes after the evaluation
+    np.testing.assert_allclose(of_rail.sum(axis=1), run["Q"][:, 0, 1], rtol=5e-3, atol=100.0)
+    place = run["wheelset_distance"][:, 0] - NOSE
+    assert (of_rail[place < 0.1, 1] == 0.0).all()
+    assert (of_rail[(place > 0.4) & (place < 0.5), 0] == 0.0).all()
