@@ -191,8 +191,10 @@ def _checked(file: Path, points: Floats) -> Floats:
     """Points of a section that can be one [m]."""
     if points.shape[-1] < FEWEST_POINTS:
         raise _wrong(file, "", f"{points.shape[-1]} points", f"{FEWEST_POINTS} at least")
+    if not np.isfinite(points).all():
+        raise _wrong(file, "", "a value that is no number", "finite y, z")
     width = float(np.ptp(points[0]))
-    if not NARROWEST <= width <= WIDEST or not np.isfinite(points).all():
+    if not NARROWEST <= width <= WIDEST:
         found = f"a section {1e3 * width:.3g} mm wide"
         allowed = f"{1e3 * NARROWEST:g} to {1e3 * WIDEST:g} mm; y, z in m or mm"
         raise _wrong(file, "", found, allowed)

@@ -71,6 +71,9 @@ def track_remarks(track: TrackTables) -> list[Remark]:
                 f"({track.rounding:g} m), which flattens it"
             )
             remarks.append(Remark(section.key, text))
+    for k, part in enumerate(track.sections):
+        if text := part.unusual():
+            remarks.append(Remark(f"sections.{k}", text))
     return remarks + _beyond_the_track(track)
 
 

@@ -1,6 +1,6 @@
 """Rails whose section changes along the track: crossings, and rails that are worn in places."""
 
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -14,6 +14,11 @@ from railsim.text import LONGEST_FILE, shortened
 
 Coordinates = Annotated[tuple[Finite, ...], Field(min_length=8, max_length=2000)]
 MOST_RANGES = 50
+# m, by which a section may go back, and by which its top may lie over or under the rail tops
+MOST_BACK, MOST_HEIGHT = 5e-3, 10e-3
+# m, and slope, by which a section may be shifted against the one before: wings go aside at 1:9
+MOST_JUMP, STEEPEST = 5e-3, 0.25
+FAR_APART = 5.0  # times the mean distance of sections
 
 
 class Contour(Definition):
@@ -30,7 +35,25 @@ class Contour(Definition):
     def _matching(self) -> Self:
         if len(self.y) != len(self.z):
             raise ValueError(f"{len(self.y)} values of y and {len(self.z)} of z")
+        back = 1e3 * max(high - y for high, y in zip(accumulate(self.y, max), self.y, strict=True))
+        if back > 1e3 * MOST_BACK:
+            raise ValueError(
+                f"the section at {self.s:g} m goes back by {back:.3g} mm; from the gauge side "
+                "to the field side, y positive to the field side, without crossing itself"
+            )
+        top = 1e3 * min(self.z)
+        if abs(top) > 1e3 * MOST_HEIGHT:
+            raise ValueError(
+                f"the section at {self.s:g} m has its top at z = {top:.3g} mm; within "
+                f"{1e3 * MOST_HEIGHT:g} mm of the rail tops, z positive down"
+            )
         return self
+
+    def jump(self, after: Self) -> float:
+        """Shift of the whole section to the next one, sideways or in height [m]."""
+        sides = [after.y[k] - self.y[k] for k in (0, -1)]
+        aside = min(map(abs, sides)) if sides[0] * sides[1] > 0.0 else 0.0
+        return max(aside, abs(min(after.z) - min(self.z)))
 
 
 class RailSections(Definition):
@@ -64,12 +87,39 @@ class RailSections(Definition):
         for before, after in pairwise(self.contours or ()):
             if after.s <= before.s:
                 raise ValueError(f"sections out of order: {after.s:g} after {before.s:g} m")
+            jump = before.jump(after)
+            if jump > max(MOST_JUMP, STEEPEST * (after.s - before.s)):
+                raise ValueError(
+                    f"a jump of {1e3 * jump:.3g} mm from {before.s:g} to {after.s:g} m, which no "
+                    f"blend can follow; {1e3 * MOST_JUMP:g} mm at most, or 1:{1.0 / STEEPEST:g}"
+                )
         if self.contours is not None:
             first, last = (self.contours[k].s + self.shift for k in (0, -1))
             if first > self.begin or last < self.end:
                 found = f"sections from {first:g} to {last:g} m"
                 raise ValueError(f"{found} do not reach over the range")
+            a, b = self._gap()
+            if b - a > 0.5 * (self.end - self.begin):
+                raise ValueError(
+                    f"no section from {a:g} to {b:g} m, more than half the range; are the "
+                    "positions in m?"
+                )
         return self
+
+    def _gap(self) -> tuple[float, float]:
+        """Ends of the longest part of the range without a section, along the track [m]."""
+        inside = [one.s + self.shift for one in self.contours or ()]
+        ends = sorted({self.begin, self.end, *(s for s in inside if self.begin < s < self.end)})
+        return max(pairwise(ends), key=lambda pair: pair[1] - pair[0])
+
+    def unusual(self) -> str:
+        """Say where sections are far apart for their number; nothing where they are not."""
+        a, b = self._gap()
+        places = [one.s + self.shift for one in self.contours or ()]
+        inside = sum(self.begin <= s <= self.end for s in places)
+        if b - a < FAR_APART * (self.end - self.begin) / (inside + 1):
+            return ""
+        return f"no section from {a:g} to {b:g} m: the rail between is blended over {b - a:.3g} m"
 
     def mirrored(self) -> Self:
         """Return the same as the other rail."""

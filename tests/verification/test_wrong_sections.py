@@ -1,0 +1,56 @@
+"""Lists of rails' sections as users get them wrong: one clear sentence for each."""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.loading import load_track
+from railsim.errors import InputError
+
+PLACES = np.round(np.linspace(0.0, 2.0, 21), 9)
+Y = np.linspace(-0.035, 0.035, 40)
+TOP = 0.012 * (np.abs(Y) / 0.035) ** 4
+
+
+def rows(y=Y, z=TOP):
+    """Sections of a plain rail, all alike but for the one in the middle."""
+    return [(s, y, z) if k == 10 else (s, Y, TOP) for k, s in enumerate(PLACES)]
+
+
+def loaded(tmp_path, sections):
+    """Track with these sections, from a file."""
+    lines = [f"{s},{y},{z}" for s, ys, zs in sections for y, z in zip(ys, zs, strict=True)]
+    (tmp_path / "list.csv").write_text("s,y,z\n" + "\n".join(lines) + "\n")
+    part = 'rail = "right"\nfile = "list.csv"\nshift = 50.0\nbegin = 50.2\nend = 51.8\n'
+    head = 'format = "railsim-track/1"\nname = "x"\ngauge = 1.435\nrail = "60E1"\n'
+    plan = 'inclination = 0.025\nfriction = 0.3\nplan = [{ type = "STR", length = 100.0 }]\n'
+    file = tmp_path / "track.toml"
+    file.write_text(head + plan + "[[sections]]\n" + part)
+    return load_track(file)
+
+
+def test_plain_sections_are_taken_without_a_remark(tmp_path):
+    assert not loaded(tmp_path, rows()).unusual()
+
+
+@pytest.mark.parametrize(
+    ("sections", "said"),
+    [
+        (rows(y=-Y), "at 1 m goes back by 70 mm; from the gauge side"),
+        (rows(y=np.concatenate([Y[:10], Y[25:9:-1], Y[26:]])), "without crossing itself"),
+        (rows(z=-3.0 * TOP), "top at z = -36 mm; within 10 mm of the rail tops, z positive down"),
+        (rows(y=Y + 0.03), "a jump of 30 mm from 0.9 to 1 m, which no blend can follow"),
+        (rows(z=TOP * np.nan), "a value that is no number"),
+        (rows(y=1e3 * Y), "wide; 10 to 400 mm; y, z in m or mm"),
+        ([*rows()[:5], rows()[6], rows()[5], *rows()[7:]], "0.5 after 0.6; rising positions"),
+        ([(1e3 * s, *points) for s, *points in rows()], "are the positions in m"),
+        (rows()[5:], "sections from 50.5 to 52 m do not reach over the range"),
+    ],
+)
+def test_wrong_sections_are_refused(tmp_path, sections, said):
+    with pytest.raises(InputError, match=said):
+        loaded(tmp_path, sections)
+
+
+def test_gap_is_remarked(tmp_path):
+    (remark,) = loaded(tmp_path, rows()[:7] + rows()[13:]).unusual()
+    assert "no section from 50.6 to 51.3 m: the rail between is blended" in str(remark)
