@@ -43,7 +43,8 @@ def command(
 
     RECORDING is a track file with a measured irregularity, or the CSV of one.  It is run in pieces
     over all cores; places.csv lists the places with the shape of the defect, sections.csv compares
-    with the geometry limits of EN 13848-5, heat_strip.png shows all limits over the arc length.
+    with the geometry limits of EN 13848-5, heat_strip.png shows all limits over the arc length,
+    report.html has them all.
 
     \b
     Example:
@@ -51,6 +52,7 @@ def command(
           --speeds 40 --out judged
     """  # noqa: D301 - click reads the escape
     from railsim.plot.assessed_track import heat_strip
+    from railsim.report.assessed_track import assessed_track_page
     from railsim.studies.assess_track import assess_track
     from railsim.studies.rows import speed_of
 
@@ -66,6 +68,7 @@ def command(
         )
     output.written += found.write()
     output.write("heat_strip.png", lambda: heat_strip(found))
+    output.write("report.html", lambda: assessed_track_page(found))
     table = found.table()
     more = len(table) - SHOWN
     table.rows = table.rows[:SHOWN]

@@ -38,6 +38,13 @@ FILES = ("irregularity.json", "irregularity.png")
     metavar="A",
     help="rms noise of an accelerometer in m/s2, where MEASURED has none.",
 )
+@click.option(
+    "--simulations",
+    type=click.IntRange(min=0),
+    default=25,
+    metavar="N",
+    help="Most simulated runs for 2 km of the record; 0: the linear estimate.",
+)
 @set_option
 @output_options("Folder for recording, track, estimates, forces.")
 @code_options
@@ -49,6 +56,7 @@ def command(
     scale: float,
     wavelengths: tuple[float, float],
     noise: float,
+    simulations: int,
     assignments: tuple[str, ...],
     output: Output,
 ) -> None:
@@ -56,7 +64,8 @@ def command(
 
     MEASURED is a measurement file with channels sensor_acceleration:POINT:AXIS of axleboxes,
     frames or floor.  A smoother with the linearised vehicle gives alignment, level and cross level
-    with the standard deviation of their errors, in D1 and D2 of EN 13848, and Q, Y and sum Y.
+    with the standard deviation of their errors, in D1 and D2 of EN 13848, and Q, Y and sum Y;
+    simulated runs over the estimate put it right where the contact is not linear.
     Wavelengths that the channels do not see are named and not filled in.
 
     \b
@@ -86,6 +95,7 @@ def command(
             load_vehicle(name, load),
             load_track(track or how.track or "straight"),
             assumed=assumed,
+            simulations=simulations,
             progress=progress,
         )
     if folder is not None:

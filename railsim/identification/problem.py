@@ -292,7 +292,8 @@ class Problem:
 def _simulated(
     run: "object", model: Model, parameters: Sequence[Parameter], x: Floats, slope: bool
 ) -> Floats:
-    from railsim.identification.runs import Run, silent
+    from railsim.identification.runs import Run
+    from railsim.simulation.remarks import silent
 
     assert isinstance(run, Run)
     try:

@@ -6,9 +6,7 @@ spline of degree five over five values for the shortest period in the band: its 
 2e-4 of the amplitude, and 2e-6 at half the frequency.
 """
 
-import logging
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,6 +24,7 @@ from railsim.measurement import Measurement
 from railsim.measurement.counterpart import amplified, check_channels, compared, outputs_for, series
 from railsim.result import Result
 from railsim.simulation import simulate
+from railsim.simulation.remarks import silent
 
 Floats = NDArray[np.float64]
 OVERSAMPLED = 5.0  # simulated values for the shortest period of the band
@@ -39,18 +38,6 @@ MARGIN = 0.85  # of the step of the model, for variants that are stiffer
 ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
 # where the speed varies nothing is low-passed: what is folded into the band lies far above it
 VARYING_RATE, FAR_ABOVE = 400.0, 10.0  # 1/s at least; times the end of the band
-
-
-@contextmanager
-def silent() -> Iterator[None]:
-    """Do not report the remarks of runs within the block: those of variants."""
-    log = logging.getLogger("railsim")
-    level = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(level)
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,6 +91,7 @@ def in_the_mean(
     rough = track.replace(
         plan=[{"type": "STR", "length": LENGTH}],
         cant=[{"type": "CST", "length": LENGTH, "cant": 0.0}],
+        vertical=[],
         irregularities=[{**irregularity, "type": "random", "seed": SEED}],
     )
     result = simulate(vehicle, rough, speed=tangent.speed, settings=Settings(output_rate=RATE))

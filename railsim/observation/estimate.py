@@ -8,16 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.excitations.recording import ORDER
 from railsim.files.access import make_folder, whole_file
 from railsim.linear.track_response import QUANTITIES
+from railsim.observation.pieces import STEP, Piece
 from railsim.table import Column, Table
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0)}
 """Wavelengths of EN 13848-1 [m]."""
 LETTERS = ("y", "z", "cross_level", "gauge")  # columns of a recording
 MILLI, KILO = 1e3, 1e-3
+SEEN = 0.5  # share of the variance that the channels explain, below which nothing is filled in
 FILES = ("recording.csv", "track.toml", "estimates.csv", "forces.csv")
 
 
@@ -227,6 +231,74 @@ class Irregularity:
             f'[[cant]]\ntype = "CST"\nlength = {length:g}\ncant = 0.0\n\n'
             f'[[irregularities]]\ntype = "measured"\nfile = "{FILES[0]}"\n'
         )
+
+
+def estimate_of(
+    piece: Piece,
+    spectra: Complex,
+    covariance: Complex,
+    power: Floats,
+    forces: tuple[tuple[str, ...], Complex, Floats],
+) -> Estimate:
+    """Return the estimate of a piece from spectra of fields and their covariance.
+
+    Parameters
+    ----------
+    piece : Piece
+    spectra, covariance : complex128[field, k], complex128[k, field, field]
+        Irregularities, then accelerations.
+    power : float64[k, quantity]
+        Assumed before.
+    forces : (str[output], complex128[k, output, field], float64[output, n])
+        Names, response, and what they have beyond it [N, m].
+    """
+    n, number = len(piece.grid), power.shape[1]
+    points = 2 * (len(covariance) - 1)
+    k: Floats = 2.0 * np.pi * np.fft.rfftfreq(points, STEP).astype(float)
+    names, response, base = forces
+    outputs = np.einsum("kcq,qk->ck", response, spectra, optimize=True)
+    rest = np.einsum("kcp,kpq,kcq->ck", response, covariance, response.conj(), optimize=True).real
+    own = covariance[:, range(number), range(number)].real.T
+    power = power.T
+    with np.errstate(invalid="ignore"):
+        seen = np.where(power > 0.0, 1.0 - own / np.where(power > 0.0, power, 1.0), 0.0)
+    kept = seen >= SEEN
+    error = np.where(kept, own, power)
+    found = np.where(kept, spectra[:number], 0.0)
+    bands, deviations = {}, {}
+    for name, gain in _gains(k).items():
+        bands[name] = np.fft.irfft(gain * found, points, axis=1)[:, :n]
+        deviations[name] = rms(gain**2 * error, points)
+    return Estimate(
+        s=piece.grid,
+        speed=piece.speed,
+        values=np.fft.irfft(found, points, axis=1)[:, :n],
+        deviations=rms(error, points),
+        bands=bands,
+        band_deviations=deviations,
+        wave_numbers=k,
+        seen=seen,
+        power=power,
+        outputs=names,
+        forces=np.fft.irfft(outputs, points, axis=1)[:, :n] + base,
+        force_deviations=rms(rest, points),
+    )
+
+
+def _gains(k: Floats) -> dict[str, Floats]:
+    """Magnitude of the band passes over the wave number, see `recording.band_passed`."""
+    found = {}
+    with np.errstate(divide="ignore"):
+        for name, (shortest, longest) in BANDS.items():
+            f = k / (2.0 * np.pi)
+            below = np.where(f > 0.0, 1.0 / longest / f, np.inf) ** (2 * ORDER)
+            found[name] = 1.0 / np.sqrt((1.0 + below) * (1.0 + (f * shortest) ** (2 * ORDER)))
+    return found
+
+
+def rms(power: Floats, points: int) -> Floats:
+    """Root of the variance of two-sided powers of the bins of `rfft`."""
+    return np.asarray(np.sqrt((2.0 * power.sum(axis=1) - power[:, 0] - power[:, -1]) / points))
 
 
 def joined(

@@ -5,53 +5,54 @@ that it has come over, and the forces of its wheels, each with its standard devi
 are alignment, level, cross level and gauge with the powers of a spectrum, and for each wheelset the
 accelerations in y, z, roll and yaw that the linear contact leaves out (`contact.py`).
 
-The model is one of constant speed.  A run is divided into pieces that overlap, each with its mean
-speed; a piece ends after `LONGEST` or where the speed has left a band of `SPEEDS`.
+The linear model is one of straight track and constant speed; what it lacks is in the simulated runs
+by which its estimate is put right (`simulated.py`).  A run is divided into pieces (`pieces.py`).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from railsim.contact.geometry import geometry_of
-from railsim.definitions.excitations.recording import ORDER
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import Fault, InputError, ModelError, argument_fault, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.observation.contact import Noise, in_the_mean
-from railsim.observation.estimate import BANDS, Estimate, Irregularity, joined
-from railsim.observation.grid import HALF, on_grid
+from railsim.observation.estimate import Estimate, Irregularity, estimate_of, joined, rms
+from railsim.observation.innovations import (
+    KINDS,
+    Powers,
+    Sizes,
+    disagreeing,
+    level_of,
+    likely_sizes,
+    spectra_of,
+)
+from railsim.observation.pieces import READ, STEP, Piece, pieces_of, used_channels
+from railsim.observation.simulated import CHANGE, SimulatedRun, refined
 from railsim.observation.smoother import Complex, Fields
 from railsim.result.sensors import all_sensors
+from railsim.simulation.remarks import silent
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Progress = Callable[[float], None]
 
-STEP = 0.25  # m
-LONGEST, OVERLAP, SHORTEST = 2000.0, 200.0, 300.0  # of pieces [m]
-SPEEDS = 0.06  # largest over smallest speed of a piece, less 1
 PERIOD = 60.0  # by which the period is longer than a piece [m]
-MARGIN = 20.0  # at both ends of a record [m]
-SLOWEST = 5.0  # m/s
-NOISE = {"sensor_acceleration": 0.05, "sensor_roll_rate": 1e-3}  # m/s2, rad/s, of one value
-BIAS = {"sensor_acceleration": 0.2, "sensor_roll_rate": 5e-3}
-MODEL = 0.03  # error of the response over its rms: masses, springs, dampers that are not linear
-AROUND_GAP = 8  # steps beside a gap that are left out
-ALIKE, UNLIKE = 0.3, 3.0  # correlation, ratio of rms values: read, and said by other channels
-BEYOND = 30.0  # power of what does not agree, over that which noise and model explain
-FEWEST = 3  # channels of which one can be wrong
+NOISE = dict(zip(READ, (0.05, 1e-3), strict=True))  # m/s2, rad/s, of one value
+BIAS = dict(zip(READ, (0.2, 5e-3), strict=True))
+REMAINDER = 0.04  # of the power of what the linear contact leaves out, about a simulated run
+SIMULATIONS = 25  # at most, for each piece
+LEVEL = 30.0  # rms of what channels read over what is assumed: beyond this a unit is wrong
 FLANGE = 0.7  # rad, contact angle
-SEEN = 0.5  # share of the variance that the channels explain, below which nothing is filled in
 CHANNELS = ("lateral", "vertical", "cross_level", "gauge")  # of a spectrum, as `QUANTITIES`
 CANT = 1.5  # m, between the rails
 
@@ -116,23 +117,13 @@ class Assumed:
         return found
 
 
-@dataclass(frozen=True)
-class _Piece:
-    """Part of a run at a nearly constant speed: its grid, signals, and where these exist."""
-
-    grid: Floats
-    signals: Floats
-    there: Bools
-    speed: float
-    rate: float
-
-
 def irregularity(
     measurement: Measurement,
     vehicle: Vehicle,
     track: Track,
     *,
     assumed: Assumed | None = None,
+    simulations: int = SIMULATIONS,
     progress: Progress | None = None,
 ) -> Irregularity:
     """Return the irregularities and wheel forces behind a measured run.
@@ -142,9 +133,12 @@ def irregularity(
     measurement : Measurement
         With channels ``sensor_acceleration:POINT:AXIS`` or ``sensor_roll_rate:POINT``.
     vehicle, track : Vehicle, Track
-        The vehicle that measured; rails, gauge, friction and support of the track, straight.
+        The vehicle that measured; plan, rails, gauge, friction and support of the track.
     assumed : Assumed, optional
         Spectrum and noise.
+    simulations : int
+        Most simulated runs for a piece of at most 2 km, see `railsim.observation.simulated`; 0 for
+        the linear estimate, which knows neither curves nor speeds that change.
     progress : callable, optional
         Called repeatedly with the finished fraction.
 
@@ -152,33 +146,34 @@ def irregularity(
     ------
     InputError
         No channel that can be used, points that the vehicle does not have, a record too short or
-        too slow.
+        too slow, channels that are all much larger or smaller than is assumed.
     ModelError
         The vehicle cannot be linearised, or does not complete the run that does so.
     """
     assumed = assumed or Assumed()
     assumed.check()
     known = all_sensors(vehicle)
-    used = _used(measurement, known)
+    used = used_channels(measurement, known)
     remarks = list(measurement.remarks)
     left = [name for name in measurement.channels if name not in used]
     if left:
         remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")
-    pieces = _pieces(measurement, list(used))
+    pieces = pieces_of(measurement, list(used))
     bare = track.replace(irregularities=[])
-    linear = LinearVehicle(vehicle, bare)
-    smooth = _Smooth(vehicle, bare, linear, assumed, measurement, used)
+    smooth = _Smooth(vehicle, bare, assumed, measurement, used, simulations)
     found = []
     for number, piece in enumerate(pieces):
         found.append(smooth.estimate(piece))
         if progress is not None:
             progress((number + 1) / len(pieces))
-    remarks += smooth.remarks() + _curves(track, measurement)
+    remarks += smooth.remarks()
+    if not simulations:
+        remarks += _curves(track, measurement)
     return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks)
 
 
 def _curves(track: Track, measurement: Measurement) -> list[str]:
-    """Remark on curves, which the model does not have."""
+    """Remark on curves, which the linear model does not have."""
     begin, end = measurement.distance[[0, -1]]
     curved = [
         section
@@ -191,83 +186,9 @@ def _curves(track: Track, measurement: Measurement) -> list[str]:
         return []
     low, high = min(c.begin for c in curved), max(c.end for c in curved)
     return [
-        f"The track has curves between s = {low:.0f} and {high:.0f} m; the model is one on "
+        f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear model is one on "
         "straight track: alignment, Y and sum Y there are not to be relied upon."
     ]
-
-
-def _used(measurement: Measurement, known: dict[str, Any]) -> dict[str, str]:
-    """Outputs of the linear vehicle by channel: ``axlebox_1_left.z``."""
-    used, faults = {}, []
-    for name, quantity in measurement.quantities.items():
-        kind, *labels = quantity.split(":")
-        if kind not in NOISE:
-            continue
-        if labels[0] not in known:
-            found = f"the vehicle has no sensor '{labels[0]}'"
-            key = f"channels.{name}.quantity"
-            faults.append(Fault(measurement.name, key, found, nearest(labels[0], known)))
-            continue
-        used[name] = f"{labels[0]}.{labels[1] if len(labels) > 1 else 'roll_rate'}"
-    if not used and not faults:
-        allowed = "sensor_acceleration:axlebox_1_left:z and others of axleboxes, frames and floor"
-        faults.append(Fault(measurement.name, "channels", "no accelerations", allowed))
-    if faults:
-        raise InputError(faults)
-    return used
-
-
-def _pieces(measurement: Measurement, names: list[str]) -> list[_Piece]:
-    """Divide a run where its speed changes."""
-    s, v = measurement.distance, measurement.speed
-    fault = None
-    if s[-1] - s[0] < SHORTEST + 2.0 * MARGIN:
-        fault = Fault(
-            measurement.name, "distance", f"{s[-1] - s[0]:.0f} m", f"{SHORTEST:g} m at least"
-        )
-    elif v.min() < SLOWEST:
-        fault = Fault(measurement.name, "speed", f"{v.min():.3g} m/s", f"{SLOWEST:g} m/s at least")
-    if fault:
-        raise InputError([fault])
-    pieces, begin = [], float(s[0]) + MARGIN
-    last = float(s[-1]) - MARGIN
-    while True:
-        inside = (s >= begin) & (s <= min(begin + LONGEST, last))
-        speeds = v[inside]
-        spread = np.maximum.accumulate(speeds) / np.minimum.accumulate(speeds) - 1.0
-        count = int(np.searchsorted(spread, SPEEDS))
-        end = float(s[inside][min(count, len(speeds)) - 1])
-        end = min(max(end, begin + SHORTEST), last)
-        if last - end < SHORTEST - OVERLAP:
-            end = last
-        pieces.append(_piece(measurement, names, begin, end))
-        if end >= last:
-            return pieces
-        begin = end - OVERLAP
-
-
-def _piece(measurement: Measurement, names: list[str], begin: float, end: float) -> _Piece:
-    reach = HALF * STEP + 1.0
-    part = measurement.part(begin - reach, end + reach)
-    grid: Floats = begin + STEP * np.arange(int((end - begin) / STEP) + 1, dtype=np.float64)
-    signals, there = [], []
-    for name in names:
-        x = part[name]
-        unknown = np.isnan(x)
-        lost = np.zeros(len(grid), dtype=bool)
-        if unknown.all():
-            signals.append(np.zeros(len(grid)))
-            there.append(lost)
-            continue
-        if unknown.any():
-            x = np.interp(part.distance, part.distance[~unknown], x[~unknown])
-            near = np.searchsorted(grid, part.distance[unknown])
-            lost[np.clip(near, 0, len(grid) - 1)] = True
-            lost = np.convolve(lost, np.ones(2 * AROUND_GAP + 1), mode="same") > 0
-        signals.append(on_grid(part.distance, x, grid))
-        there.append(~lost)
-    speed = float(np.mean(part.speed))
-    return _Piece(grid, np.array(signals), np.array(there), speed, measurement.rate)
 
 
 class _Smooth:
@@ -277,12 +198,14 @@ class _Smooth:
         self,
         vehicle: Vehicle,
         track: Track,
-        linear: LinearVehicle,
         assumed: Assumed,
         measurement: Measurement,
         used: dict[str, str],
+        simulations: int,
     ) -> None:
-        self.vehicle, self.track, self.linear, self.assumed = vehicle, track, linear, assumed
+        self.vehicle, self.track, self.assumed = vehicle, track, assumed
+        self.simulations, self.name = simulations, measurement.name
+        self.linear = LinearVehicle(vehicle, track)
         self.channels, self.used, self.known = list(used), list(used.values()), all_sensors(vehicle)
         kinds = [measurement.quantities[name].split(":")[0] for name in used]
         default = {**NOISE, "sensor_acceleration": assumed.noise}
@@ -294,7 +217,7 @@ class _Smooth:
         self._models: dict[float, tuple[TrackResponse, Noise]] = {}
         self.said: list[str] = []
         self._wrong: set[int] | None = None
-        self.flanges = _flanges(linear, track)
+        self.flanges = _flanges(self.linear, track)
         self._last: tuple[tuple[float, int], Complex] | None = None
 
     def remarks(self) -> list[str]:
@@ -310,79 +233,11 @@ class _Smooth:
                 "wavelengths": list(self.assumed.wavelengths),
                 "scale": self.assumed.scale,
             }
-            self._models[speed] = in_the_mean(self.vehicle, self.track, self.linear, tangent, rough)
+            with silent():
+                self._models[speed] = in_the_mean(
+                    self.vehicle, self.track, self.linear, tangent, rough
+                )
         return self._models[speed]
-
-    def estimate(self, piece: _Piece) -> Estimate:
-        """Return fields and forces of a piece with their standard deviations."""
-        speed = float(f"{piece.speed:.3g}")
-        response, noise = self.model(speed)
-        n = len(piece.grid)
-        points = next_fast_len(n + int(PERIOD / STEP), real=True)
-        k = _wave_numbers(points)
-        power = self.assumed.power(k, points)
-        unknown = np.tile(noise.at(k, STEP), len(response.offsets))
-        whole = self._response(response, k, speed)
-        chosen = [response.outputs.index(name) for name in self.used]
-        H = whole[:, chosen]
-        tracks = H[:, :, : len(QUANTITIES)]
-        errors = (
-            self.noise**2 * piece.speed / piece.rate / STEP
-            + MODEL**2
-            * np.einsum("kcq,kq,kcq->kc", tracks, power, tracks.conj(), optimize=True).real
-        )
-        errors[0] += points * self.bias**2
-        fields = Fields(points, np.hstack([power, unknown]), H, errors)
-        padded = ((0, 0), (0, points - n))
-        if self._wrong is None:
-            self._wrong = self._disagreeing(fields, piece)
-        there = piece.there.copy()
-        there[list(self._wrong)] = False
-        mean = fields.mean(np.pad(piece.signals, padded), np.pad(there, padded))
-        covariance = fields.covariance()
-        return _estimate(piece, response, whole, mean, covariance, power)
-
-    def _disagreeing(self, fields: Fields, piece: _Piece) -> set[int]:
-        """Channels that read another thing than the others say; a remark on each.
-
-        What the others say of channel c is y_c - (G^-1 y)_c/(G^-1)_cc.  The worst one is left out
-        before the others are looked at again.
-        """
-        n, points = len(piece.grid), fields.points
-        taper = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) * STEP / PERIOD)
-        where = piece.there * taper
-        read = np.pad(piece.signals - _means(piece.signals, piece.there), ((0, 0), (0, points - n)))
-        read[:, :n] *= where
-        spectra, left = np.fft.rfft(read, axis=1), list(range(len(read)))
-        wrong: set[int] = set()
-        G = fields.data_covariance()
-        while len(left) > FEWEST and len(wrong) < len(read) // 3:
-            inverse = np.linalg.inv(G[:, left][:, :, left])
-            own = np.einsum("kcc->ck", inverse).real
-            rest = np.einsum("kcd,dk->ck", inverse, spectra[left], optimize=True) / own
-            said = np.fft.irfft(spectra[left] - rest, points, axis=1)
-            beyond = np.mean(np.abs(rest) ** 2 * own, axis=1) / points
-            product = np.sum(read[left] * said, axis=1)
-            sizes = np.linalg.norm(read[left], axis=1), np.linalg.norm(said, axis=1)
-            worst = int(np.argmax(beyond))
-            name, c = self.channels[left[worst]], product[worst] / (sizes[0] * sizes[1])[worst]
-            ratio = (sizes[0] / sizes[1])[worst]
-            if c < -ALIKE:
-                words = (
-                    f"has the opposite sign of what the other channels say ({c:.2f}): 'reverse'?"
-                )
-            elif c > ALIKE and not 1.0 / UNLIKE < ratio < UNLIKE:
-                words = f"is {ratio:.2g} times what the other channels say: another 'unit'?"
-            elif c < ALIKE and beyond[worst] > BEYOND:
-                words = (
-                    f"does not agree with what the other channels say (correlation {c:.2f}): "
-                    "another point or axis, or a clock that runs apart?"
-                )
-            else:
-                break
-            self.said.append(f"{name} {words} It is left out.")
-            wrong.add(left.pop(worst))
-        return wrong
 
     def _response(self, response: TrackResponse, k: Floats, speed: float) -> Complex:
         """H of all outputs, that of a constant left out; the last one is kept."""
@@ -396,54 +251,102 @@ class _Smooth:
             self._last = key, H
         return self._last[1]
 
+    def estimate(self, piece: Piece) -> Estimate:
+        """Return fields and forces of a piece with their standard deviations."""
+        response, noise = self.model(piece.speed)
+        n = len(piece.grid)
+        points = 2 * next_fast_len((n + int(PERIOD / STEP) + 1) // 2, real=True)
+        k: Floats = 2.0 * np.pi * np.fft.rfftfreq(points, STEP).astype(float)
+        whole = self._response(response, k, piece.speed)
+        chosen = [response.outputs.index(name) for name in self.used]
+        forces = [i for i, o in enumerate(response.outputs) if o[:2] in ("Q.", "Y.", "su", "la")]
+        names = tuple(response.outputs[i] for i in forces)
+        white = np.tile(self.noise**2 * piece.speed / piece.rate / STEP, (len(k), 1))
+        white[0] += points * self.bias**2
+        unknown = np.tile(noise.at(k, STEP), len(response.offsets))
+        powers = Powers(points, self.assumed.power(k, points), unknown, whole[:, chosen], white)
+        run = SimulatedRun(self.vehicle, self.track, piece, self.used, list(names))
+        read = piece.signals
+        if self.simulations and not run.is_steady:
+            smooth = run(np.zeros((len(QUANTITIES), n)))
+            if isinstance(smooth, str):
+                raise ModelError(f"the run over the track without irregularities: {smooth}")
+            read = read - smooth.channels
+        there = self._there(powers, piece, read)
+        sizes = likely_sizes(powers, spectra_of(read, there, points))
+        # what the contact leaves out goes with the irregularities: its size does not show yet
+        fields = powers.fields(replace(sizes, contact=np.ones(len(KINDS))))
+        padded = (0, 0), (0, points - n)
+        mean = fields.mean(np.pad(read, padded), np.pad(there, padded))
+        base = np.tile(response.steady[forces][:, None], n)
+        if self.simulations:
+            found = self._refined(piece, run, powers, sizes, whole[:, forces], mean, there)
+            fields, mean, base = found or (fields, mean, base)
+        return estimate_of(
+            piece, np.fft.rfft(mean, axis=1), fields.covariance(), powers.track,
+            (names, whole[:, forces], base),
+        )  # fmt: skip
 
-def _estimate(
-    piece: _Piece,
-    response: TrackResponse,
-    whole: Complex,
-    mean: Floats,
-    covariance: Complex,
-    power: Floats,
-) -> Estimate:
-    n, points = len(piece.grid), mean.shape[1]
-    k = _wave_numbers(points)
-    number = len(QUANTITIES)
-    spectra = np.fft.rfft(mean, axis=1)
-    forces = [i for i, o in enumerate(response.outputs) if o[:2] in ("Q.", "Y.", "su", "la")]
-    outputs = np.einsum("kcq,qk->ck", whole[:, forces], spectra, optimize=True)
-    rest = np.einsum(
-        "kcp,kpq,kcq->ck", whole[:, forces], covariance, whole[:, forces].conj(), optimize=True
-    ).real
-    own = covariance[:, range(number), range(number)].real.T
-    power = power.T
-    with np.errstate(invalid="ignore"):
-        seen = np.where(power > 0.0, 1.0 - own / np.where(power > 0.0, power, 1.0), 0.0)
-    kept = seen >= SEEN
-    error = np.where(kept, own, power)
-    found = np.where(kept, spectra[:number], 0.0)
-    bands, deviations = {}, {}
-    for name, gain in _gains(k).items():
-        bands[name] = np.fft.irfft(gain * found, points, axis=1)[:, :n]
-        deviations[name] = _rms(gain**2 * error, points)
-    return Estimate(
-        s=piece.grid,
-        speed=piece.speed,
-        values=np.fft.irfft(found, points, axis=1)[:, :n],
-        deviations=_rms(error, points),
-        bands=bands,
-        band_deviations=deviations,
-        wave_numbers=k,
-        seen=seen,
-        power=power,
-        outputs=tuple(response.outputs[i] for i in forces),
-        forces=np.fft.irfft(outputs, points, axis=1)[:, :n] + response.steady[forces][:, None],
-        force_deviations=_rms(rest, points),
-    )
+    def _refined(
+        self,
+        piece: Piece,
+        run: SimulatedRun,
+        powers: Powers,
+        sizes: Sizes,
+        forces: Complex,
+        mean: Floats,
+        there: Bools,
+    ) -> tuple[Fields, Floats, Floats] | None:
+        """Fields about the simulated run that agrees with the measured one.
 
+        Returns
+        -------
+        Fields, float64[field, points], float64[force, n], or None
+            With the sizes of errors that are left; their mean; what the forces have beyond the
+            linear ones.  None where the first simulated run was not complete.
+        """
+        n, points, count = len(piece.grid), powers.points, len(QUANTITIES)
+        H = powers.response[:, :, :count]
+        gain = powers.fields(replace(sizes, contact=np.full(len(KINDS), REMAINDER))).gain(count)
+        found = refined(
+            run,
+            lambda data: _applied(gain, data),
+            lambda r: _applied(H, r),
+            (piece.signals, there),
+            (mean[:count], rms(powers.track.T, points)),
+            self.simulations,
+        )
+        place = f"s = {piece.grid[0]:.0f} to {piece.grid[-1]:.0f} m"
+        if isinstance(found, str):
+            self.said.append(
+                f"{place}: the run simulated on the linear estimate is {found}. The linear "
+                "estimate is given."
+            )
+            return None
+        if found.change > CHANGE:
+            self.said.append(
+                f"{place}: after {self.simulations} simulated runs the irregularities still change "
+                f"by {found.change:.2g} of what is assumed for them ({CHANGE:g} asked)."
+            )
+        sizes = likely_sizes(powers, spectra_of(found.data[:, :n], there, points))
+        fields = powers.fields(sizes)
+        mean = _applied(fields.gain(fields.power.shape[1]), found.data)
+        base = found.reading.forces - _applied(forces[:, :, :count], found.fields)[:, :n]
+        return fields, mean, base
 
-def _means(x: Floats, there: Bools) -> Floats:
-    count = np.maximum(there.sum(axis=1), 1)
-    return np.asarray((np.where(there, x, 0.0).sum(axis=1) / count)[:, None])
+    def _there(self, powers: Powers, piece: Piece, read: Floats) -> Bools:
+        """Where the channels say something; the first piece tells which of them are wrong."""
+        if self._wrong is None:
+            level = level_of(powers, spectra_of(read, piece.there, powers.points))
+            if not 1.0 / LEVEL < level < LEVEL:
+                found = f"{level:.3g} times what the vehicle reads on '{self.assumed.spectrum}'"
+                allowed = f"1/{LEVEL:g} to {LEVEL:g} times; the 'unit' of all channels, or 'scale'?"
+                raise InputError([Fault(self.name, "channels", found, allowed)])
+            self._wrong, said = disagreeing(powers, piece, read, self.channels)
+            self.said += said
+        there = piece.there.copy()
+        there[list(self._wrong)] = False
+        return there
 
 
 def _flanges(linear: LinearVehicle, track: Track) -> Floats:
@@ -466,21 +369,7 @@ def _flanges(linear: LinearVehicle, track: Track) -> Floats:
     return np.array(found)
 
 
-def _wave_numbers(points: int) -> Floats:
-    return np.asarray(2.0 * np.pi * np.fft.rfftfreq(points, STEP), dtype=np.float64)
-
-
-def _gains(k: Floats) -> dict[str, Floats]:
-    """Magnitude of the band passes over the wave number, see `recording.band_passed`."""
-    found = {}
-    with np.errstate(divide="ignore"):
-        for name, (shortest, longest) in BANDS.items():
-            f = k / (2.0 * np.pi)
-            below = np.where(f > 0.0, 1.0 / longest / f, np.inf) ** (2 * ORDER)
-            found[name] = 1.0 / np.sqrt((1.0 + below) * (1.0 + (f * shortest) ** (2 * ORDER)))
-    return found
-
-
-def _rms(power: Floats, points: int) -> Floats:
-    """Root of the variance of two-sided powers of the bins of `rfft`."""
-    return np.asarray(np.sqrt((2.0 * power.sum(axis=1) - power[:, 0] - power[:, -1]) / points))
+def _applied(matrix: Complex, values: Floats) -> Floats:
+    """complex128[k, row, column] on float64[column, points]."""
+    spectra = np.einsum("krc,ck->rk", matrix, np.fft.rfft(values, axis=1), optimize=True)
+    return np.asarray(np.fft.irfft(spectra, values.shape[1], axis=1))

@@ -64,6 +64,13 @@ class Fields:
             np.linalg.solve(one + self.power[:, :, None] * seen, self.power[:, :, None] * one)
         )
 
+    def gain(self, fields: int) -> Complex:
+        """P H* G^-1 of (1) for the first fields, complex128[bin, field, channel]."""
+        return np.asarray(np.einsum(
+            "kp,kcp,kcd->kpd", self.power[:, :fields], self.response[:, :, :fields].conj(),
+            self._inverse(), optimize=True,
+        ))  # fmt: skip
+
     def mean(self, data: Floats, there: Bools | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].
 

@@ -5,7 +5,9 @@ attribute ``remarks`` holds them, one a line; tables, summaries and comparisons 
 remark is added here, from what the run has counted, or to `Run.remarks` while it is computed.
 """
 
-from collections.abc import Mapping, Sequence
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,18 @@ ALTERNATES = 0.005, 0.02
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
 YAW_MAX = TableGrid().yaw_max
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Do not report the remarks of runs within the block: those of variants."""
+    log = logging.getLogger("railsim")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:

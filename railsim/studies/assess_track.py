@@ -22,7 +22,6 @@ from scipy.ndimage import uniform_filter1d
 
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
-from railsim.definitions.excitations.recording import BANDS, band_passed
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
 from railsim.definitions.settings import Settings
@@ -33,32 +32,22 @@ from railsim.files.access import check_folder, whole_file
 from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out
 from railsim.studies.case import Case, short_name
+from railsim.studies.geometry_limits import CELL, SECTION, Flags, RecordedGeometry
 from railsim.studies.plan import name_faults
 from railsim.studies.points import Point
 from railsim.studies.records import Record
 from railsim.studies.spec import Execution, RunSpec, StudySpec
 from railsim.table import Column, Table
-from railsim.track.irregularity import displacement
 
 Floats = NDArray[np.float64]
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
-CELL, SECTION, APART = 25.0, 200.0, 25.0  # m
+APART = 25.0  # m
 RATE, LOW_PASS, SLIDING = 100.0, 20.0, 2.0  # 1/s, Hz, m
-STEP, AROUND = 0.25, 15.0  # m
 QUANTITIES = {
     "Q": "Q", "Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "acceleration of the floor, y",
     "body_z": "acceleration of the floor, z",
 }  # fmt: skip
-# EN 13848-5: speed up to [km/h]; alert limit (least) of the standard deviations of level and of
-# alignment, intervention limit (least) of isolated defects of both, D1 [mm].  From memory.
-GEOMETRY = (
-    (80.0, 2.3, 1.5, 17.0, 15.0),
-    (120.0, 1.8, 1.2, 13.0, 11.0),
-    (160.0, 1.4, 1.0, 10.0, 8.0),
-    (230.0, 1.2, 0.8, 9.0, 7.0),
-    (300.0, 1.0, 0.7, 8.0, 6.0),
-)
 UNCHECKED = "The limits of EN 13848-5 are from memory, not compared with the printed standard."
 
 
@@ -107,12 +96,12 @@ class TrackAssessment:
     cells : float64[c]
         Begins of the cells [m].
     shares : dict of (str, float, str) to float64[c]
-        Largest share of the limit per cell, by vehicle, speed and quantity.
+        Largest share of the limit per cell, by vehicle, speed and quantity; NaN where no run came.
     sections : Table
         What vehicles and geometry say of each section of 200 m.
-    flagged : int64[4]
+    flagged : int64[5]
         Number of sections that both, only vehicles (misses), only the geometry (false alarms) and
-        none complain of.
+        none complain of, and of those that some vehicle did not run over.
     computed : int
         Runs that were computed by this call.
     remarks : tuple of str
@@ -142,22 +131,23 @@ class TrackAssessment:
     @property
     def notes(self) -> tuple[str, ...]:
         """Misses and false alarms in words."""
-        both, missed, false, none = self.flagged.tolist()
+        both, missed, false, none, left = self.flagged.tolist()
+        not_run = f" {left} sections some vehicle did not run over." if left else ""
         return (
             f"Of {both + missed + false + none} sections of {SECTION:g} m vehicles and geometry "
             f"both flag {both}, only the vehicles {missed} (missed by geometry limits), only "
-            f"geometry limits {false} (false alarms).",
+            f"geometry limits {false} (false alarms).{not_run}",
             UNCHECKED,
             *self.remarks,
         )
 
     def record(self) -> dict[str, Any]:
         """Return the assessment as plain data, SI."""
-        both, missed, false, none = self.flagged.tolist()
+        names = ("both", "missed", "false_alarms", "none", "not_run")
         return {
             "share": self.share, "places": self.table().records(),
             "sections": self.sections.records(),
-            "flagged": {"both": both, "missed": missed, "false_alarms": false, "none": none},
+            "flagged": dict(zip(names, self.flagged.tolist(), strict=True)),
             "remarks": [UNCHECKED, *self.remarks],
         }  # fmt: skip
 
@@ -354,7 +344,7 @@ def _judged(
 ) -> TrackAssessment:
     begin, end = _extent(track)
     cells = np.arange(begin, end, CELL)
-    geometry = _Geometry(track, begin, end)
+    geometry = RecordedGeometry(track, begin, end)
     shares: dict[tuple[str, float, str], Floats] = {}
     places: list[Place] = []
     for case in cases:
@@ -369,15 +359,20 @@ def _judged(
             if not inside.any():
                 continue
             s, part = s[inside], value[inside] / limit
-            row = shares.setdefault((name, case.speed, quantity), np.zeros(len(cells)))
-            np.maximum.at(row, np.minimum(((s - begin) / CELL).astype(int), len(cells) - 1), part)
+            row = shares.setdefault((name, case.speed, quantity), np.full(len(cells), np.nan))
+            np.fmax.at(row, np.minimum(((s - begin) / CELL).astype(int), len(cells) - 1), part)
             for k in _peaks(s, part, share):
                 places.append(
                     Place(name, case.speed, quantity, where, float(s[k]), float(part[k] * limit),
                           limit, geometry.shape(float(s[k])))
                 )  # fmt: skip
     places = _strongest(places)
-    sections, flagged = geometry.sections(places, max(case.speed for case in cases))
+    asked = len({(c.labels["vehicle"], c.speed) for c in cases}) * len(QUANTITIES)
+    rows = (
+        np.array([*shares.values()]) if len(shares) == asked else np.full((1, len(cells)), np.nan)
+    )
+    flags = Flags(np.any(rows > share, axis=0), np.isnan(rows).any(axis=0))
+    sections, flagged = geometry.sections(flags, max(case.speed for case in cases))
     return TrackAssessment(
         folder, share, tuple(places), cells, shares, sections, flagged, computed, tuple(remarks)
     )
@@ -438,60 +433,3 @@ def _strongest(places: Sequence[Place]) -> list[Place]:
             others.append(place.s)
             kept.append(place)
     return kept
-
-
-class _Geometry:
-    """Alignment, level and cross level in D1 along a recording, and what their limits say."""
-
-    def __init__(self, track: Track, begin: float, end: float) -> None:
-        function = displacement(track)
-        assert function is not None  # it has a recording
-        self.s = np.arange(begin, end, STEP)
-        parts = np.array_split(self.s, max(1, len(self.s) // 50_000))
-        rails = np.concatenate([np.asarray(function(p)[0]) for p in parts], axis=1)
-        self.rails = band_passed(rails, STEP, BANDS["D1"])
-        y_l, z_l, y_r, z_r = self.rails
-        self.kinds = {"level": 0.5 * (z_l + z_r), "alignment": 0.5 * (y_l + y_r),
-                      "cross level": z_r - z_l}  # fmt: skip
-        self.spread = {name: float(np.std(x)) or 1.0 for name, x in self.kinds.items()}
-
-    def shape(self, s: float) -> str:
-        """Words for the defect at a place: quantity, size, length over which it has one sign."""
-        near = np.flatnonzero(np.abs(self.s - s) <= AROUND)
-        sizes = {n: np.max(np.abs(x[near])) / self.spread[n] for n, x in self.kinds.items()}
-        name = max(sizes, key=lambda n: sizes[n])
-        x = self.kinds[name]
-        k = int(near[np.argmax(np.abs(x[near]))])
-        same = np.sign(x) == np.sign(x[k])
-        low, high = k, k
-        while low > 0 and same[low - 1]:
-            low -= 1
-        while high < len(x) - 1 and same[high + 1]:
-            high += 1
-        crossings = np.count_nonzero(np.diff(np.sign(x[near])))
-        repeated = ", repeated" if crossings >= 6 and sizes[name] < 4.0 else ""
-        length = STEP * (high - low + 1)
-        return f"{name} {1e3 * x[k]:+.1f} mm over {length:.1f} m{repeated}"
-
-    def sections(self, places: Sequence[Place], speed: float) -> tuple[Table, NDArray[np.int64]]:
-        """Return the table of sections, and how many each of both flags."""
-        row = next((row for row in GEOMETRY if 3.6 * speed <= row[0] + 1e-3), GEOMETRY[-1])
-        columns: list[Column | str] = [
-                   Column("begin", unit="m", format=".0f"), Column("end", unit="m", format=".0f"),
-                   Column("level", "standard deviation of level D1", "mm", ".2f"),
-                   Column("alignment", "standard deviation of alignment D1", "mm", ".2f"),
-                   Column("level_peak", "largest level D1", "mm", ".1f"),
-                   Column("alignment_peak", "largest alignment D1", "mm", ".1f"),
-                   "geometry", "vehicles"]  # fmt: skip
-        rows, flagged = [], np.zeros(4, dtype=np.int64)
-        for begin in np.arange(self.s[0], self.s[-1] - 0.5 * SECTION, SECTION):
-            there = self.rails[:, (self.s >= begin) & (self.s < begin + SECTION)]
-            deviations, peaks = there.std(axis=1), np.abs(there).max(axis=1)
-            values = [max(deviations[1], deviations[3]), max(deviations[0], deviations[2]),
-                      max(peaks[1], peaks[3]), max(peaks[0], peaks[2])]  # fmt: skip
-            by_geometry = any(1e3 * v > m for v, m in zip(values, row[1:], strict=True))
-            by_vehicles = any(begin <= p.s < begin + SECTION for p in places)
-            flagged[(0 if by_geometry else 1) if by_vehicles else (2 if by_geometry else 3)] += 1
-            words = ["flagged" if one else "" for one in (by_geometry, by_vehicles)]
-            rows.append([float(begin), float(begin + SECTION), *map(float, values), *words])
-        return Table(columns, rows), flagged

@@ -6,6 +6,7 @@ no files behind; a process that does not respond, because it is compiling, is te
 moment.  Processes whose study has ended terminate by themselves.
 """
 
+import logging
 import math
 import multiprocessing
 import os
@@ -227,7 +228,8 @@ class _Pool:
         self._processes: set[BaseProcess] = set()
         self._index_of: dict[Future[list[Record]], int] = {}
         shared = self._fractions, self._holders, self._stop
-        self._pool = ProcessPoolExecutor(min(workers, len(indices)), context, _begin, shared)
+        begun = (*shared, bool(logging.getLogger("railsim").handlers))
+        self._pool = ProcessPoolExecutor(min(workers, len(indices)), context, _begin, begun)
         self.lost: set[int] = set()
 
     def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
@@ -411,9 +413,11 @@ def _outcome(future: Future[list[Record]], batch: Batch) -> list[Record]:
 _shared: Any = None
 
 
-def _begin(fractions: Any, holders: Any, stop: Any) -> None:
+def _begin(fractions: Any, holders: Any, stop: Any, handled: bool) -> None:
     global _shared
     _shared = fractions, holders, stop
+    if handled:  # remarks on runs are in their records; here nobody else would hold them back
+        logging.getLogger("railsim").addHandler(logging.NullHandler())
     hear_requests()
     threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
 

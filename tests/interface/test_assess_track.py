@@ -9,6 +9,7 @@ import railsim
 from railsim.cli import main
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
+from railsim.studies.geometry_limits import Flags, RecordedGeometry
 from railsim.track.irregularity import displacement
 
 LENGTH, SPEED, DEFECT = 1000.0, 40.0, 640.0
@@ -90,6 +91,9 @@ def test_command(judged, recording, capsys, monkeypatch):
     data = json.loads(capsys.readouterr().out)
     assert data["places"][0]["shape"].startswith("alignment")
     assert (judged[2] / "heat_strip.png").is_file()
+    page = (judged[2] / "report.html").read_text(encoding="utf-8")
+    assert "alignment" in page
+    assert "false alarms" in page
     assert "missed" in data["flagged"]
 
 
@@ -103,3 +107,29 @@ def test_wrong_input(recording, tmp_path, capsys):
     assert "no recording" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
     assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
+
+
+def test_sections_are_counted_by_hand():
+    """Five sections: a dip of 20 mm in the first, vehicles flag the first, second and fifth.
+
+    The fourth some vehicle did not run over; the last one takes the 60 m that are left.  A stretch
+    that is exceeded over many cells flags every section that it reaches.
+    """
+    s = np.arange(0.0, 1060.0, 0.25)
+    dip = -10e-3 * (1.0 + np.cos(2.0 * np.pi * np.clip((s - 100.0) / 10.0, -0.5, 0.5)))
+    rows = np.c_[s, 0 * s, dip, 0 * s, dip].tolist()
+    track = railsim.load_track("straight").replace(
+        plan=[{"type": "STR", "length": 1060.0}],
+        cant=[{"type": "CST", "length": 1060.0, "cant": 0.0}],
+        irregularities=[{"type": "measured", "rows": rows, "fade": 0.0}],
+    )
+    exceeded = np.zeros(43, dtype=bool)
+    exceeded[3:12] = exceeded[42] = True  # 75 to 300 m, 1050 to 1060 m
+    unknown = np.zeros(43, dtype=bool)
+    unknown[25] = True  # 625 to 650 m
+    table, flagged = RecordedGeometry(track, 0.0, 1060.0).sections(Flags(exceeded, unknown), 40.0)
+    assert flagged.tolist() == [1, 2, 0, 1, 1]
+    records = table.records()
+    assert [r["vehicles"] for r in records] == ["flagged", "flagged", "", "not run", "flagged"]
+    assert [r["geometry"] for r in records] == ["flagged", "", "", "", ""]
+    assert records[-1]["end"] == pytest.approx(1060.0)

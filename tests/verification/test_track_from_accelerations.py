@@ -159,7 +159,7 @@ def test_both_wheelsets_cancel_in_the_middle_of_the_frame():
 @pytest.fixture(scope="module")
 def short(coach):
     result, track, measurement = twin(coach, 700.0, V, points=("axlebox",))
-    return result, track, measurement, irregularity(measurement, coach, track)
+    return result, track, measurement, irregularity(measurement, coach, track, simulations=0)
 
 
 def test_level_cross_level_and_wheel_forces_of_a_twin(short):
@@ -215,7 +215,7 @@ def test_gaps_signs_and_units(short, coach):
     )
     channels["axlebox_2_right_z"] = -channels["axlebox_2_right_z"]
     channels["axlebox_4_left_z"] = 1e-3 * channels["axlebox_4_left_z"]
-    found = irregularity(replace(measurement, channels=channels), coach, track)
+    found = irregularity(replace(measurement, channels=channels), coach, track, simulations=0)
     said = "\n".join(found.remarks)
     assert "axlebox_2_right_z has the opposite sign" in said
     assert "axlebox_4_left_z is 0.001 times" in said
@@ -253,7 +253,8 @@ def test_command(short, coach, tmp_path, capsys, monkeypatch):
     (tmp_path / "run.toml").write_text("\n".join([*head, *lines]))
     assert main(["irregularity", "run.toml", "--out", "found"]) == 2
     assert "--vehicle" in capsys.readouterr().err
-    assert main(["irregularity", "run.toml", "--vehicle", COACH, "--out", "found", "--quiet"]) == 0
+    arguments = ["irregularity", "run.toml", "--vehicle", COACH, "--out", "found", "--quiet"]
+    assert main([*arguments, "--simulations", "0"]) == 0
     assert "cross level" in capsys.readouterr().out
     assert {p.name for p in (tmp_path / "found").iterdir()} == {
         "irregularity.json", "irregularity.png", "recording.csv", "track.toml", "estimates.csv",
@@ -261,38 +262,43 @@ def test_command(short, coach, tmp_path, capsys, monkeypatch):
     }  # fmt: skip
 
 
+def test_channels_in_another_unit_altogether(short, coach):
+    """All a thousand times too large: nothing disagrees, and yet it is no track."""
+    _, track, measurement, _ = short
+    channels = {name: 1e3 * x for name, x in measurement.channels.items()}
+    with pytest.raises(InputError, match="unit"):
+        irregularity(replace(measurement, channels=channels), coach, track)
+
+
 @pytest.mark.further
 @pytest.mark.parametrize("speed", [20.0, 30.0, 45.0, 60.0])
 def test_twins_over_speed(coach, speed):
-    """Errors, and intervals that cover 90 to 98 %, pooled along the track."""
-    result, track, measurement = twin(coach, 2000.0, speed, seed=21)
-    found = irregularity(measurement, coach, track)
+    """What is asked for, and intervals that cover 90 to 98 %, pooled along the track."""
+    result, track, measurement = twin(coach, 1500.0, speed, seed=21)
+    found = irregularity(measurement, coach, track.replace(irregularities=[]))
     by = errors(found, track, 100.0)
     assert rms(by["level", "D1"][1]) < 0.15e-3
-    assert rms(by["alignment", "D1"][1]) < 0.55e-3
+    assert rms(by["alignment", "D1"][1]) < 0.30e-3
     for name in ("level", "alignment", "cross_level"):
         assert rms(by[name, "D2"][1]) < 1e-3
     true, error, _ = force_errors(found, result, "Q.", "Q", 100.0)
     assert rms(error) < 0.02 * true.mean()
     true, error, _ = force_errors(found, result, "sum_Y", "sum_Y", 100.0)
-    assert rms(error) < 0.25 * true.std()
+    assert rms(error) < 0.10 * true.std()
     inside = [np.abs(e) < 1.96 * sd for (_, e, sd) in by.values()]
     assert 0.90 < np.mean(inside) < 0.99
 
 
 @pytest.mark.further
 def test_vehicle_that_is_another_one(coach):
-    """Mass 10 % and stiffness 20 % off: alignment less than twice as bad, level as good as asked.
-
-    The level grows by more than that, from 0.02 mm in D2: the floor follows another spring.
-    """
+    """Mass 10 % and stiffness 20 % off: less than twice as bad, or far inside of what is asked."""
     _, track, measurement = twin(coach, 1500.0, 40.0)
-    right = errors(irregularity(measurement, coach, track), track)
+    bare = track.replace(irregularities=[])
+    right = errors(irregularity(measurement, coach, bare, simulations=0), track)
     values = {"carbody.mass": 38600.0 * 1.1, "secondary_spring.stiffness.z": 370e3 * 1.2,
               "coil_spring.stiffness.z": 991e3 * 0.8}  # fmt: skip
-    wrong = errors(irregularity(measurement, coach.with_values(values), track), track)
-    for band in BANDS:
-        there = "alignment", band
-        assert rms(wrong[there][1]) < 2.0 * rms(right[there][1])
-    assert rms(wrong["level", "D1"][1]) < 0.15e-3
-    assert rms(wrong["level", "D2"][1]) < 0.3e-3
+    other = coach.with_values(values)
+    wrong = errors(irregularity(measurement, other, bare, simulations=0), track)
+    for name in ("alignment", "level", "cross_level"):
+        for band in BANDS:
+            assert rms(wrong[name, band][1]) < 2.0 * rms(right[name, band][1])

@@ -1,0 +1,124 @@
+"""Parts of a run whose speed is nearly constant, and their signals over arc length."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import Fault, InputError, nearest
+from railsim.measurement import Measurement
+from railsim.observation.grid import HALF, on_grid
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+STEP = 0.25  # m
+LONGEST, OVERLAP, SHORTEST = 2000.0, 200.0, 300.0  # of pieces [m]
+SPEEDS = 0.06  # largest over smallest speed of a piece, less 1
+MARGIN = 20.0  # at both ends of a record [m]
+SLOWEST = 5.0  # m/s
+AROUND_GAP = 8  # steps beside a gap that are left out
+READ = ("sensor_acceleration", "sensor_roll_rate")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Part of a run at a nearly constant speed.
+
+    Attributes
+    ----------
+    grid : float64[n]
+        Arc length of the reference body, equal steps [m].
+    signals, there : float64[channel, n], bool[channel, n]
+        What the channels read, and where they do.
+    speeds : float64[n]
+        [m/s].
+    rate : float
+        Values of the record per second [1/s].
+    """
+
+    grid: Floats
+    signals: Floats
+    there: Bools
+    speeds: Floats
+    rate: float
+
+    @property
+    def speed(self) -> float:
+        """Mean speed, three digits [m/s]."""
+        return float(f"{np.mean(self.speeds):.3g}")
+
+
+def used_channels(measurement: Measurement, known: dict[str, Any]) -> dict[str, str]:
+    """Outputs of the linear vehicle by channel: ``axlebox_1_left.z``."""
+    used, faults = {}, []
+    for name, quantity in measurement.quantities.items():
+        kind, *labels = quantity.split(":")
+        if kind not in READ:
+            continue
+        if labels[0] not in known:
+            found = f"the vehicle has no sensor '{labels[0]}'"
+            key = f"channels.{name}.quantity"
+            faults.append(Fault(measurement.name, key, found, nearest(labels[0], known)))
+            continue
+        used[name] = f"{labels[0]}.{labels[1] if len(labels) > 1 else 'roll_rate'}"
+    if not used and not faults:
+        allowed = "sensor_acceleration:axlebox_1_left:z and others of axleboxes, frames and floor"
+        faults.append(Fault(measurement.name, "channels", "no accelerations", allowed))
+    if faults:
+        raise InputError(faults)
+    return used
+
+
+def pieces_of(measurement: Measurement, names: list[str]) -> list[Piece]:
+    """Divide a run where its speed changes."""
+    s, v = measurement.distance, measurement.speed
+    fault = None
+    if s[-1] - s[0] < SHORTEST + 2.0 * MARGIN:
+        fault = Fault(
+            measurement.name, "distance", f"{s[-1] - s[0]:.0f} m", f"{SHORTEST:g} m at least"
+        )
+    elif v.min() < SLOWEST:
+        fault = Fault(measurement.name, "speed", f"{v.min():.3g} m/s", f"{SLOWEST:g} m/s at least")
+    if fault:
+        raise InputError([fault])
+    pieces, begin = [], float(s[0]) + MARGIN
+    last = float(s[-1]) - MARGIN
+    while True:
+        inside = (s >= begin) & (s <= min(begin + LONGEST, last))
+        speeds = v[inside]
+        spread = np.maximum.accumulate(speeds) / np.minimum.accumulate(speeds) - 1.0
+        count = int(np.searchsorted(spread, SPEEDS))
+        end = float(s[inside][min(count, len(speeds)) - 1])
+        end = min(max(end, begin + SHORTEST), last)
+        if last - end < SHORTEST - OVERLAP:
+            end = last
+        pieces.append(_piece(measurement, names, begin, end))
+        if end >= last:
+            return pieces
+        begin = end - OVERLAP
+
+
+def _piece(measurement: Measurement, names: list[str], begin: float, end: float) -> Piece:
+    reach = HALF * STEP + 1.0
+    part = measurement.part(begin - reach, end + reach)
+    grid: Floats = begin + STEP * np.arange(int((end - begin) / STEP) + 1, dtype=np.float64)
+    signals, there = [], []
+    for name in names:
+        x = part[name]
+        unknown = np.isnan(x)
+        lost = np.zeros(len(grid), dtype=bool)
+        if unknown.all():
+            signals.append(np.zeros(len(grid)))
+            there.append(lost)
+            continue
+        if unknown.any():
+            x = np.interp(part.distance, part.distance[~unknown], x[~unknown])
+            near = np.searchsorted(grid, part.distance[unknown])
+            lost[np.clip(near, 0, len(grid) - 1)] = True
+            lost = np.convolve(lost, np.ones(2 * AROUND_GAP + 1), mode="same") > 0
+        signals.append(on_grid(part.distance, x, grid))
+        there.append(~lost)
+    speeds = np.interp(grid, part.distance, part.speed)
+    return Piece(grid, np.array(signals), np.array(there), speeds, measurement.rate)

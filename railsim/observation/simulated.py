@@ -1,0 +1,232 @@
+"""A measured run simulated on estimated irregularities, and the estimate put right by it.
+
+A wheelset that moves by millimetres meets a contact that is another one at every place; a smoother
+with one linear contact says little of the alignment there.  With h(r) what channels read in a
+simulated run over the irregularities r, H the linear response and K the gain of the smoother,
+
+    r = K (y - h(r) + H r),                                                                 (1)
+
+the linear estimate has r = 0 on the right.  At a solution of (1) the simulated run reads what was
+measured, up to what the errors leave; for a linear vehicle it is the linear estimate.  The steps of
+(1) do not converge by themselves where the contact is steeper than its mean; mixed with the steps
+before, such that the mixture of the residuals is least (Anderson 1965; Walker and Ni 2011), they
+do.  Values that do not exist are those of H r.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.settings import Drive, Settings
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import is_straight_and_level
+from railsim.definitions.vehicle.definition import Vehicle
+from railsim.linear.track_response import RAILS
+from railsim.observation.grid import on_grid
+from railsim.observation.pieces import STEP, Piece
+from railsim.result import Result
+from railsim.simulation.remarks import silent
+from railsim.simulation.run import simulate
+
+Floats = NDArray[np.float64]
+
+OUTPUTS: Any = {"quantities": ["Q", "Y", "sum_Y", "wheelset_lateral"], "sensors": "readings"}
+LEAD, AFTER = 100.0, 30.0  # of a piece that is simulated [m]
+RATE = 1000.0  # 1/s
+KEPT = 25  # steps that are mixed
+SHARE = 0.5  # of the residual that is added to the mixture
+CHANGE = 0.02  # of the irregularities, over the standard deviation assumed: converged
+STEADY = 0.01  # change of a speed that counts as none, over its mean
+OVERSAMPLED = 3.0  # simulated values for a step of the grid, where the speed varies
+SPEED_ROWS = 20  # steps of the grid between two rows of the speed
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a simulated run says on the grid of a piece: channels and forces."""
+
+    channels: Floats
+    forces: Floats
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Irregularities that a simulated run agrees with.
+
+    Attributes
+    ----------
+    fields : float64[quantity, points]
+    reading : Reading
+        Of the run over them.
+    data : float64[channel, points]
+        y - h(r) + H r.
+    change : float
+        rms of what is left of (1), over the standard deviation assumed, the largest quantity.
+    """
+
+    fields: Floats
+    reading: Reading
+    data: Floats
+    change: float
+
+
+class SimulatedRun:
+    """A vehicle that runs over irregularities as it did in a piece of a measured run.
+
+    Parameters
+    ----------
+    vehicle, track : Vehicle, Track
+        The track with its plan, without irregularities.
+    piece : Piece
+    outputs : sequence of str
+        Readings, such as ``axlebox_1_left.z``.
+    forces : sequence of str
+        Such as ``Q.1.left``, ``sum_Y.1``.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, track: Track, piece: Piece, outputs: list[str], forces: list[str]
+    ) -> None:
+        self.vehicle, self.piece, self.outputs, self.forces = vehicle, piece, outputs, forces
+        s = piece.grid
+        # straight track is the same everywhere: the run begins at its beginning
+        self._straight = is_straight_and_level(track)
+        self._moved = float(s[0]) - LEAD if self._straight else 0.0
+        self._track = track
+        self._start = max(0.0, float(s[0]) - LEAD - self._moved)
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether nothing but irregularities is read: straight and level, at a constant speed."""
+        speeds = self.piece.speeds
+        return self._straight and float(np.ptp(speeds)) < STEADY * float(np.mean(speeds))
+
+    def __call__(self, fields: Floats) -> Reading | str:
+        """Return what is read over irregularities at the grid, or why the run ended before.
+
+        Parameters
+        ----------
+        fields : float64[quantity, n]
+            [m].
+        """
+        s = self.piece.grid - self._moved
+        before = np.arange(self._start, s[0] - 0.5 * STEP, STEP)
+        after = s[-1] + np.arange(STEP, AFTER, STEP)
+        rails = RAILS.T @ fields
+        first = np.outer(rails[:, 0], np.linspace(0.0, 1.0, len(before), endpoint=False))
+        last = np.outer(rails[:, -1], np.linspace(1.0, 0.0, len(after)))
+        rows = np.column_stack(
+            [np.concatenate([before, s, after]), np.hstack([first, rails, last]).T]
+        )
+        irregularity = {"type": "measured", "rows": rows.tolist(), "fade": 0.0}
+        changes: dict[str, Any] = {"irregularities": [irregularity]}
+        end = float(s[-1]) + 0.5 * AFTER
+        if self._straight:
+            changes["plan"] = [{"type": "STR", "length": end + AFTER}]
+            changes["cant"] = [{"type": "CST", "length": end + AFTER, "cant": 0.0}]
+        with silent():
+            result = simulate(
+                self.vehicle,
+                self._track.replace(**changes),
+                speed=float(np.mean(self.piece.speeds)) if self.is_steady else None,
+                start=self._start,
+                until=end,
+                settings=self._settings(s),
+            )
+        if result.status != "complete":
+            return f"{result.status}: {result.status_reason}"
+        return Reading(*(self._read(result, names) for names in (self.outputs, self.forces)))
+
+    def _settings(self, s: Floats) -> Settings:
+        if self.is_steady:
+            return Settings(output_rate=RATE, outputs=OUTPUTS)
+        # a run whose speed varies hands over every value by itself: not more than are needed
+        rate = min(RATE, OVERSAMPLED * float(self.piece.speeds.max()) / STEP)
+        table = np.column_stack([s, self.piece.speeds])[::SPEED_ROWS].tolist()
+        drive = Drive(mode="table", speed_table=table)
+        return Settings(output_rate=rate, outputs=OUTPUTS, drive=drive)
+
+    def _read(self, result: Result, names: list[str]) -> Floats:
+        s = result["distance"] + self._moved
+        return np.array([on_grid(s, _series(result, name), self.piece.grid) for name in names])
+
+
+def _series(result: Result, name: str) -> Floats:
+    """A reading or force by its name among the outputs of the linear vehicle."""
+    kind, *labels = name.split(".")
+    if kind in ("Q", "Y"):
+        return np.asarray(result[kind][:, int(labels[0]) - 1, int(labels[1] == "right")])
+    if kind in ("sum_Y", "lateral"):
+        quantity = "wheelset_lateral" if kind == "lateral" else kind
+        return np.asarray(result[quantity][:, int(labels[0]) - 1])
+    if labels[0] == "roll_rate":
+        return np.asarray(result.series("sensor_roll_rate", sensor=kind))
+    return np.asarray(result.series("sensor_acceleration", sensor=kind, axis=labels[0]))
+
+
+def refined(
+    run: Callable[[Floats], Reading | str],
+    gain: Callable[[Floats], Floats],
+    seen: Callable[[Floats], Floats],
+    data: tuple[Floats, NDArray[np.bool_]],
+    first: tuple[Floats, Floats],
+    most: int,
+) -> Refined | str:
+    """Solve (1), starting from the linear estimate.
+
+    Parameters
+    ----------
+    run : callable
+        float64[quantity, n] to what is read, n points of the grid.
+    gain, seen : callable
+        K and H: float64[channel, points] to float64[quantity, points] and back.
+    data : float64[channel, n], bool[channel, n]
+        y, and where it exists.  A constant in it is the channel's, not the track's.
+    first, deviations : float64[quantity, points], float64[quantity]
+        Irregularities to begin with, and what they are measured with [m].
+    most : int
+        Number of runs.
+
+    Returns
+    -------
+    Refined or str
+        The best step; why the first run was not complete.
+    """
+    y, there = data
+    r, deviations = first
+    scale = np.where(deviations > 0.0, deviations, np.inf)[:, None]
+    n = y.shape[1]
+    tried: list[Floats] = []
+    residuals: list[Floats] = []
+    best: Refined | str = "not there"
+    for _ in range(most):
+        reading = run(r[:, :n])
+        if isinstance(reading, str):
+            return reading if isinstance(best, str) else best
+        rest = np.where(there, y - reading.channels, 0.0)
+        count = np.maximum(there.sum(axis=1, keepdims=True), 1)
+        read = np.array(seen(r))
+        read[:, :n] += np.where(there, rest - rest.sum(axis=1, keepdims=True) / count, 0.0)
+        left = (gain(read) - r) / scale
+        change = float(np.sqrt(np.mean(left[:, :n] ** 2, axis=1)).max())
+        if isinstance(best, str) or change < best.change:
+            best = Refined(r, reading, read, change)
+        if change < CHANGE:
+            return best
+        tried, residuals = [*tried, r / scale][-KEPT:], [*residuals, left][-KEPT:]
+        r = np.where(np.isfinite(scale), scale, 0.0) * _mixed(tried, residuals)
+    return best
+
+
+def _mixed(tried: list[Floats], residuals: list[Floats]) -> Floats:
+    """Next step: of the mixture with the least residual, with a share of that residual."""
+    if len(tried) == 1:
+        return tried[0] + SHARE * residuals[0]
+    moved = np.diff(np.reshape(tried, (len(tried), -1)), axis=0).T
+    changed = np.diff(np.reshape(residuals, (len(tried), -1)), axis=0).T
+    weights = np.linalg.lstsq(changed, residuals[-1].ravel(), rcond=1e-8)[0]
+    step = SHARE * residuals[-1].ravel() - (moved + SHARE * changed) @ weights
+    return np.asarray(tried[-1] + step.reshape(tried[-1].shape))

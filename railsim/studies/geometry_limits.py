@@ -1,0 +1,107 @@
+"""What the geometry of a recorded track says by itself: EN 13848-5, and shapes of defects."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.excitations.recording import BANDS, band_passed
+from railsim.definitions.track.definition import Track
+from railsim.table import Column, Table
+from railsim.track.irregularity import displacement
+
+CELL, SECTION = 25.0, 200.0  # m
+STEP, AROUND = 0.25, 15.0  # m
+# EN 13848-5: speed up to [km/h]; alert limit (least) of the standard deviations of level and of
+# alignment, intervention limit (least) of isolated defects of both, D1 [mm].  From memory.
+GEOMETRY = (
+    (80.0, 2.3, 1.5, 17.0, 15.0),
+    (120.0, 1.8, 1.2, 13.0, 11.0),
+    (160.0, 1.4, 1.0, 10.0, 8.0),
+    (230.0, 1.2, 0.8, 9.0, 7.0),
+    (300.0, 1.0, 0.7, 8.0, 6.0),
+)
+
+
+@dataclass(frozen=True)
+class Flags:
+    """Cells in which some vehicle exceeds the share of a limit, and over which some did not run."""
+
+    exceeded: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+
+
+class RecordedGeometry:
+    """Alignment, level and cross level in D1 along a recording, and what their limits say.
+
+    Parameters
+    ----------
+    track : Track
+        With a recording.
+    begin, end : float
+        Part of it [m].
+    """
+
+    def __init__(self, track: Track, begin: float, end: float) -> None:
+        function = displacement(track)
+        assert function is not None  # it has a recording
+        self.s = np.arange(begin, end, STEP)
+        parts = np.array_split(self.s, max(1, len(self.s) // 50_000))
+        rails = np.concatenate([np.asarray(function(p)[0]) for p in parts], axis=1)
+        self.rails = band_passed(rails, STEP, BANDS["D1"])
+        y_l, z_l, y_r, z_r = self.rails
+        self.kinds = {"level": 0.5 * (z_l + z_r), "alignment": 0.5 * (y_l + y_r),
+                      "cross level": z_r - z_l}  # fmt: skip
+        self.spread = {name: float(np.std(x)) or 1.0 for name, x in self.kinds.items()}
+
+    def shape(self, s: float) -> str:
+        """Words for the defect at a place: quantity, size, length over which it has one sign."""
+        near = np.flatnonzero(np.abs(self.s - s) <= AROUND)
+        sizes = {n: np.max(np.abs(x[near])) / self.spread[n] for n, x in self.kinds.items()}
+        name = max(sizes, key=lambda n: sizes[n])
+        x = self.kinds[name]
+        k = int(near[np.argmax(np.abs(x[near]))])
+        same = np.sign(x) == np.sign(x[k])
+        low, high = k, k
+        while low > 0 and same[low - 1]:
+            low -= 1
+        while high < len(x) - 1 and same[high + 1]:
+            high += 1
+        crossings = np.count_nonzero(np.diff(np.sign(x[near])))
+        repeated = ", repeated" if crossings >= 6 and sizes[name] < 4.0 else ""
+        length = STEP * (high - low + 1)
+        return f"{name} {1e3 * x[k]:+.1f} mm over {length:.1f} m{repeated}"
+
+    def sections(self, flags: Flags, speed: float) -> tuple[Table, NDArray[np.int64]]:
+        """Return the table of sections, and how many each of both flags.
+
+        The last section takes what is left, if that is less than half a section.
+        """
+        row = next((row for row in GEOMETRY if 3.6 * speed <= row[0] + 1e-3), GEOMETRY[-1])
+        columns: list[Column | str] = [
+                   Column("begin", unit="m", format=".0f"), Column("end", unit="m", format=".0f"),
+                   Column("level", "standard deviation of level D1", "mm", ".2f"),
+                   Column("alignment", "standard deviation of alignment D1", "mm", ".2f"),
+                   Column("level_peak", "largest level D1", "mm", ".1f"),
+                   Column("alignment_peak", "largest alignment D1", "mm", ".1f"),
+                   "geometry", "vehicles"]  # fmt: skip
+        rows, flagged = [], np.zeros(5, dtype=np.int64)
+        first, last = self.s[0], self.s[-1] + STEP
+        edges = first + SECTION * np.arange(max(1, round((last - first) / SECTION)) + 1)
+        edges[-1] = last
+        cells = first + CELL * np.arange(len(flags.exceeded))
+        for begin, end in pairwise(edges.tolist()):
+            there = self.rails[:, (self.s >= begin) & (self.s < end)]
+            deviations, peaks = there.std(axis=1), np.abs(there).max(axis=1)
+            values = [max(deviations[1], deviations[3]), max(deviations[0], deviations[2]),
+                      max(peaks[1], peaks[3]), max(peaks[0], peaks[2])]  # fmt: skip
+            by_geometry = any(1e3 * v > m for v, m in zip(values, row[1:], strict=True))
+            inside = (cells >= begin - 1e-6) & (cells < end - 1e-6)
+            by_vehicles = bool(flags.exceeded[inside].any())
+            both = (0 if by_geometry else 1) if by_vehicles else (2 if by_geometry else 3)
+            unknown = not by_vehicles and bool(flags.unknown[inside].any())
+            flagged[4 if unknown else both] += 1
+            rows.append([begin, end, *map(float, values), "flagged" if by_geometry else "",
+                         "not run" if unknown else "flagged" if by_vehicles else ""])  # fmt: skip
+        return Table(columns, rows), flagged

@@ -1,0 +1,88 @@
+"""An estimate put right by simulated runs, and sizes of errors that are not known before."""
+
+import numpy as np
+import pytest
+
+from railsim.observation.innovations import Powers, likely_sizes
+from railsim.observation.simulated import CHANGE, Reading, refined
+
+N = 400
+
+
+def smooth(seed=3):
+    """Two fields, made of waves of 20 points and longer."""
+    rng = np.random.default_rng(seed)
+    spectra = np.zeros((2, N // 2 + 1), dtype=complex)
+    spectra[:, 1:20] = rng.normal(size=(2, 19)) + 1j * rng.normal(size=(2, 19))
+    found = np.fft.irfft(spectra, N, axis=1)
+    return found / found.std()
+
+
+def solved(law, most=40):
+    """Channels read law(r); the linear response is r, the gain nearly its inverse."""
+    truth = smooth()
+    y = law(truth)
+    return truth, refined(
+        lambda r: Reading(law(r), np.empty((0, N))),
+        lambda data: data / 1.001,
+        lambda r: r,
+        (y, np.ones(y.shape, dtype=bool)),
+        (y / 1.001, np.ones(2)),
+        most,
+    )  # fmt: skip
+
+
+def test_a_linear_vehicle_keeps_its_linear_estimate():
+    truth, found = solved(lambda r: 1.0 * r)
+    assert found.change < 1e-9
+    assert found.fields == pytest.approx(truth / 1.001)
+
+
+def test_a_steep_law_is_solved_where_simple_steps_diverge():
+    """r + r^3/10 has slopes up to 3.7 at |r| = 3: steps with the gain of r grow there."""
+    truth, found = solved(lambda r: r + 0.1 * r**3)
+    linear = (truth + 0.1 * truth**3) / 1.001
+    simple = linear.copy()
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(20):
+            simple = (truth + 0.1 * truth**3 - 0.1 * simple**3) / 1.001
+    assert not np.abs(simple - truth).max() < 10.0
+    assert found.change < 0.02
+    assert np.std(found.fields - truth) < 3.0 * CHANGE < 0.2 * np.std(linear - truth)
+
+
+def test_a_run_that_ends_early_is_said():
+    found = refined(
+        lambda r: "derailed: wheelset 1", lambda y: y, lambda r: r,
+        (np.zeros((2, N)), np.ones((2, N), dtype=bool)), (np.zeros((2, N)), np.ones(2)), 5,
+    )  # fmt: skip
+    assert found == "derailed: wheelset 1"
+
+
+def test_sizes_of_errors_are_those_of_the_data():
+    """Data drawn with known sizes: found within three standard deviations of such an estimate."""
+    k = np.arange(1.0, 1025.0) / 1024.0
+    channels, wheelsets = 24, 2
+    rng = np.random.default_rng(1)
+    response = rng.normal(size=(len(k), channels, 4 + 4 * wheelsets)) + 0j
+    powers = Powers(
+        points=2 * (len(k) - 1),
+        track=np.tile([1.0, 2.0, 1.5, 0.5], (len(k), 1)),
+        unknown=np.full((len(k), 4 * wheelsets), 0.05),
+        response=response,
+        white=np.full((len(k), channels), 1e-4),
+    )
+    true_model, true_contact = np.tile([0.02, 0.3, 0.05, 0.1, 0.2, 0.08], 4), (0.5, 4.0)
+
+    def drawn(power):
+        return np.sqrt(power / 2.0) * (
+            rng.normal(size=power.shape) + 1j * rng.normal(size=power.shape)
+        )
+
+    kinds = np.tile([true_contact[0], true_contact[1], true_contact[1], true_contact[0]], wheelsets)
+    fields = drawn(np.hstack([powers.track, powers.unknown * kinds]))
+    data = np.einsum("kcf,kf->kc", response, fields)
+    data += drawn(powers.white + true_model**2 * powers.own)
+    found = likely_sizes(powers, np.sqrt(powers.points) * data.T)
+    assert found.model == pytest.approx(true_model, rel=0.3)
+    assert found.contact == pytest.approx(true_contact, rel=0.35)
