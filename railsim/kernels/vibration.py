@@ -42,15 +42,19 @@ def high_pass(h):
 
 
 @compiled(inline=True)
-def note_alternation(row, guiding, fading, s):
+def note_alternation(vibration, w, side, guiding, fading, s):
     """Take up the guiding force of a wheel."""
-    slope = guiding - row[LAST_Y]
-    bend = slope - row[SLOPE]
-    turns = fading * row[TURNS] - (1.0 - fading) * bend * row[BEND]
-    row[LAST_Y], row[SLOPE], row[BEND], row[TURNS] = guiding, slope, bend, turns
-    if turns > row[ALTERNATION]:
-        row[ALTERNATION] = turns
-        row[ALTERNATES_AT] = s
+    slope = guiding - vibration[w, side, LAST_Y]
+    bend = slope - vibration[w, side, SLOPE]
+    product = bend * vibration[w, side, BEND]
+    turns = fading * (vibration[w, side, TURNS] + product) - product
+    vibration[w, side, LAST_Y] = guiding
+    vibration[w, side, SLOPE] = slope
+    vibration[w, side, BEND] = bend
+    vibration[w, side, TURNS] = turns
+    if turns > vibration[w, side, ALTERNATION]:
+        vibration[w, side, ALTERNATION] = turns
+        vibration[w, side, ALTERNATES_AT] = s
 
 
 @compiled(python=False)
@@ -69,7 +73,7 @@ def watch(work, coefficients, h, s):
                 vibration[w, side, Z_1] = -b0 * load
                 vibration[w, side, Z_2] = b0 * load
                 vibration[w, side, LAST_Y] = wheel[w, side, W_Y]
-            note_alternation(vibration[w, side], wheel[w, side, W_Y], fading, s)
+            note_alternation(vibration, w, side, wheel[w, side, W_Y], fading, s)
             value = b0 * load + vibration[w, side, Z_1]
             vibration[w, side, Z_1] = vibration[w, side, Z_2] - 2.0 * b0 * load - a1 * value
             vibration[w, side, Z_2] = b0 * load - a2 * value
