@@ -34,7 +34,7 @@ def striking(system, work, h):
         share in one of them, as far as parts may be as short.
     """
     contact, most, change = system.contact, work.parts[PARTS], work.watch[SHARE]
-    where = np.int64(-1)
+    where = -1
     if most > 0:
         for w in range(contact.body.shape[0]):
             own = work.force_rate[w] * h / contact.load[w]
