@@ -33,6 +33,8 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[growth.py]",
+        "reliability/test_ends.py::test_physical_end_keeps_its_result[standstill]",
         "interface/test_stability_commands.py::test_linear_critical_speed",
         "interface/test_examples.py::"
         "test_example_runs_and_draws_its_picture[16_how_loud_is_this_flat]",

@@ -55,7 +55,7 @@ class Given:
         with faults.caught():
             coach = load_vehicle(vehicle, parts["vehicle"])
         with faults.caught():
-            rails = load_track(track or "straight", parts["track"])
+            rails = load_track("straight" if track is None else track, parts["track"])
         with faults.caught():
             settings = load_settings(self.settings, parts["settings"])
         faults.check()

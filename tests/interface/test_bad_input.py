@@ -39,7 +39,7 @@ IRREGULARITIES = [
     (
         'type="bump"',
         "",
-        "unknown 'type' 'bump'; allowed: dip, kink, measured, random, sweep, twist",
+        "unknown 'type' 'bump'; allowed: dip, kink, law, measured, random, sweep, twist",
     ),
     ("s=3.0", "", "no key 'type'; it tells what the table describes"),
     (DIP.replace("0.003", "3.0"), ".depth", "3.0; must be less than or equal to 0.5"),

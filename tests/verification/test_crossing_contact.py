@@ -187,7 +187,7 @@ def test_constant_sections_are_plain_rail():
     points = {"y": (y - 0.5 * track.gauge - 0.035).tolist(), "z": z.tolist()}
     part = {
         "rail": "right",
-        "contours": [{"s": s, **points} for s in (40.0, 50.0, 60.0)],
+        "contours": [{"s": s, **points} for s in (49.0, 50.0, 50.2, 51.0)],
         "gauge_face": -0.035,
         "begin": 49.9,
         "end": 50.5,

@@ -7,7 +7,8 @@ from railsim.contact.elastic import TableArrays
 from railsim.contact.table import TableGrid, build_contact_table
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
-from railsim.kernels.wheel_contact import WheelOnRail, has_climbed
+from railsim.kernels.table_ends import has_climbed
+from railsim.kernels.wheel_contact import WheelOnRail
 from railsim.profiles import load_profile
 from railsim.simulation import simulate
 

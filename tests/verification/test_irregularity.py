@@ -233,7 +233,7 @@ def test_cross_level_of_a_sweep_is_the_difference_of_heights():
 
 
 def test_every_kind_of_irregularity_has_a_displacement_and_answers():
-    assert len(TYPES) == 6
+    assert len(TYPES) == 7
     for kind in TYPES.values():
         assert not kind.__abstractmethods__
 
