@@ -16,7 +16,7 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import B_CHANGE, B_K, B_K2, B_LEVER, B_RADIUS, B_RATE, B_RISE
-from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT, look_up
+from railsim.kernels.contact_table import A1, B1, D_B1, LOOK_UP_SIZE, N_PATCH, N_WEIGHT, look_up
 from railsim.kernels.system import AHEAD, ARC_LENGTH
 
 BEGIN, END = range(2)  # columns of RailTables.range_row
@@ -26,6 +26,7 @@ NODES = 4  # of a cubic
 NODE_WEIGHTS = 2 * NODES  # weights of the nodes and of their derivative, in `Work.weights`
 FAR = 2e-3  # m, a patch whose gap exceeds the wheel's height by more is left out
 NO_HEIGHT = 1.0  # m
+NARROW = 1e-6  # m/N^(1/3), least semi-axis of a patch: others have 2e-5 and more
 
 
 @compiled(python=False)
@@ -230,6 +231,10 @@ def look_up_part(system, work, cell, place, part, first):
             fall += slope * out[scratch]
             K_rate += slope * out[scratch + 1]
             K2_rate += slope * out[scratch + 2]
+        # near where a zone ends along the track cubics fall below zero: the ellipse needs an extent
+        out[begin + A1] = max(out[begin + A1], NARROW)
+        out[begin + B1] = max(out[begin + B1], NARROW)
+        out[begin + D_B1] = max(out[begin + D_B1], NARROW - out[begin + B1])
         bump[patch, B_RISE] = -fall
         bump[patch, B_K] = K_rate
         bump[patch, B_K2] = K2_rate

@@ -226,3 +226,13 @@ def test_shares_of_the_rails_add_up():
     place = run["wheelset_distance"][:, 0] - NOSE
     assert (of_rail[place < 0.1, 1] == 0.0).all()
     assert (of_rail[(place > 0.4) & (place < 0.5), 0] == 0.0).all()
+
+
+@pytest.mark.further
+@pytest.mark.parametrize("vehicle", ["coach_manchester", "wagon_y25"])
+def test_check_rail_guides_over_the_nose_of_the_diverging_route(vehicle):
+    """The wagon met zones that end along the track, where interpolated stiffnesses are negative."""
+    track = load_track("crossing_56e1_r245_1in9.25_diverging")
+    result = simulate(load_vehicle(vehicle), track, speed=11.0)
+    assert result.status == "complete"
+    assert result["check_rail_force"].max() > 20e3
