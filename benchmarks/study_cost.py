@@ -2,6 +2,7 @@
 
     python benchmarks/study_cost.py OUT [--vehicles V...] [--tracks T...] [--speeds 10]
         [--frictions 25] [--duration 40] [--workers 2]
+        [--json study.json]
 
 By default two coaches on two curves at so many speeds and coefficients of friction, with
 `keep = "summary"`.  Printed: the share of the own time loops of the runs in the CPU time of all
@@ -34,6 +35,7 @@ def main() -> None:
     parser.add_argument("--frictions", type=int, default=25)
     parser.add_argument("--duration", type=float, default=40.0)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     memory = Memory()
     begin = time.perf_counter()
@@ -59,7 +61,9 @@ def main() -> None:
     print(f"CPU {cpu:.1f} s, {1e3 * cpu / runs:.0f} ms a run; own time loops {own / cpu:.1%}")
     print(f"folder {size / 1e6:.2f} MB, {size / runs:.0f} bytes a run")
     print("memory (MB) at tenths of the time:", *(f"{mb:.0f}" for mb in memory.tenths()))
-    print(json.dumps({"runs": runs, "cpu": cpu, "own": own, "wall": wall, "bytes": size}))
+    if asked.json:
+        found = {"runs": runs, "cpu": cpu, "own": own, "wall": wall, "bytes": size}
+        asked.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 class Memory:

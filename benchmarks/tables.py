@@ -1,28 +1,29 @@
-"""Fill the tables of docs/performance.md with the figures in results/.
+"""Fill the tables of docs/performance.md and of README's speed with the figures in results/.
 
     python benchmarks/tables.py
 
-`bench.json` is the output of `whole.py`, `peers.json` and `growth.json` those of the scripts of the
-same names.
+`bench.json` is the output of `whole.py`, `speeds.json` that of `irregular.py`, `study.json` that of
+`study_cost.py`, `peers.json` and `growth.json` those of the scripts of the same names.
 """
 
 import json
 import sys
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from whole import tables
 
-RESULTS = Path(__file__).parent / "results"
-DOCS = Path(__file__).parents[1] / "docs"
-sys.path.insert(0, str(DOCS))
-from generate import filled, table  # noqa: E402
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+sys.path.insert(0, str(ROOT / "docs"))
+from generators.filling import fill_page, table  # noqa: E402
 
 BENCH = ("loop", "parts", "fastsim_grids", "ensembles", "cores", "commands")
-GROWTH = ("wheelsets", "cells", "output", "length")
+Row = list[str]
 
 
-def peer_row(name: str, setting: str, record: dict[str, Any], ours: dict[str, Any]) -> list[str]:
+def peer_row(name: str, setting: str, record: dict[str, Any], ours: dict[str, Any]) -> Row:
     error = record.get("error")
     return [
         name,
@@ -37,38 +38,20 @@ def peer_row(name: str, setting: str, record: dict[str, Any], ours: dict[str, An
 
 
 def peers(found: dict[str, Any]) -> str:
-    header = [
-        "",
-        "setting",
-        "x real time",
-        "railsim ahead by",
-        "dQ/Q0 (points)",
-        "Y (kN)",
-        "yaw (%)",
-        "as right",
-    ]
+    head = "|setting|x real time|railsim ahead by|dQ/Q0 (points)|Y (kN)|yaw (%)|as right"
     rows = []
-    for key, words in (("scipy", "curve"), ("scipy, irregular track", "irregular straight")):
-        part = found[key]
-        ours = part["railsim"]
+    for key, words, other in (
+        ("scipy", "curve", "scipy"),
+        ("scipy, irregular track", "irregular straight", "scipy"),
+        ("exudyn", "simplified coach", "Exudyn"),
+    ):
+        ours = found[key]["railsim"]
         rows.append(peer_row(f"railsim, {words}", f"{1e3 * ours['step']:g} ms", ours, ours))
-        rows += [
-            peer_row(
-                f"scipy {record['method']}",
-                f"rtol {record['options']['tolerance']:g}",
-                record,
-                ours,
-            )
-            for record in part["candidates"]
-        ]
-    part = found["exudyn"]
-    ours = part["railsim"]
-    rows.append(peer_row("railsim, simplified coach", f"{1e3 * ours['step']:g} ms", ours, ours))
-    rows += [
-        peer_row(f"Exudyn {record['method']}", f"{1e3 * record['step']:g} ms", record, ours)
-        for record in part["candidates"]
-    ]
-    return table(header, rows)
+        for record in found[key]["candidates"]:
+            step = f"{1e3 * record['step']:g} ms" if "step" in record else ""
+            setting = step or f"rtol {record['options']['tolerance']:g}"
+            rows.append(peer_row(f"{other} {record['method']}", setting, record, ours))
+    return table(head.split("|"), rows)
 
 
 def fastsim(found: dict[str, Any]) -> str:
@@ -81,57 +64,93 @@ def fastsim(found: dict[str, Any]) -> str:
     return table(["FASTSIM 10 x 10", "us per patch", "ratio"], rows)
 
 
-def growth(found: dict[str, Any]) -> list[str]:
-    return [
-        table(
-            ["wheelsets", "patches", "states", "us per evaluation", "us per wheelset"],
+def irregular(found: dict[str, Any]) -> str:
+    """Irregular rails: what the scheme did, speed, errors."""
+    head = "run|step (ms)|divided (%)|evaluations a step|x real time|peaks (%)|rms (%)"
+    rows = []
+    for name, run in found.items():
+        again = run["contacts_evaluated_again"] / run["steps"]
+        rows.append(
             [
-                [
-                    str(r["wheelsets"]),
-                    str(r["patches"]),
-                    str(r["states"]),
-                    f"{1e6 * r['time']:.2f}",
-                    f"{1e6 * r['time'] / r['wheelsets']:.2f}",
-                ]
-                for r in found["wheelsets"]
-            ],
+                name.replace("ballasted", "elastic"),
+                f"{1e3 * run['step']:.3g}",
+                f"{100.0 * run['steps_divided'] / run['steps']:.1f}",
+                f"{run['evaluations'] / run['steps']:.2f}" + (f" + {again:.1f}" if again else ""),
+                f"{median(run['real_time']):.0f}",
+                *(" ".join(f"{x:.2f}" for x in run[errors]) for errors in ("peaks", "rms")),
+            ]
+        )
+    return table(head.split("|"), rows)
+
+
+def study(found: dict[str, Any]) -> str:
+    head = "runs|CPU (s)|own time loops (s)|CPU outside them, a run (ms)|bytes a run"
+    outside = 1e3 * (found["cpu"] - found["own"]) / found["runs"]
+    row = "{runs}|{cpu:.1f}|{own:.1f}|{outside:.0f}|{each:.0f}".format(
+        **found, outside=outside, each=found["bytes"] / found["runs"]
+    )
+    return table(head.split("|"), [row.split("|")])
+
+
+def growth(found: dict[str, Any]) -> dict[str, str]:
+    """Tables by name: the cost over what makes a run larger."""
+    columns = {
+        "wheelsets": (
+            "wheelsets|patches|states|us per evaluation|us per wheelset",
+            "{wheelsets}|{patches}|{states}|{us:.2f}|{us_each:.2f}",
         ),
-        table(
-            ["FASTSIM's grid", "us per evaluation"],
-            [[f"{r['grid']} x {r['grid']}", f"{1e6 * r['time']:.2f}"] for r in found["cells"]],
+        "cells": ("FASTSIM's grid|us per evaluation", "{grid} x {grid}|{us:.2f}"),
+        "output": ("outputs per s|step (ms)|x real time", "{rate:g}|{ms:.3f}|{real_time:.0f}"),
+        "length": (
+            "track (km)|CPU (s)|peak memory (MB)|file (MB)",
+            "{kilometres:g}|{cpu:.1f}|{memory_MB:.0f}|{file_MB:.1f}",
         ),
-        table(
-            ["outputs per s", "step (ms)", "x real time"],
-            [
-                [f"{r['rate']:g}", f"{1e3 * r['step']:.3f}", f"{r['real_time']:.0f}"]
-                for r in found["output"]
-            ],
-        ),
-        table(
-            ["track (km)", "CPU (s)", "peak memory (MB)", "file (MB)"],
-            [
-                [
-                    f"{r['kilometres']:g}",
-                    f"{r['cpu']:.1f}",
-                    f"{r['memory'] / 1e6:.0f}",
-                    f"{r['file'] / 1e6:.1f}",
-                ]
-                for r in found["length"]
-            ],
-        ),
+    }
+    made = {}
+    for name, (head, row) in columns.items():
+        rows = []
+        for record in found[name]:
+            us = 1e6 * record.get("time", 0.0)
+            more = {
+                "us": us,
+                "us_each": us / record.get("wheelsets", 1),
+                "ms": 1e3 * record.get("step", 0.0),
+                "memory_MB": record.get("memory", 0) / 1e6,
+                "file_MB": record.get("file", 0) / 1e6,
+            }
+            rows.append(row.format(**record, **more).split("|"))
+        made[name] = table(head.split("|"), rows)
+    return made
+
+
+def speed(bench: dict[str, Any], speeds: dict[str, Any], peers: dict[str, Any]) -> str:
+    """README's table: what people run, and the fastest others at equal error."""
+    loops = {run["name"]: run["real_time"] for run in bench["runs"]}
+    real = {name: median(run["real_time"]) for name, run in speeds.items()}
+    curve = "Manchester coach, R 250 m"
+    straight = "Manchester coach, straight, ERRI B176 low, 40 m/s, {}"
+    best, exudyn = peers["scipy"]["best"], peers["exudyn"]["best"]
+    rows = [
+        ["elastic rails", f"{loops[curve]:.0f}", f"{real[straight.format('ballasted')]:.0f}"],
+        ["rigid rails", f"{loops[curve + ', rigid']:.0f}", f"{real[straight.format('rigid')]:.0f}"],
+        [f"scipy, {best['method']}, the same equations", f"{best['real_time']:.0f}", ""],
+        [f"Exudyn, {exudyn['method']}, the same contact", f"{exudyn['real_time']:.0f}", ""],
     ]
+    return table(["", "smooth curve R 250 m, 20 m/s", "ERRI low, 40 m/s"], rows)
 
 
 def main() -> None:
-    def load(name: str) -> dict[str, Any]:
-        return dict(json.loads((RESULTS / f"{name}.json").read_text()))
+    def load(name: str) -> Any:
+        return json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
 
-    bench, found = load("bench"), load("peers")
+    bench, found, speeds = load("bench"), load("peers"), load("speeds")
     known = dict(zip(BENCH, (table(*made) for made in tables(bench)), strict=True))
     known |= {"peers": peers(found), "fastsim": fastsim(found["fastsim"])}
-    known |= dict(zip(GROWTH, growth(load("growth")), strict=True))
-    page = DOCS / "performance.md"
-    page.write_text(filled(page.read_text(), known))
+    known |= {"irregular": irregular(speeds), "study": study(load("study"))}
+    known |= growth(load("growth")) | {"speed": speed(bench, speeds, found)}
+    makers = {name: lambda made=made: made for name, made in known.items()}
+    for page in (ROOT / "docs" / "performance.md", ROOT / "README.md"):
+        fill_page(page, makers)
 
 
 if __name__ == "__main__":

@@ -44,11 +44,9 @@ def measure(*, small: bool) -> dict[str, Any]:
 def tables(found: dict[str, Any]) -> list[Rows]:
     """Return what was found as tables: titles of the columns, rows."""
     runs = table(found["runs"])
-    header = [column.heading for column in runs.columns]
-    texts = [
-        [column.text(cell) for column, cell in zip(runs.columns, row, strict=True)]
-        for row in runs.rows
-    ]
+    shown = [k for k, column in enumerate(runs.columns) if column.heading != "target"]
+    header = [runs.columns[k].heading for k in shown]
+    texts = [[runs.columns[k].text(row[k]) for k in shown] for row in runs.rows]
     made = [
         (header, texts),
         _parts(found["parts"]),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from generators.filling import filled, table
+from generators.filling import fill_page, table
 from railsim import Result, Settings, load_track, load_vehicle, simulate
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
 from railsim.plot.histories import histories
@@ -113,6 +113,6 @@ def _digits(value: float) -> str:
 def make(parts: Sequence[str]) -> None:
     """Fill the tables and draw the first picture."""
     draw_first_picture()
-    known = tables()
+    makers = {name: lambda made=made: made for name, made in tables().items()}
     for page in PAGES:
-        page.write_text(filled(page.read_text("utf-8"), known), encoding="utf-8")
+        fill_page(page, makers)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from importlib import import_module
@@ -50,6 +51,19 @@ quantity = "Q_peak"
 def test_every_script_is_tried():
     scripts = {path.name for path in BENCHMARKS.glob("*.py")}
     assert scripts == {*SMALL, *IMPORTED, *WRITES_THE_MANUAL}
+
+
+def test_figures_of_the_manual_are_those_of_the_results(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    tables = import_module("tables")
+    pages = ("docs/performance.md", "README.md")
+    (tmp_path / "docs").mkdir()
+    for page in pages:
+        shutil.copy(BENCHMARKS.parent / page, tmp_path / page)
+    monkeypatch.setattr(tables, "ROOT", tmp_path)
+    tables.main()
+    for page in pages:
+        assert (tmp_path / page).read_text() == (BENCHMARKS.parent / page).read_text()
 
 
 @pytest.mark.parametrize("script", SMALL)
