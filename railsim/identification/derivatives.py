@@ -23,8 +23,9 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.identification.parameters import Model, Parameter, parsed
-from railsim.identification.variants import Workers, cores
+from railsim.identification.variants import Workers
 from railsim.measurement.counterpart import outputs_for, series
+from railsim.processes import available_cores
 from railsim.profiles import Profile
 from railsim.result import Result
 from railsim.simulation import simulate
@@ -223,7 +224,7 @@ def sensitivity(
     except KeyError as error:
         raise InputError([argument_fault("outputs", "", str(error.args[0]), "")]) from None
     count = len(wanted)
-    with Workers(workers or cores()) as pool:
+    with Workers(workers or available_cores()) as pool:
         if scheme == "forward":
             found, runs = _forward(job, base, pool), count + 2
         else:

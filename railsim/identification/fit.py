@@ -21,10 +21,11 @@ from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem
 from railsim.identification.residuals import FORMS, Form, whiteness
 from railsim.identification.runs import Prepared, model_of, prepared, track_of
-from railsim.identification.variants import Workers, cores
+from railsim.identification.variants import Workers
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import shift_of
 from railsim.measurement.likeness import suspicions
+from railsim.processes import available_cores
 
 Floats = NDArray[np.float64]
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
@@ -106,7 +107,7 @@ def identify(
     kept = None if folder is None else Path(folder)
     if kept is not None:
         kept.mkdir(parents=True, exist_ok=True)
-    with Workers(workers or cores()) as pool:
+    with Workers(workers or available_cores()) as pool:
         problem = Problem(
             model, wanted, ready, Form(form, band), place, pool, kept, progress or (lambda _: None)
         )

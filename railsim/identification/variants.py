@@ -1,6 +1,5 @@
 """Variants of a model over the cores: each a run of its own, of which only series come back."""
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -10,13 +9,6 @@ from typing import Any, Self
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
 
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
-
-
-def cores() -> int:
-    """Return the number of cores of this process."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @dataclass
