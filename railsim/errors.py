@@ -168,6 +168,18 @@ class InputError(RailsimError):
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
+def input_error(file: str, found: str, allowed: str = "", key: str = "") -> InputError:
+    """Return the error of one fault, see `Fault`."""
+    return InputError([Fault(file, key, found, allowed)])
+
+
+def argument_error(
+    parameter: str, found: str, allowed: str = "", key: str = "", option: str | None = None
+) -> InputError:
+    """Return the error of one wrong argument of a function, see `argument_fault`."""
+    return InputError([argument_fault(parameter, key, found, allowed, option)])
+
+
 class Faults(list[Fault]):
     """Faults that are collected, to be raised together.
 

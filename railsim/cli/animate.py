@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.output import Output, output_options
-from railsim.errors import Fault, Faults, InputError
+from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import TABLE_BYTES, read_text
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _scene(
     data = _read(file)
     name = vehicle or data.get("vehicle")
     if not isinstance(name, str):
-        raise InputError([Fault("--vehicle", "", "not given", "the vehicle of the modes")])
+        raise input_error("--vehicle", "not given", "the vehicle of the modes")
     found = chosen_mode(data["modes"], mode)
     how = {"frames": frames} if frames else ({"frames": 30, "cycles": 2} if film else {})
     return mode_scene(load_vehicle(name), found, **how)
@@ -101,7 +101,7 @@ def _read(file: Path) -> dict[str, Any]:
     try:
         data: Any = json.loads(read_text(file, TABLE_BYTES))
     except (ValueError, RecursionError) as error:
-        raise InputError([Fault(str(file), "", f"cannot be read ({error})", "")]) from None
+        raise input_error(str(file), f"cannot be read ({error})") from None
     if isinstance(data, list) and data:
         data = data[0]
     modes = data.get("modes") if isinstance(data, dict) else None
@@ -109,6 +109,6 @@ def _read(file: Path) -> dict[str, Any]:
     complete = isinstance(modes, list) and all(isinstance(m, dict) and known <= {*m} for m in modes)
     if not modes or not complete:
         allowed = "the JSON of railsim modes"
-        raise InputError([Fault(str(file), "modes", "missing or incomplete", allowed)])
+        raise input_error(str(file), "missing or incomplete", allowed, key="modes")
     checked: dict[str, Any] = data
     return checked

@@ -9,7 +9,7 @@ import click
 from railsim.cli.common import print_json, show
 from railsim.cli.gathered import gather, opened
 from railsim.cli.output import Output, output_options
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
     from railsim.compare import Difference
@@ -115,16 +115,16 @@ def _groups(files: tuple[str, ...], output: Output) -> dict[str, Group]:
     if not folders:
         results = opened([Path(file) for file in files])
         if len(files) < 2:
-            raise InputError([Fault("R2.h5", "", "one result", "give two results at least")])
+            raise input_error("R2.h5", "one result", "give two results at least")
         return {"": results}
     if len(folders) < len(files):
         found = f"results and folders together ({folders[0]})"
-        raise InputError([Fault("R.h5|STUDY", "", found, "results, or folders of studies")])
+        raise input_error("R.h5|STUDY", found, "results, or folders of studies")
     groups = _of_one(folders[0]) if len(folders) == 1 else _of_several(folders, output)
     crowded = [title for title, group in groups.items() if len(group) > MOST]
     if crowded:
         found = f"{len(groups[crowded[0]])} results side by side"
-        raise InputError([Fault(crowded[0], "", found, f"{MOST} at most; give the files")])
+        raise input_error(crowded[0], found, f"{MOST} at most; give the files")
     return groups if len(groups) > 1 else {"": next(iter(groups.values()))}
 
 
@@ -142,7 +142,7 @@ def _of_one(folder: str) -> dict[str, Group]:
         kept = len(found.paths)
         why = "no two runs differ in nothing but the vehicle" if kept else "no result files"
         allowed = "give the result files that are to be compared; `railsim plot` shows a study"
-        raise InputError([Fault(folder, "", why, allowed)])
+        raise input_error(folder, why, allowed)
     return pairs
 
 
@@ -152,7 +152,7 @@ def _of_several(folders: list[str], output: Output) -> dict[str, Group]:
     common = [name for name in runs[folders[0]] if all(name in paths for paths in runs.values())]
     if not common:
         found = "no result that all folders have"
-        raise InputError([Fault(folders[0], "", found, "studies with runs of the same names")])
+        raise input_error(folders[0], found, "studies with runs of the same names")
     for folder, paths in runs.items():
         if alone := [name for name in paths if name not in common]:
             more = ", ..." if len(alone) > 1 else ""

@@ -21,10 +21,10 @@ TABLE_FILE = "creep_table.npz"
 
 def check_friction(friction: float) -> None:
     """Refuse a friction coefficient out of its range."""
-    from railsim.errors import Fault, InputError
+    from railsim.errors import input_error
 
     if not 0.0 < friction <= 1.0:
-        raise InputError([Fault("--friction", "", f"{friction:g}", "above 0, at most 1")])
+        raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
 
 
 def write(output: Output, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:

@@ -18,7 +18,7 @@ from railsim.cli.common import (
 from railsim.cli.inputs import Given, Inputs, given_options, values_of
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 
 if TYPE_CHECKING:
     from railsim.studies.stability_map import MapPoint
@@ -165,14 +165,14 @@ def _ranges(
     for text in over:
         key, equals, values = text.partition("=")
         if not equals:
-            raise InputError([Fault("--over", "", f"found '{text}'", "KEY.PATH=first:last:number")])
+            raise input_error("--over", f"found '{text}'", "KEY.PATH=first:last:number")
         if key in found:
-            raise InputError([Fault("--over", key, "given twice", "each key once")])
+            raise input_error("--over", "given twice", "each key once", key=key)
         found[key] = values_of(values, "--over")
     several = [name for name, values in found.items() if len(values) > 1]
     if len(several) > 2:
         words = f"found {len(several)} parameters with several values ({', '.join(several)})"
-        raise InputError([Fault("--over", "", words, "two at most")])
+        raise input_error("--over", words, "two at most")
     return found
 
 

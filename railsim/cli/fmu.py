@@ -40,7 +40,7 @@ def command(
       railsim fmu coach_manchester curve_r250 --speed 20 --out coach.fmu
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
     """  # noqa: D301 - click reads the escape
-    from railsim.errors import InputError, argument_fault
+    from railsim.errors import argument_error
     from railsim.fmi import OUTPUTS, fmu
     from railsim.studies.case import load_case
     from railsim.studies.spec import RunSpec
@@ -64,5 +64,5 @@ def command(
             **extent,
         )
     except ImportError as error:
-        raise InputError([argument_fault("fmu", "", str(error), "")]) from None
+        raise argument_error("fmu", str(error)) from None
     output.wrote(path)

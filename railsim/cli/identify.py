@@ -8,7 +8,7 @@ import click
 
 from railsim.cli.common import code_options, vehicle_argument
 from railsim.cli.output import Output, output_options
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 from railsim.files.access import make_folder
 
 FILES = ("identified.toml", "identified.json", "report.html", "fits.png", "residuals.png")
@@ -115,7 +115,5 @@ def _band(text: str) -> tuple[float, float]:
     try:
         low, high = map(float, text.split(":"))
     except ValueError:
-        raise InputError(
-            [Fault("--band", "", f"'{text}'", "LOW:HIGH in Hz, such as 0.5:30")]
-        ) from None
+        raise input_error("--band", f"'{text}'", "LOW:HIGH in Hz, such as 0.5:30") from None
     return low, high

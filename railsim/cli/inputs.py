@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from railsim.cli.common import F, collected, load_option, set_option
-from railsim.errors import Fault, Faults, InputError
+from railsim.errors import Faults, input_error
 
 if TYPE_CHECKING:
     from railsim.definitions.settings import Settings
@@ -93,7 +93,7 @@ def values_of(text: str, option: str) -> list[float]:
         else:
             values = [float(part) for part in text.split(",")]
     except ValueError:
-        raise InputError([Fault(option, "", f"found '{text}'", allowed)]) from None
+        raise input_error(option, f"found '{text}'", allowed) from None
     if not all(abs(value) < float("inf") for value in values):
-        raise InputError([Fault(option, "", f"found '{text}'", "finite numbers")])
+        raise input_error(option, f"found '{text}'", "finite numbers")
     return values

@@ -7,7 +7,7 @@ import click
 from railsim.cli.common import code_options, names_of, rails_option, set_option
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 
 FILES = ("irregularity.json", "irregularity.png")
 
@@ -86,7 +86,7 @@ def command(
     how = measurement.definition
     name = vehicle or how.vehicle
     if name is None:
-        raise InputError([Fault("--vehicle", "", "not given", "the vehicle that measured")])
+        raise input_error("--vehicle", "not given", "the vehicle that measured")
     case = getattr(how, "load", None)
     load = [f"load={case}"] if case else []
     with progress_bar(measurement.name, quiet=output.quiet) as progress:

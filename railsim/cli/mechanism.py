@@ -102,7 +102,7 @@ def command(
 
 def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
     """Results where one of them has a value, by the words of --at."""
-    from railsim.errors import Fault, InputError
+    from railsim.errors import input_error
 
     found = []
     for assignment in at:
@@ -112,7 +112,7 @@ def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
         except ValueError:
             equals = ""
         if not equals:
-            raise InputError([Fault("--at", "", f"'{assignment}'", "NAME=VALUE, in SI units")])
+            raise input_error("--at", f"'{assignment}'", "NAME=VALUE, in SI units")
         found.append({"where": assignment, **result.at(name.strip(), value)})
     return found
 

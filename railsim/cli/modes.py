@@ -19,7 +19,7 @@ from railsim.cli.common import (
 from railsim.cli.inputs import Given, Inputs, given_options, values_of
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
     from railsim.definitions.vehicle.definition import Vehicle
@@ -97,12 +97,12 @@ def command(
     from railsim.linear.modes import Modes, RootLocus, modes, root_locus
 
     if speeds is not None and over is not None:
-        raise InputError([Fault("--over", "", "given together with --speeds", "one of the two")])
+        raise input_error("--over", "given together with --speeds", "one of the two")
     load = partial(given.inputs, vehicle, track)
     coach, rails, settings = load()
     if animate is not None and (output.out is None or speeds is not None or over is not None):
         wrong = "given without --out" if output.out is None else "given with --speeds or --over"
-        raise InputError([Fault("--animate", "", wrong, "one speed, and --out DIR")])
+        raise input_error("--animate", wrong, "one speed, and --out DIR")
     page = ALL if animate is None else ANIMATION
     folder = output.reserve(*FILES, *[page] * (speeds is None and over is None))
     with progress_bar("modes", quiet=output.quiet):

@@ -8,7 +8,7 @@ import click
 
 from railsim.cli.gathered import folder_of, gather
 from railsim.cli.output import Output, output_options
-from railsim.errors import Fault, Faults, InputError, nearest
+from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files.access import PICTURES, RESULTS
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def command(
         figure = _study_figure(str(folder), selections, options)
     elif wrong := [option for option, value in options.items() if value]:
         found = f"'{file}' is no study's folder"
-        raise InputError([Fault(wrong[0], "", found, "a folder of results")])
+        raise input_error(wrong[0], found, "a folder of results")
     elif Path(file).suffix.lower() in RESULTS:
         from railsim.plot.histories import histories
         from railsim.plot.selection import STUDY
@@ -115,7 +115,7 @@ def _study_figure(
     records = [record for record in gather([file]).records if record["status"] in ended]
     known = columns(records)
     if not known:
-        raise InputError([Fault(file, "", "no run has values", "a study with finished runs")])
+        raise input_error(file, "no run has values", "a study with finished runs")
     names = selections or [name for name in DEFAULT if name in known] or list(known)[:4]
     faults = Faults(
         Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
@@ -143,7 +143,7 @@ def _study_figure(
     if kind == "map":
         if family is None:
             found = f"only '{x}' was varied"
-            raise InputError([Fault("--kind", "map", found, "a study over two parameters")])
+            raise input_error("--kind", found, "a study over two parameters", key="map")
         return map_figure(quantities, varied[x], varied[family])
     return curves_figure(quantities, varied[x], varied[family] if family else None)
 
@@ -166,7 +166,7 @@ def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":
     if selections:
         found = f"'{selections[0]}' asked of a track"
         allowed = f"{RECORDING}; quantities belong to results (.h5)"
-        raise InputError([Fault("QUANTITY", "", found, allowed)])
+        raise input_error("QUANTITY", found, allowed)
     return track_figure(load_track(file))
 
 
@@ -182,7 +182,7 @@ def _recording_figure(file: str) -> "Figure":
     found = recordings(data.get("irregularities", ()))
     if not found:
         allowed = 'an irregularity of type = "measured" with a file'
-        raise InputError([Fault(file, "irregularities", "no recording", allowed)])
+        raise input_error(file, "no recording", allowed, key="irregularities")
     name, before, after = found[0]
     more = f", the first of {len(found)}" if len(found) > 1 else ""
     return recording_figure(before, after, f"{track.name}: {name}{more}")

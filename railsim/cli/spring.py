@@ -160,7 +160,7 @@ def vehicle(
       railsim run my_coach.toml curve_r250 --speed 20 --overwrite
     """  # noqa: D301 - click reads the escape
     from railsim.definitions.loading import load_spring
-    from railsim.errors import Fault, InputError, nearest
+    from railsim.errors import input_error, nearest
     from railsim.springs.vehicle_table import vehicle_part, vehicle_text
 
     suspension = load_spring(file, assignments)
@@ -168,7 +168,7 @@ def vehicle(
     with faults_in(file, "spring", suspension.name):
         if load is not None and load not in suspension.loads:
             valid = nearest(load, suspension.loads)
-            raise InputError([Fault("--load", "", f"no load '{load}' in [loads]", valid)])
+            raise input_error("--load", f"no load '{load}' in [loads]", valid)
         part = vehicle_part(suspension, load)
         base, removed = _base(suspension, extends, out)
         text = vehicle_text(suspension, part, base, removed)

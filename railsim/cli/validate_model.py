@@ -79,7 +79,7 @@ def _results(
     names: list[str], runs: "list[Measurement]", files: list[str], vehicle: str | None
 ) -> "list[Result]":
     """Return the results that belong to measured runs; simulated where none are given."""
-    from railsim.errors import Fault, InputError
+    from railsim.errors import input_error
     from railsim.result import open_run
 
     if not files:
@@ -87,7 +87,7 @@ def _results(
 
         return [simulated_run(run, vehicle) for run in runs]
     if vehicle is not None:
-        raise InputError([Fault("--vehicle", "", "given together with results", "leave one out")])
+        raise input_error("--vehicle", "given together with results", "leave one out")
     if len(files) > 1 or not os.path.isdir(files[0]):
         return [open_run(Path(file)) for file in files]
     paths = [Path(files[0]) / f"{Path(name).stem}.h5" for name in names]

@@ -237,7 +237,7 @@ def _file_name(of: Wearing, amount: float, side: str = "wheel") -> str:
 
 
 def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
-    from railsim.errors import Fault, Faults, InputError
+    from railsim.errors import Fault, Faults, input_error
 
     Faults(
         Fault(option, "", f"found {value:g}", "above 0")
@@ -249,7 +249,7 @@ def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
         whole = of.option.removeprefix("--")
         found = f"found {step:g} {of.unit} with a {whole} of {distance:g} {of.unit}"
         allowed = f"the {whole} divided by a whole number from 1 to {MOST_STEPS}"
-        raise InputError([Fault("--step", "", found, allowed)])
+        raise input_error("--step", found, allowed)
     return steps
 
 

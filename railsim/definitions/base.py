@@ -7,7 +7,7 @@ nothing infinite.  What may be given once for both sides is always stored as the
 import ast
 import inspect
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -22,6 +22,7 @@ from pydantic import (
     Field,
     Tag,
     WithJsonSchema,
+    model_validator,
 )
 
 from railsim.units import speed_in_si
@@ -176,6 +177,20 @@ class Remark:
 
     def __str__(self) -> str:
         return f"{self.key}: {self.text}"
+
+
+def check(method: Callable[[Any], None]) -> Any:
+    """Make a method refuse contradictions between the values of a definition by ValueError."""
+
+    def checked(definition: Any) -> Any:
+        method(definition)
+        return definition
+
+    return model_validator(mode="after")(checked)
+
+
+EMPTY_TABLE: Any = Field(default_factory=dict)
+"""Default of a table that a file may leave out."""
 
 
 def rises(what: str) -> AfterValidator:

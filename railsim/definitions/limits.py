@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from railsim.definitions.base import (
     Count,
@@ -21,6 +21,7 @@ from railsim.definitions.base import (
     NonNegative,
     Positive,
     Text,
+    check,
     rising,
 )
 from railsim.definitions.file_definition import FileDefinition
@@ -243,13 +244,12 @@ class Zone(Sourced):
     sections: Count
     """Least number of sections"""
 
-    @model_validator(mode="after")
-    def _ordered(self) -> "Zone":
+    @check
+    def _ordered(self) -> None:
         for name in ("radius", "mean_radius", "cant_deficiency", "speed"):
             ends = getattr(self, name)
             if ends is not None and ends[1] <= ends[0]:
                 raise ValueError(f"'{name}' is [smallest, largest]")
-        return self
 
 
 class Factors(Definition):
@@ -351,13 +351,12 @@ class RunningLimits(FileDefinition):
     limits: dict[Text, LimitLaw] = Field(min_length=1)
     """Limits by the names of the assessed quantities"""
 
-    @model_validator(mode="after")
-    def _shares_of_others(self) -> "RunningLimits":
+    @check
+    def _shares_of_others(self) -> None:
         for name, limit in self.limits.items():
             other = self.limits.get(limit.of) if isinstance(limit, Share) else None
             if isinstance(limit, Share) and (other is None or isinstance(other, Share)):
                 raise ValueError(f"limit '{name}' is a share of '{limit.of}', which is none itself")
-        return self
 
 
 class Classes(Sourced):

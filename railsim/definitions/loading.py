@@ -15,7 +15,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import wrong_type
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 from railsim.files import sources
 from railsim.files.access import is_file
 from railsim.files.sources import Source
@@ -244,9 +244,9 @@ def load_settings_json(text: str, file: str = "settings_json") -> Settings:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError([Fault(file, "", f"broken JSON: {error}", "")]) from None
+        raise input_error(file, f"broken JSON: {error}") from None
     if not isinstance(data, dict):
-        raise InputError([Fault(file, "", "no table", "")])
+        raise input_error(file, "no table")
     return loaded(Settings, Source(file, {"format": Settings.format_name(), **data}), ())
 
 

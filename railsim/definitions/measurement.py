@@ -5,12 +5,22 @@ A channel is named by the quantity of a result that it is the counterpart of, wi
 without further ado.  Reading is in `railsim.measurement`.
 """
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from railsim.constants import GRAVITY
-from railsim.definitions.base import Definition, Finite, Flag, Name, NonNegative, Positive, Text
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Definition,
+    Finite,
+    Flag,
+    Name,
+    NonNegative,
+    Positive,
+    Text,
+    check,
+)
 from railsim.definitions.file_definition import FileDefinition
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SHOWN_UNITS, SIDES, Quantity
 
@@ -116,8 +126,8 @@ class Channel(Definition):
         scale = UNITS[self.unit][1] if self.unit else 1.0
         return -scale if self.reverse else scale
 
-    @model_validator(mode="after")
-    def _unit_of_quantity(self) -> Self:
+    @check
+    def _unit_of_quantity(self) -> None:
         quantity = quantity_of(self.quantity)
         assert quantity is not None  # by its own check
         allowed = sorted(unit for unit, (si, _) in UNITS.items() if si == quantity.unit)
@@ -129,7 +139,6 @@ class Channel(Definition):
             pair = getattr(self, name)
             if pair is not None and not pair[0] < pair[1]:
                 raise ValueError(f"'{name}' must rise")
-        return self
 
 
 class MeasurementFile(FileDefinition):
@@ -171,12 +180,12 @@ class MeasurementFile(FileDefinition):
     """Values that stand for none, such as -9999, in the unit of the file; empty cells always do"""
     longest_gap: NonNegative = 0.0
     """Gaps up to this time are bridged by a straight line; in longer ones there is no value [s]"""
-    mounting: dict[Name, tuple[Finite, Finite, Finite]] = Field(default_factory=dict)
+    mounting: dict[Name, tuple[Finite, Finite, Finite]] = EMPTY_TABLE
     """Small angles by which the sensors at a point are turned about x, y, z of the body [rad]: its
     accelerations are turned back"""
 
-    @model_validator(mode="after")
-    def _axes(self) -> Self:
+    @check
+    def _axes(self) -> None:
         used = [channel.quantity for channel in self.channels.values()]
         twice = sorted({one for one in used if used.count(one) > 1})
         if twice:
@@ -187,4 +196,3 @@ class MeasurementFile(FileDefinition):
             raise ValueError("a channel of 'distance', 'mileage' or 'speed', or the key 'speed'")
         if not {*used} - {*AXES}:
             raise ValueError("no channel measures the vehicle")
-        return self

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.files.access import TABLE_BYTES, is_file, read_text
 from railsim.text import LONGEST_FILE, shortened
 
@@ -85,7 +85,7 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
 
 
 def _wrong(path: Path, key: str, found: str, allowed: str) -> InputError:
-    return InputError([Fault(str(path), key, found, allowed)])
+    return input_error(str(path), found, allowed, key=key)
 
 
 def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Floats]:

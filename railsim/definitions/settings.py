@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from railsim.definitions.base import (
+    EMPTY_TABLE,
     Definition,
     Finite,
     Flag,
@@ -13,6 +14,7 @@ from railsim.definitions.base import (
     Positive,
     Speed,
     Text,
+    check,
     rises,
 )
 from railsim.definitions.creep_law import CreepLawName
@@ -87,13 +89,12 @@ class Drive(Definition):
     resistance: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     """Running resistance a + b V + c V^2 on the reference body [N, N s/m, N s2/m2]"""
 
-    @model_validator(mode="after")
-    def _what_the_mode_needs(self) -> Self:
+    @check
+    def _what_the_mode_needs(self) -> None:
         if (self.mode == "table") != (self.speed_table is not None):
             raise ValueError("'speed_table' belongs to mode = \"table\" and only to it")
         if self.mode != "free" and (self.traction_table or any(self.resistance)):
             raise ValueError("'traction_table' and 'resistance' belong to mode = \"free\"")
-        return self
 
 
 # Smallest output rate over the filter's frequency: room for the transition (zero); 1/1000 of what
@@ -186,7 +187,7 @@ class Settings(FileDefinition):
     state by Newton's method"""
     outputs: Outputs = Outputs()
     """Further quantities in the result"""
-    initial: dict[str, InitialState] = Field(default_factory=dict)
+    initial: dict[str, InitialState] = EMPTY_TABLE
     """Disturbance at the start by the body's full name"""
 
     def in_steady_rolling(self) -> Self:
@@ -198,8 +199,8 @@ class Settings(FileDefinition):
         """Put the sources of laws into the tables."""
         return with_sources(tables)
 
-    @model_validator(mode="after")
-    def _physical(self) -> Self:
+    @check
+    def _physical(self) -> None:
         if self.poisson >= 0.5:
             raise ValueError("'poisson' must be below 0.5")
         if (self.creep_law == "adhesion_curve") != (self.adhesion_curve is not None):
@@ -216,4 +217,3 @@ class Settings(FileDefinition):
                     f"'output_rate' must be {least:g} at least with 'outputs.low_pass' of "
                     f"{asked.frequency:g} Hz"
                 )
-        return self

@@ -6,11 +6,12 @@ belong to one command (`[target]` to design, `[fatigue]` to fatigue, `[vehicle]`
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from railsim.definitions.base import (
+    EMPTY_TABLE,
     Definition,
     Finite,
     NonNegative,
@@ -18,6 +19,7 @@ from railsim.definitions.base import (
     Positive,
     Remark,
     Text,
+    check,
     rising,
 )
 from railsim.definitions.file_definition import FileDefinition
@@ -90,15 +92,14 @@ class Material(Definition):
     tau_allowable: NumberOrTable | None = None
     """Allowable shear stress of the solid spring [Pa], or rows [wire diameter m, stress Pa]"""
 
-    @model_validator(mode="after")
-    def _isotropic(self) -> Self:
+    @check
+    def _isotropic(self) -> None:
         nu = self.E / (2.0 * self.G) - 1.0
         if not 0.0 <= nu < 0.5:
             raise ValueError(
                 f"E/(2 G) - 1 is {nu:.3f}; Poisson's ratio must be from 0 to 0.5: "
                 "G must be between E/3 and E/2"
             )
-        return self
 
 
 class HelicalSpring(Definition):
@@ -113,11 +114,10 @@ class HelicalSpring(Definition):
     active_coils: Positive | None = None
     """Number of active coils n; design finds it"""
 
-    @model_validator(mode="after")
-    def _winds(self) -> Self:
+    @check
+    def _winds(self) -> None:
         if self.wire_diameter is not None and self.wire_diameter >= self.mean_diameter:
             raise ValueError("'wire_diameter' must be below 'mean_diameter'")
-        return self
 
 
 class InnerSpring(HelicalSpring):
@@ -129,11 +129,10 @@ class InnerSpring(HelicalSpring):
     seat_height: NonNegative | None = None
     """Height of its lower seat above the axle centre [m] instead of `engagement`"""
 
-    @model_validator(mode="after")
-    def _one_way_of_standing(self) -> Self:
+    @check
+    def _one_way_of_standing(self) -> None:
         if self.engagement is not None and self.seat_height is not None:
             raise ValueError("either 'engagement' or 'seat_height', not both")
-        return self
 
 
 class Point(Definition):
@@ -297,7 +296,7 @@ class TrailingArmSuspension(FileDefinition):
     """One further load with its wanted deflection, for the design"""
     loads: dict[Text, Positive] = Field(min_length=1)
     """Loads of one primary suspension by name [N]"""
-    load_notes: dict[Text, Text] = Field(default_factory=dict)
+    load_notes: dict[Text, Text] = EMPTY_TABLE
     """What each load is, by its name"""
     fatigue: Fatigue | None = None
     """Dynamic loads and Goodman-Smith line"""

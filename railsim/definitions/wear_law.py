@@ -2,9 +2,7 @@
 
 from typing import ClassVar, Literal
 
-from pydantic import model_validator
-
-from railsim.definitions.base import Definition, NonNegative, Positive, Text
+from railsim.definitions.base import Definition, NonNegative, Positive, Text, check
 from railsim.definitions.file_definition import FileDefinition
 
 
@@ -54,10 +52,9 @@ class WearLawFile(FileDefinition):
     krause_poll: FrictionWork | None = None
     """Work of friction, mild and severe"""
 
-    @model_validator(mode="after")
-    def _one(self) -> "WearLawFile":
+    @check
+    def _one(self) -> None:
         if (self.archard is None) == (self.krause_poll is None):
             raise ValueError("give one of the tables archard and krause_poll")
         if self.archard is not None and self.archard.speeds[0] >= self.archard.speeds[1]:
             raise ValueError("archard.speeds must increase")
-        return self

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from railsim.errors import Fault, Faults, InputError, argument_fault, nearest
+from railsim.errors import Fault, Faults, InputError, argument_fault, input_error, nearest
 from railsim.files.access import DEFINITION_BYTES, is_file, read_text
 from railsim.files.key_paths import descend, key_path
 from railsim.text import shortened
@@ -193,7 +193,7 @@ def find_any(name: str | Path) -> Path:
     found = f"'{name}' is a folder" if os.path.isdir(name) else f"no file '{name}'"
     known = [name for kind in FOLDERS for name in shipped_names(kind)]
     hint = nearest(str(name), known).removeprefix("allowed: ")
-    raise InputError([Fault(str(name), "", found, f"a path, or a shipped name: {hint}")])
+    raise input_error(str(name), found, f"a path, or a shipped name: {hint}")
 
 
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
@@ -225,7 +225,7 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
     InputError : a syntax error, with its line; tables nested too deeply, too long a number.
     """
     if max(text.count("=") + text.count("\n["), text.count("{")) > MOST_KEYS:
-        raise InputError([Fault(file, "", "too many keys", f"{MOST_KEYS} at most")])
+        raise input_error(file, "too many keys", f"{MOST_KEYS} at most")
     try:
         if _DEEP_KEY.search(text):
             raise RecursionError
@@ -235,7 +235,7 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         raise RecursionError
     except RecursionError:
         found = "values nested too deeply"
-        raise InputError([Fault(file, "", found, f"{DEEPEST} levels at most")]) from None
+        raise input_error(file, found, f"{DEEPEST} levels at most") from None
     except tomllib.TOMLDecodeError as error:
         located = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
         if located:
@@ -245,9 +245,9 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         else:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"
-        raise InputError([Fault(file, key, found, "")]) from None
+        raise input_error(file, found, key=key) from None
     except (ValueError, OverflowError) as error:  # a whole number of thousands of digits
-        raise InputError([Fault(file, "", f"a value is out of range: {error}", "")]) from None
+        raise input_error(file, f"a value is out of range: {error}") from None
 
 
 def _depth(data: Any) -> int:
@@ -297,7 +297,7 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
         raise InputError([fault])
     if len(chain) > LONGEST_CHAIN:
         found = f"the {len(chain)}th file in a chain"
-        raise InputError([Fault(str(path), "extends", found, f"{LONGEST_CHAIN} at most")])
+        raise input_error(str(path), found, f"{LONGEST_CHAIN} at most", key="extends")
     base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
     Faults(fault for key in removed for fault in _remove(base, key, str(path))).check()
     _merge(base.data, data, (), base.origin, str(path))

@@ -8,7 +8,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from railsim.errors import Fault, InputError, argument_fault, nearest, optional_package
+from railsim.errors import (
+    InputError,
+    argument_error,
+    argument_fault,
+    input_error,
+    nearest,
+    optional_package,
+)
 from railsim.simulation import Simulation
 
 
@@ -52,18 +59,18 @@ class Controller:
         name = str(path)
         if not allow_code:
             allowed = "allow_code=True, where you trust its source"
-            raise InputError([Fault(name, "", "a unit holds native code", allowed)])
+            raise input_error(name, "a unit holds native code", allowed)
         if not 0.0 < period < np.inf:
-            raise InputError([argument_fault("period", "", f"found {period} s", "a positive time")])
+            raise argument_error("period", f"found {period} s", "a positive time")
         fmpy = optional_package("fmpy", "Controller", "'railsim[fmi]'")
         slave = optional_package("fmpy.fmi3", "Controller", "'railsim[fmi]'").FMU3Slave
         try:
             model = fmpy.read_model_description(name)
         except Exception as error:
-            raise InputError([Fault(name, "", f"no unit: {error}", "a unit of FMI 3.0")]) from None
+            raise input_error(name, f"no unit: {error}", "a unit of FMI 3.0") from None
         if model.coSimulation is None or not model.fmiVersion.startswith("3"):
             allowed = "a unit of FMI 3.0 for co-simulation"
-            raise InputError([Fault(name, "", f"FMI {model.fmiVersion}", allowed)])
+            raise input_error(name, f"FMI {model.fmiVersion}", allowed)
         known = {variable.name: variable for variable in model.modelVariables}
         self._read = [(_reference(name, known, one), at) for one, at in inputs.items()]
         self._give = [(_reference(name, known, one), to) for one, to in outputs.items()]
@@ -115,7 +122,7 @@ class Controller:
         for (_, actuator), value in zip(self._give, given, strict=True):
             simulation.set(actuator, value)
         if terminate:
-            raise InputError([argument_fault("unit", "", "it ended the simulation", "")])
+            raise argument_error("unit", "it ended the simulation")
 
     def close(self) -> None:
         """End the unit and remove what was unpacked of it."""
@@ -137,9 +144,9 @@ class Controller:
 def _reference(file: str, known: Mapping[str, Any], name: str) -> int:
     """Return the reference of a unit's variable, a number without dimensions."""
     if name not in known:
-        raise InputError([Fault(file, name, "no such variable", nearest(name, known))])
+        raise input_error(file, "no such variable", nearest(name, known), key=name)
     if known[name].type != "Float64" or known[name].dimensions:
-        raise InputError([Fault(file, name, f"a {known[name].type}", "one Float64")])
+        raise input_error(file, f"a {known[name].type}", "one Float64", key=name)
     reference: int = known[name].valueReference
     return reference
 

@@ -11,7 +11,7 @@ from typing import Any
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import Fault, InputError, argument_fault, nearest, optional_package
+from railsim.errors import argument_error, input_error, nearest, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
 from railsim.notation import QUANTITIES, REQUESTED
@@ -127,7 +127,7 @@ def _commands(
     for name in wanted:
         if name not in actuators:
             allowed = nearest(name, actuators) if actuators else "the vehicle has none"
-            raise InputError([argument_fault("inputs", "", f"no actuator '{name}'", allowed)])
+            raise argument_error("inputs", f"no actuator '{name}'", allowed)
     return [
         {
             "name": name,
@@ -162,7 +162,7 @@ def _variables(
                 words = ", ".join((panel.quantity.long_name, *labels))
                 found[name] = _variable(name, quantity, at, panel.quantity.unit, words)
     if not found:
-        raise InputError([Fault("outputs", "", "found none", "at least one quantity or signal")])
+        raise input_error("outputs", "found none", "at least one quantity or signal")
     return list(found.values())
 
 

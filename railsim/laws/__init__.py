@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 from railsim.laws.binding import KIND
 from railsim.laws.permission import PERMITTED, allow, allowed, digest, is_allowed, permitted_part
 
@@ -76,7 +76,7 @@ def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
         definition = None
     if not isinstance(definition, ast.FunctionDef) or definition.name != name:
         found, allowed = "its source cannot be read", "a function of a file, script or notebook"
-        raise InputError([Fault("law", name, found, allowed)])
+        raise input_error("law", found, allowed, key=name)
     definition.decorator_list = []
     source = f"{KNOWN}\n\n{ast.unparse(tree)}\n"
     allow(source)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 from railsim.laws.permission import check_laws, digest
 
 MEMORY = "memory"
@@ -132,7 +132,7 @@ class Bound:
                 if wrong
                 else (f"no value for '{missing[0]}', an argument of the law '{self.name}'")
             )
-            raise InputError([Fault("vehicle", key, found, _listed(self.further))])
+            raise input_error("vehicle", found, _listed(self.further), key=key)
         return [float(own[name]) for name in self.further]
 
 
@@ -217,7 +217,7 @@ class _Binding:
 
     def _refuse(self, found: str, allowed: str, line: int | None = None) -> None:
         where = f"line {line}" if line else self.name
-        raise InputError([Fault(self.file, where, f"the law '{self.name}' {found}", allowed)])
+        raise input_error(self.file, f"the law '{self.name}' {found}", allowed, key=where)
 
     def _function(self) -> Any:
         """Execute the text and take the function out of it."""

@@ -18,7 +18,7 @@ so that a motion along the path has just these forces, and the tangent is the li
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import InputError, ModelError, argument_fault
+from railsim.errors import ModelError, argument_error
 from railsim.linear.coordinates import FreeVehicle
 
 Floats = NDArray[np.float64]
@@ -82,15 +82,10 @@ class ContactPath:
                 try:
                     x, pose = self._on_path(vehicle, body, y, guess)
                 except ModelError as error:
-                    raise InputError(
-                        [
-                            argument_fault(
-                                "amplitude",
-                                "",
-                                f"found {1e3 * self.amplitude:g} mm, but {error}",
-                                "a smaller amplitude",
-                            )
-                        ]
+                    raise argument_error(
+                        "amplitude",
+                        f"found {1e3 * self.amplitude:g} mm, but {error}",
+                        "a smaller amplitude",
                     ) from None
                 self._known[body, y] = pose
                 before = y

@@ -14,7 +14,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
@@ -431,7 +431,7 @@ def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[f
     if bad or not values:
         found = f"found {bad[0]!r}" if bad else "no speed"
         allowed = f"{low:g} to {high:g} m/s, or a text such as '72 km/h'"
-        raise InputError([argument_fault(name, "", found, allowed)])
+        raise argument_error(name, found, allowed)
     return [float(value) for value in values]
 
 

@@ -13,7 +13,7 @@ from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, ModelError, argument_fault
+from railsim.errors import Fault, InputError, ModelError, argument_error, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
 from railsim.linear.circle import POSITION, circle, left_out
@@ -294,12 +294,8 @@ def _check_hold(model: Model, hold: Sequence[str]) -> None:
     ]
     wrong = [name for name in hold if name not in rigid]
     if wrong:
-        raise InputError(
-            [
-                argument_fault(
-                    "hold", wrong[0], "no such body; `held` holds the wheelsets", ", ".join(rigid)
-                )
-            ]
+        raise argument_error(
+            "hold", "no such body; `held` holds the wheelsets", ", ".join(rigid), key=wrong[0]
         )
 
 

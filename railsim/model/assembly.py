@@ -25,7 +25,7 @@ from railsim.definitions.track.support import Support as SupportDefinition
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, Faults, InputError, ModelError
+from railsim.errors import Fault, Faults, ModelError, input_error
 from railsim.kernels.aligned import CACHE_LINE, aligned
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
@@ -203,7 +203,7 @@ def assemble(
     rails = rail_ranges(flat, track, book.used, served, settings.normal_contact)
     if settings.transient_creep and N_PATCH * parts_of_wheel(rails.arrays) > TRACED:
         found = "sections of more than two rails side by side"
-        raise InputError([Fault("track", "sections", found, "two with settings.transient_creep")])
+        raise input_error("track", found, "two with settings.transient_creep", key="sections")
     return Model(system, index, flat, tables, book.used, design, wheels, check, rails)
 
 

@@ -6,7 +6,7 @@ from railsim.contact.creep import creep_law
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.laws import LawUse
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import input_error, nearest
 from railsim.kernels.creep import OWN
 from railsim.kernels.own_laws import CREEP_GIVES, CREEP_TAKES, FRICTION_GIVES, FRICTION_TAKES
 from railsim.kernels.patches import CreepLaw
@@ -17,15 +17,11 @@ from railsim.laws.binding import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
 def settings_creep_law(settings: Settings, track: Track) -> CreepLaw:
     """Creep law of the settings with the third body of the track."""
     if settings.adhesion_curve is not None and track.third_body != (1.0, 1.0):
-        raise InputError(
-            [
-                Fault(
-                    "track",
-                    "third_body",
-                    f"found {list(track.third_body)} together with settings.adhesion_curve",
-                    "[1.0, 1.0]: a measured curve holds the third body",
-                )
-            ]
+        raise input_error(
+            "track",
+            f"found {list(track.third_body)} together with settings.adhesion_curve",
+            "[1.0, 1.0]: a measured curve holds the third body",
+            key="third_body",
         )
     return creep_law(
         settings.creep_law,
@@ -61,6 +57,6 @@ def _bound(settings: Settings, use: LawUse, key: str, takes: Takes) -> tuple[Bou
     laws = settings.laws or {}
     if use.law not in laws:
         allowed = nearest(use.law, laws) if laws else "there is none"
-        raise InputError([Fault("settings", f"{key}.law", f"no law '{use.law}'", allowed)])
+        raise input_error("settings", f"no law '{use.law}'", allowed, key=f"{key}.law")
     bound = bind(use.law, laws[use.law], takes)
     return bound, bound.parameters(f"{key}.parameters", use.parameters)

@@ -31,7 +31,7 @@ from railsim.definitions.elements.rows import (
 )
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import input_error, nearest
 from railsim.kernels.actuators import (
     ALONG,
     AXLE,
@@ -130,7 +130,7 @@ class LawBlocks:
         laws = self.laws or {}
         if act.law not in laws:
             found, allowed = f"no law '{act.law}'", nearest(act.law, laws) if laws else "none"
-            raise InputError([Fault("vehicle", f"elements.{name}.law", found, allowed)])
+            raise input_error("vehicle", found, allowed, key=f"elements.{name}.law")
         bound = bind(act.law, laws[act.law], FORCE_ELEMENT)
         values = bound.parameters(f"elements.{name}.parameters", act.parameters)
         block = [0.0] * (1 + bound.states + LAW_TAKES + bound.states)

@@ -15,7 +15,7 @@ Read `profile` first: it states the frames.
 import json
 from pathlib import Path
 
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import input_error, nearest
 from railsim.files.access import is_file, whole_file
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
@@ -60,19 +60,14 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
 
         return recognised_profile(read_profile_file(path), name_or_path, kind)
     else:
-        raise InputError(
-            [
-                Fault(
-                    shortened(name_or_path, LONGEST_FILE),
-                    "",
-                    "no such profile",
-                    nearest(name_or_path, DEFINITIONS) + " or the path of a file",
-                )
-            ]
+        raise input_error(
+            shortened(name_or_path, LONGEST_FILE),
+            "no such profile",
+            nearest(name_or_path, DEFINITIONS) + " or the path of a file",
         )
     if kind is not None and profile.kind != kind:
-        raise InputError(
-            [Fault(name_or_path, "", f"this is a {profile.kind} profile", f"give a {kind} profile")]
+        raise input_error(
+            name_or_path, f"this is a {profile.kind} profile", f"give a {kind} profile"
         )
     return profile
 

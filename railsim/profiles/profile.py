@@ -18,7 +18,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 from railsim.text import printable, shortened
 
 Kind = Literal["wheel", "rail"]
@@ -69,13 +69,13 @@ class Profile:
         if self.y.ndim != 1 or self.y.shape != self.z.shape or self.y.size < FEWEST_POINTS:
             found = f"arrays of shape {self.y.shape} and {self.z.shape}"
             allowed = f"two rows of equal length, {FEWEST_POINTS} points at least"
-            raise InputError([Fault(f"profile '{self.name}'", "y, z", found, allowed)])
+            raise input_error(f"profile '{self.name}'", found, allowed, key="y, z")
         if not np.isfinite([self.y, self.z]).all():
             found = "values that are not finite"
-            raise InputError([Fault(f"profile '{self.name}'", "y, z", found, "numbers in m")])
+            raise input_error(f"profile '{self.name}'", found, "numbers in m", key="y, z")
         if self.kind not in get_args(Kind):
             found = shortened(repr(self.kind))
-            raise InputError([Fault(f"profile '{self.name}'", "kind", found, "wheel or rail")])
+            raise input_error(f"profile '{self.name}'", found, "wheel or rail", key="kind")
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Profile):

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 from railsim.files.access import read_bytes
 from railsim.profiles.profile import Kind
 
@@ -88,7 +88,7 @@ def _shown(texts: list[str]) -> str:
 
 
 def _fault(file: str, line: int, found: str, remedy: str = "") -> InputError:
-    return InputError([Fault(file, f"line {line}", found, remedy or "give y and z on each line")])
+    return input_error(file, found, remedy or "give y and z on each line", key=f"line {line}")
 
 
 def _number(text: str) -> float | None:
@@ -120,12 +120,10 @@ def read_profile_file(path: str | Path) -> RawProfile:
     file = str(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(
-            [Fault(file, "", f"unknown kind of file '{suffix}'", f"formats: {FORMATS}")]
-        )
+        raise input_error(file, f"unknown kind of file '{suffix}'", f"formats: {FORMATS}")
     content = read_bytes(path, PROFILE_BYTES)
     if b"\0" in content:
-        raise InputError([Fault(file, "", "not a text file", f"formats: {FORMATS}")])
+        raise input_error(file, "not a text file", f"formats: {FORMATS}")
     # titles may hold any character; numbers are ASCII in every one of these encodings
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     if suffix in (".prw", ".prr"):
@@ -181,15 +179,11 @@ def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], fl
     found = [(names.index(y), names.index(z)) for y, z in pairs if y in names and z in names]
     if found:
         return min(found), units[names[min(found)[0]]]
-    raise InputError(
-        [
-            Fault(
-                file,
-                f"line {line}",
-                f"unknown columns {_shown(names)}",
-                "the header is y_mm,z_mm for millimetres or y,z for metres",
-            )
-        ]
+    raise input_error(
+        file,
+        f"unknown columns {_shown(names)}",
+        "the header is y_mm,z_mm for millimetres or y,z for metres",
+        key=f"line {line}",
     )
 
 
@@ -220,8 +214,8 @@ def _simpack(file: str, lines: list[str]) -> RawProfile:
         elif key.lower() in NUMERIC_KEYS:
             raise _fault(file, number, f"{key} is not a number: {value!r}", "give a number")
     if not points.y:
-        raise InputError(
-            [Fault(file, "", "no points", "SIMPACK files hold them from point.begin to point.end")]
+        raise input_error(
+            file, "no points", "SIMPACK files hold them from point.begin to point.end"
         )
     raw = points.raw()
     raw.name = title
@@ -229,8 +223,8 @@ def _simpack(file: str, lines: list[str]) -> RawProfile:
         raw.kind = "wheel" if kind_flag == 1.0 else "rail"
     per_metre = values.get("units.len.f", 1.0)
     if per_metre <= 0.0:
-        raise InputError(
-            [Fault(file, "units.len.f", f"{per_metre:g}", "units per metre, 1000 for millimetres")]
+        raise input_error(
+            file, f"{per_metre:g}", "units per metre, 1000 for millimetres", key="units.len.f"
         )
     raw.unit = 1.0 / per_metre
     _process_simpack(raw, values)

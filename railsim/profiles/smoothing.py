@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 from railsim.profiles.profile import Kind
 
 CURVATURE_NOISE = 3.0
@@ -36,7 +36,7 @@ class Points:
     def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:
         """Return what to raise about a point."""
         key = "" if at is None else f"line {int(self.line[at])}"
-        return InputError([Fault(self.file, key, found, remedy)])
+        return input_error(self.file, found, remedy, key=key)
 
     def keep(self, which: Floats | NDArray[np.bool_] | NDArray[np.int64]) -> None:
         """Keep some of the points, or bring them into another order."""

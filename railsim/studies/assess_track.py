@@ -27,7 +27,7 @@ from railsim.definitions.loading import load_running_limits, load_track, load_ve
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_error, input_error
 from railsim.files.access import check_folder, whole_file
 from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out
@@ -197,7 +197,7 @@ def assess_track(
         All faults of the inputs; no recording in the track.
     """
     if not 0.0 < share <= 10.0:
-        raise InputError([argument_fault("share", "", f"found {share:g}", "above 0, up to 10")])
+        raise argument_error("share", f"found {share:g}", "above 0, up to 10")
     folder = Path(out)
     check_folder(folder)
     track = recorded(recording)
@@ -283,7 +283,7 @@ def recorded(recording: str | Path) -> Track:
     track = load_track(recording)
     if not any(isinstance(part, Measured) for part in track.irregularities):
         allowed = "an irregularity of the type 'measured'"
-        raise InputError([Fault(str(recording), "irregularities", "no recording", allowed)])
+        raise input_error(str(recording), "no recording", allowed, key="irregularities")
     return track
 
 
@@ -293,7 +293,7 @@ def _extent(track: Track) -> tuple[float, float]:
     begin, end = max(0.0, min(a for a, _ in found)), min(track.length, max(b for _, b in found))
     if end - begin < 2.0 * SECTION:
         found_words, allowed = f"{end - begin:.0f} m", f"{2.0 * SECTION:g} m at least"
-        raise InputError([Fault(track.name, "irregularities", found_words, allowed)])
+        raise input_error(track.name, found_words, allowed, key="irregularities")
     return begin, end
 
 

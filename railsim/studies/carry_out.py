@@ -8,7 +8,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import InputError, argument_fault
+from railsim.errors import InputError, argument_error
 from railsim.files.access import is_file, make_folder, sweep
 from railsim.processes import available_cores
 from railsim.studies.execute import (
@@ -54,7 +54,7 @@ def carry_out(plan: Runs, spec: StudySpec, folder: Path, execution: Execution) -
             journal.clear()
         elif known is None and journal.entries:
             found = f"another study has begun in {folder}"
-            raise InputError([argument_fault("out", "", found, "")])
+            raise argument_error("out", found)
         journal.begin(inputs)
         for text in state.settle(journal):
             (execution.on_remark or _LOG.warning)(text)
@@ -125,7 +125,7 @@ def _refuse_another_study(
     if differing:
         found = f"{folder} holds a study with other " + ", ".join(differing)
         allowed = "`resume` continues with these inputs, `overwrite` computes everything; "
-        raise InputError([argument_fault("out", "", found, f"{allowed}or another `out`")])
+        raise argument_error("out", found, f"{allowed}or another `out`")
 
 
 def _refuse_files_of_others(folder: Path) -> None:
@@ -142,7 +142,7 @@ def _refuse_files_of_others(folder: Path) -> None:
     else:
         return
     allowed = "choose another `out`, or give `overwrite`"
-    raise InputError([argument_fault("out", str(folder / name), found, allowed)])
+    raise argument_error("out", found, allowed, key=str(folder / name))
 
 
 def _is_newer(one: Path, other: Path) -> bool:

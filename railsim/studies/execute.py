@@ -26,7 +26,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import InputError, ModelError, RailsimError, argument_fault
+from railsim.errors import InputError, ModelError, RailsimError, argument_error, argument_fault
 from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
@@ -316,7 +316,7 @@ def cluster(address: str) -> Any:
     except ImportError:
         found = "the package 'distributed' is not installed"
         allowed = "install it with: pip install 'railsim[distributed]'"
-        raise InputError([argument_fault("scheduler", "", found, allowed)]) from None
+        raise argument_error("scheduler", found, allowed) from None
     try:
         return Client(address)
     except (OSError, ValueError) as error:

@@ -21,7 +21,7 @@ from railsim.definitions.track.tables import Circle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.result.sensors import sensors
 from railsim.studies.case import Case
 
@@ -49,7 +49,7 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
             table = table.get(part, {})
         if last not in table:
             allowed = "a key of the vehicle's file"
-            raise InputError([Fault(f"conditions.{name}", "remove", key, allowed)])
+            raise input_error(f"conditions.{name}", key, allowed, key="remove")
         del table[last]
     data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
     try:

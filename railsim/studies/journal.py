@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self, overload
 
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import InputError, argument_fault, input_error
 from railsim.files.access import locked
 from railsim.studies.records import Record, json_bytes
 
@@ -259,5 +259,5 @@ class Records(Sequence[Record]):
         except (ValueError, RecursionError, AttributeError) as error:
             found = f"a record that cannot be used ({error})"
             allowed = "remove the journal: existing results are kept"
-            raise InputError([Fault(str(self._path), entry.name, found, allowed)]) from None
+            raise input_error(str(self._path), found, allowed, key=entry.name) from None
         return record

@@ -17,7 +17,7 @@ import tomli_w
 from railsim.definitions.loading import load_study
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_error, argument_fault
 from railsim.files.access import check_folder, is_file, make_folder, read_text, whole_file
 from railsim.processes import available_cores
 from railsim.studies.designs import (
@@ -239,7 +239,7 @@ def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: b
             "`resume` uses what is still valid, `overwrite` computes everything; or another `out`"
         )
         found = "holds another optimisation"
-        raise InputError([argument_fault("out", str(folder), found, allowed)])
+        raise argument_error("out", found, allowed, key=str(folder))
     make_folder(folder)
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")

@@ -11,7 +11,7 @@ from itertools import product
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import needs_run
 from railsim.definitions.study.definition import value_texts
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_error, argument_fault, input_error
 from railsim.studies.case import Case, Loader, run_labels, run_name
 from railsim.studies.points import Fingerprints, Point, check_number, point_key
 from railsim.studies.rows import PERMITTED, Row, made_rows
@@ -45,9 +45,7 @@ class Plan:
 
     def __init__(self, spec: StudySpec, workers: int = 1) -> None:
         if not (spec.vehicles and spec.tracks and spec.speeds and all(spec.grid.values())):
-            raise InputError(
-                [Fault("study", "", "no combination", "give a vehicle, a track, a speed")]
-            )
+            raise input_error("study", "no combination", "give a vehicle, a track, a speed")
         self._spec = spec
         self._loader = Loader({*spec.grid, *(k for t in spec.linked for k in t)}, spec.analyses)
         self._fingerprint = Fingerprints()
@@ -187,7 +185,5 @@ def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
     try:
         found = tuple(one for value in values for one in value_texts(value))
     except ValueError as error:
-        raise InputError(
-            [argument_fault("grid", text, str(error), f"allowed: {ALLOWED}")]
-        ) from None
+        raise argument_error("grid", str(error), f"allowed: {ALLOWED}", key=text) from None
     return key.strip(), found

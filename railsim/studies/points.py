@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, input_error
 from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
 from railsim.studies.case import Overrides
@@ -149,4 +149,4 @@ def check_number(
         return
     each = seconds() / REAL_TIME_FACTOR + SECONDS_BESIDES
     found = f"{number:,} runs, some {duration_in_words(number * each / cores)} on {cores} cores"
-    raise InputError([Fault("study", "", found, f"at most {MOST_RUNS:,}; give fewer values")])
+    raise input_error("study", found, f"at most {MOST_RUNS:,}; give fewer values")

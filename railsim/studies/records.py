@@ -6,7 +6,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 from railsim.files.access import TABLE_BYTES, make_folder, read_text, whole_file
 
 Record = dict[str, Any]
@@ -34,7 +34,7 @@ def read_record(path: Path) -> Record:
     except (ValueError, TypeError, KeyError, RecursionError):
         whole = False
     if not whole:
-        raise InputError([Fault(str(path), "", "the record is damaged", "")])
+        raise input_error(str(path), "the record is damaged")
     record: Record = stored["record"]
     return record
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from railsim.definitions.study.definition import Sample, Spread
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.units import speed_in_si
 
 Grid = Mapping[str, Sequence[str]]
@@ -74,7 +74,7 @@ def speed_of(text: str, option: str = "speeds") -> float:
     """
     found = speed_in_si(text)
     if isinstance(found, str):
-        raise InputError([argument_fault(option, "", f"'{text}' is not a speed", SPEEDS)])
+        raise argument_error(option, f"'{text}' is not a speed", SPEEDS)
     return float(found)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 from railsim.studies.front import non_dominated
 
 Floats = NDArray[np.float64]
@@ -239,7 +239,7 @@ def _nsga2(task: Task) -> None:
     except ImportError:
         found = "the package 'pymoo' is not installed"
         allowed = "install it with: pip install 'railsim[optimise]'; or method = \"surrogate\""
-        raise InputError([Fault("optimise.method", "nsga2", found, allowed)]) from None
+        raise input_error("optimise.method", found, allowed, key="nsga2") from None
     problem = Problem(
         n_var=task.variables, n_obj=task.objectives, n_ieq_constr=task.constraints, xl=0.0, xu=1.0
     )

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, Va
 from railsim.definitions.base import Name
 from railsim.definitions.study.analyses import Analysis
 from railsim.definitions.study.definition import Sample, Study, value_texts
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.studies.rows import PERMITTED, speed_of
 from railsim.units import ALLOWED
 from railsim.version import __version__
@@ -71,7 +71,7 @@ def _texts(key: str, values: Any) -> list[str]:
         try:
             found += value_texts(plain if isinstance(plain, str) else (plain,))
         except ValueError as error:
-            raise InputError([Fault(key, "", str(error), f"allowed: {ALLOWED}")]) from None
+            raise input_error(key, str(error), f"allowed: {ALLOWED}") from None
     return found
 
 

@@ -26,7 +26,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.linear.sliding import has_pads
 from railsim.linear.stationary import (
     WALKING_PACE,
@@ -192,7 +192,7 @@ def stationary(
     if cant is None:
         cant = _admissible_cant(vehicle)
     if not 0.0 < cant <= 0.5:
-        raise InputError([Fault("cant", "", f"{cant:g} m", "above 0, up to 0.5 m")])
+        raise input_error("cant", f"{cant:g} m", "above 0, up to 0.5 m")
     twists = twist_heights(flat, limits)
     balance = equilibrium(assemble(vehicle, track, settings or Settings()), WALKING_PACE)
     values: list[StationaryValue] = []
@@ -251,7 +251,7 @@ def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floa
     if len(names) != 2:
         found = f"{len(wheelsets)} wheelsets in {len(names)} assemblies"
         allowed = "two bogies, or two axles, each an assembly or a wheelset of the vehicle"
-        raise InputError([Fault(flat.name, "wheelsets", found, allowed)])
+        raise input_error(flat.name, found, allowed, key="wheelsets")
     middles = np.array([x[ends == name].mean() for name in names])
     of_wheelset = np.array([middles[names.index(end)] for end in ends])
     spacing = float(abs(middles[0] - middles[1]))

@@ -18,7 +18,7 @@ from typing import Annotated, Any, BinaryIO, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from railsim.definitions.study.analyses import unit_of_number
-from railsim.errors import Fault, InputError, RailsimError, words_of
+from railsim.errors import Fault, InputError, RailsimError, input_error, words_of
 from railsim.files.access import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
@@ -129,13 +129,13 @@ def read_index(path: Path) -> Index:
     text = read_text(path, INDEX_BYTES)
     # each takes some hundred bytes of memory when it is read
     if max(text.count(","), 5 * text.count("{"), 5 * text.count("[")) > MOST_VALUES:
-        raise InputError([Fault(str(path), "", "too many values", f"{MOST_VALUES} at most")])
+        raise input_error(str(path), "too many values", f"{MOST_VALUES} at most")
     try:
         index: Any = json.loads(text)
     except (ValueError, RecursionError) as error:
         line = f"line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         words = f"broken JSON: {getattr(error, 'msg', error)}"
-        raise InputError([Fault(str(path), line, words, "")]) from None
+        raise input_error(str(path), words, key=line) from None
     index = index if isinstance(index, dict) else {"format": None}
     if index.get("format") == FORMAT:
         refuse_too_many(index.get("inputs"), str(path))
@@ -156,7 +156,7 @@ def refuse_too_many(inputs: Any, file: str) -> None:
             number += len(node)
             nodes += node.values() if isinstance(node, dict) else node
     if number > MOST_INPUTS:
-        raise InputError([Fault(file, "inputs", "too many values", f"{MOST_INPUTS} at most")])
+        raise input_error(file, "too many values", f"{MOST_INPUTS} at most", key="inputs")
 
 
 def check_index(path: Path) -> Index:
@@ -221,7 +221,7 @@ def _checked_row(record: Record) -> dict[str, Any]:
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         found = f"the record of '{record['name']}' cannot be used ({error!r})"
         allowed = "remove the journal: existing results are kept"
-        raise InputError([Fault(JOURNAL, "", found, allowed)]) from None
+        raise input_error(JOURNAL, found, allowed) from None
 
 
 def unit_of(column: str) -> str:

@@ -13,7 +13,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import InputError, RailsimError, argument_fault
+from railsim.errors import RailsimError, argument_error
 from railsim.files.access import TABLE_BYTES, read_bytes
 from railsim.result import Result
 
@@ -40,13 +40,11 @@ def full_name(function: "str | Function | None") -> str | None:
             file = ""
         if not name.isidentifier() or not Path(file).is_file():
             found = f"{function!r} is not a function of a module"
-            raise InputError([argument_fault(PARAMETER, "", found, "a function defined in a file")])
+            raise argument_error(PARAMETER, found, "a function defined in a file")
         return f"{Path(file).resolve()}:{name}"
     file, _, name = function.rpartition(":")
     if not (file.endswith(".py") and name.isidentifier()):
-        raise InputError(
-            [argument_fault(PARAMETER, function, "not understood", f"allowed: {ALLOWED}")]
-        )
+        raise argument_error(PARAMETER, "not understood", f"allowed: {ALLOWED}", key=function)
     whole = f"{Path(file).resolve()}:{name}"
     _loaded(whole)
     return whole
@@ -67,7 +65,7 @@ def given_again(stored: str | None, option: str | None) -> str | None:
         allowed = (
             f"read it, then give `{PARAMETER}`, FILE.py:FUNCTION, too: it runs with your rights"
         )
-        raise InputError([argument_fault("resume", "", found, allowed)])
+        raise argument_error("resume", found, allowed)
     return full_name(option)
 
 
@@ -118,8 +116,8 @@ def _loaded(name: str) -> Function:
         spec.loader.exec_module(module)
     except Exception as error:
         found = f"cannot be loaded ({type(error).__name__}: {error})"
-        raise InputError([argument_fault(PARAMETER, file, found, ALLOWED)]) from None
+        raise argument_error(PARAMETER, found, ALLOWED, key=file) from None
     loaded: Function | None = getattr(module, function, None)
     if not callable(loaded):
-        raise InputError([argument_fault(PARAMETER, file, f"no function '{function}'", ALLOWED)])
+        raise argument_error(PARAMETER, f"no function '{function}'", ALLOWED, key=file)
     return loaded

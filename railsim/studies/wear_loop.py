@@ -26,7 +26,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.track.tables import Straight
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import Fault, InputError, ModelError, RailsimError
+from railsim.errors import Fault, InputError, ModelError, RailsimError, input_error
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.filters import Floats
@@ -332,7 +332,7 @@ def _profile_name(vehicle: Vehicle) -> str:
     names = {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
     if len(names) != 1:
         found = f"{len(names)} wheel profiles"
-        raise InputError([Fault("vehicle", "profile", found, "the same for all wheels")])
+        raise input_error("vehicle", found, "the same for all wheels", key="profile")
     return names.pop()
 
 

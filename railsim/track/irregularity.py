@@ -15,7 +15,7 @@ from railsim.definitions.excitations.measured import Measured, largest_between_r
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import input_error, nearest
 from railsim.laws.binding import EXCITATION, bind
 from railsim.laws.permission import permitted_part
 
@@ -58,7 +58,7 @@ def _by_law(part: ByLaw, key: str, track: Track) -> Displacement:
     laws = track.laws or {}
     if part.law not in laws:
         allowed = nearest(part.law, laws) if laws else "there is none"
-        raise InputError([Fault("track", f"{key}.law", f"no law '{part.law}'", allowed)])
+        raise input_error("track", f"no law '{part.law}'", allowed, key=f"{key}.law")
     bound = bind(part.law, laws[part.law], EXCITATION)
     values = bound.parameters(f"{key}.parameters", part.parameters)
 
@@ -67,7 +67,7 @@ def _by_law(part: ByLaw, key: str, track: Track) -> Displacement:
         wrong = np.flatnonzero(~(np.abs(part.factor * found) <= LARGEST))
         if wrong.size:
             words = f"the law '{part.law}' gives {found[wrong[0]]:g} m at s = {s[wrong[0]]:.6g} m"
-            raise InputError([Fault("track", key, words, f"a number within {LARGEST:g} m")])
+            raise input_error("track", words, f"a number within {LARGEST:g} m", key=key)
         return found
 
     return part.displacement_by(value, track.length)

@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.track.definition import Track
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
 from railsim.track.alignment import Alignment
@@ -60,7 +60,7 @@ def track_tables(
     ds = cell_length or usual_cell_length(track, before + after)
     if (track.length + before + after) / ds > 10 * MOST_CELLS:
         found = f"{track.length:g} m of track with details of {ds:g} m"
-        raise InputError([Fault(track.name, "plan", found, "a shorter track, or coarser details")])
+        raise input_error(track.name, found, "a shorter track, or coarser details", key="plan")
     cells_before = int(np.ceil(before / ds))
     n_cells = cells_before + int(np.ceil((track.length + after) / ds))
     s: Floats = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)

@@ -2,9 +2,9 @@
 
 from typing import Literal, Self
 
-from pydantic import PrivateAttr, model_validator
+from pydantic import PrivateAttr
 
-from railsim.definitions.base import NonNegative, Positive
+from railsim.definitions.base import NonNegative, Positive, check
 from railsim.definitions.elements.base import PointElement, Signs
 from railsim.definitions.elements.rows import AXES, Act
 
@@ -37,15 +37,14 @@ class CommandedElement(PointElement):
         """Whether it acts at points."""
         return self.acts != "axle"
 
-    @model_validator(mode="after")
-    def _what_belongs_together(self) -> Self:
+    @check
+    def _what_belongs_together(self) -> None:
         if self.rate_limit is not None and self.lag == 0.0:
             raise ValueError("'rate_limit' needs 'lag'")
         if self.acts == "axle" and (self.sides or self.stroke):
             raise ValueError("acts = \"axle\" has no 'sides' and no 'stroke'")
         if self.acts == "line" and (self.points is None or self.points[0] == self.points[1]):
             raise ValueError("acts = \"line\" needs two different 'points'")
-        return self
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored placement, where one command has the mirrored effect."""
@@ -85,8 +84,8 @@ class Actuator(CommandedElement):
     damping: NonNegative = 0.0
     """Damping beside it [N s/m or N m s]"""
 
-    @model_validator(mode="after")
-    def _a_position_is_held(self) -> Self:
+    @check
+    def _a_position_is_held(self) -> None:
         if (self.command == "position") != (self.stiffness > 0.0):
             raise ValueError("'stiffness' belongs to command = \"position\" and only to it")
         if self.damping > 0.0 and self.command != "position":
@@ -95,7 +94,6 @@ class Actuator(CommandedElement):
         if self.command == wrong:
             other = "no" if wrong == "position" else "only"
             raise ValueError(f'command = "{wrong}" has {other} acts = "axle"')
-        return self
 
     @property
     def command_unit(self) -> str:

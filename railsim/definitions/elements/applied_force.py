@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Finite, Text, Vector, rises
+from railsim.definitions.base import Finite, Text, Vector, check, rises
 from railsim.definitions.elements.base import Element, Signs, times
 from railsim.definitions.elements.rows import Load
 
@@ -32,11 +32,10 @@ class AppliedForce(Element):
     torque_table: TimeRows | None = None
     """Rows [time s or distance m, Mx, My, Mz N m], linear in between, constant beyond"""
 
-    @model_validator(mode="after")
-    def _something_acts(self) -> Self:
+    @check
+    def _something_acts(self) -> None:
         if self.force_table is None and self.torque_table is None:
             raise ValueError("'force_table' or 'torque_table' is needed")
-        return self
 
     def end_points(self) -> tuple[Vector, Vector] | None:
         """Point of action as written, twice [m]; None for the centre of gravity."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from railsim.definitions.base import (
     Definition,
@@ -14,6 +14,7 @@ from railsim.definitions.base import (
     Positive,
     Text,
     Vector,
+    check,
     rising,
 )
 from railsim.definitions.elements.rows import NOTHING, Row, Rows, Triple
@@ -152,13 +153,12 @@ class PointElement(SidedElement):
     points: tuple[Vector, Vector] | None = None
     """Point on body 1 and point on body 2 [m]"""
 
-    @model_validator(mode="after")
-    def _one_way_of_giving_points(self) -> Self:
+    @check
+    def _one_way_of_giving_points(self) -> None:
         if (self.point is None) == (self.points is None) and self.has_points:
             raise ValueError("either 'point' or 'points' is needed")
         if not self.has_points and (self.point or self.points):
             raise ValueError("it acts at no point: 'point' and 'points' mean nothing")
-        return self
 
     @property
     def has_points(self) -> bool:
@@ -193,14 +193,13 @@ class FreeLength(PairElement):
         load, at = self.load_at_length
         return load + stiffness * (at - length)
 
-    @model_validator(mode="after")
-    def _one_origin_of_the_preload(self) -> Self:
+    @check
+    def _one_origin_of_the_preload(self) -> None:
         if self.free_length is not None and self.load_at_length is not None:
             raise ValueError("either 'free_length' or 'load_at_length', not both")
         given = vars(self).get("preload", 0.0) not in ("auto", 0.0)
         if self.has_free_length and given:  # defaults stand in the files that results carry
             raise ValueError("either 'preload' or a length, not both")
-        return self
 
 
 class PreloadAlongAxes(PairElement):
@@ -239,11 +238,10 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
         """Damping along z [N s/m]."""
         return self.damping[2]
 
-    @model_validator(mode="after")
-    def _length_needs_seats(self) -> Self:
+    @check
+    def _length_needs_seats(self) -> None:
         if self.has_free_length and (self.points is None or self.stiffness[2] == 0.0):
             raise ValueError("a free length needs 'points' at two heights and a stiffness along z")
-        return self
 
     def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
         """Return the spring with the preload of its length: compression pushes the seats apart."""

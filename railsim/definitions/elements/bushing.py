@@ -1,10 +1,8 @@
 """Springs and dampers along and about three axes."""
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
-from pydantic import model_validator
-
-from railsim.definitions.base import AutoOrVector, NonNegativeVector
+from railsim.definitions.base import AutoOrVector, NonNegativeVector, check
 from railsim.definitions.elements.base import PointElement, VerticalSpring
 from railsim.definitions.elements.rows import Mount, State
 
@@ -27,12 +25,11 @@ class Bushing(VerticalSpring, PointElement):
     preload: AutoOrVector = "auto"
     """Force on body 1 in the nominal position along x, y, z [N], or `auto`: from the equilibrium"""
 
-    @model_validator(mode="after")
-    def _series_needs_damping(self) -> Self:
+    @check
+    def _series_needs_damping(self) -> None:
         for axis, series, damping in zip("xyz", self.series_stiffness, self.damping, strict=True):
             if series > 0.0 and damping == 0.0:
                 raise ValueError(f"'series_stiffness' along {axis} needs 'damping' along {axis}")
-        return self
 
     @property
     def vertical_damping(self) -> float:

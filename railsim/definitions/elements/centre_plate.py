@@ -1,11 +1,9 @@
 """A flat centre plate, as eight pads."""
 
 from math import cos, pi, sin, sqrt
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
-from pydantic import model_validator
-
-from railsim.definitions.base import NonNegative, Positive, Vector
+from railsim.definitions.base import NonNegative, Positive, Vector, check
 from railsim.definitions.elements.base import Compression, Element, PairElement
 from railsim.definitions.elements.friction import SlidingFriction
 from railsim.definitions.elements.rows import Mount
@@ -39,11 +37,10 @@ class CentrePlate(SlidingFriction, PairElement):
     stick_stiffness: Positive
     """Horizontal stiffness of the whole sticking plate [N/m]"""
 
-    @model_validator(mode="after")
-    def _a_ring(self) -> Self:
+    @check
+    def _a_ring(self) -> None:
         if self.inner_radius >= self.radius:
             raise ValueError("'inner_radius' must be smaller than 'radius'")
-        return self
 
     @property
     def vertical_stiffness(self) -> float:

@@ -1,10 +1,17 @@
 """Dry friction: what pads have in common, and the friction pad or leaf spring."""
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import AutoOrVector, Definition, Finite, NonNegativeVector, Positive
+from railsim.definitions.base import (
+    AutoOrVector,
+    Definition,
+    Finite,
+    NonNegativeVector,
+    Positive,
+    check,
+)
 from railsim.definitions.elements.base import PointElement, VerticalSpring
 from railsim.definitions.elements.rows import FrictionLimit, Mount, pads
 
@@ -21,11 +28,10 @@ class SlidingFriction(Definition):
     stribeck_speed: Positive | None = None
     """Sliding speed at which the difference has fallen to 1/e of itself [m/s]"""
 
-    @model_validator(mode="after")
-    def _ratio_with_speed(self) -> Self:
+    @check
+    def _ratio_with_speed(self) -> None:
         if (self.sliding_ratio < 1.0) != (self.stribeck_speed is not None):
             raise ValueError("a 'sliding_ratio' below 1 and 'stribeck_speed' belong together")
-        return self
 
     def limit(self, force: float = 0.0, coefficient: float = 0.0) -> FrictionLimit:
         """Return the limit along one axis: `force` [N] + `coefficient` [1] times the load."""
@@ -59,8 +65,8 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
     preload: AutoOrVector = "auto"
     """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
 
-    @model_validator(mode="after")
-    def _friction_needs_a_sticking_stiffness(self) -> Self:
+    @check
+    def _friction_needs_a_sticking_stiffness(self) -> None:
         limits = zip(self.friction_force, self.friction_coefficient, strict=True)
         slides = [force > 0.0 or coefficient > 0.0 for force, coefficient in limits]
         if not any(slides):
@@ -68,7 +74,6 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         for axis, sliding, sticking in zip("xyz", slides, self.stick_stiffness, strict=True):
             if sliding and sticking == 0.0:
                 raise ValueError(f"friction along {axis} needs 'stick_stiffness' along {axis}")
-        return self
 
     def rows(self) -> list[Mount]:
         """One mount with pads along the axes that have friction."""

@@ -2,9 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
-
-from railsim.definitions.base import Finite, Name
+from railsim.definitions.base import EMPTY_TABLE, Finite, Name
 from railsim.definitions.elements.actuator import CommandedElement
 from railsim.definitions.elements.rows import Act
 
@@ -15,7 +13,7 @@ class LawElement(CommandedElement):
     kind: Literal["law"]
     law: Name
     """Name of the law in the table `laws`"""
-    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    parameters: dict[Name, Finite] = EMPTY_TABLE
     """Values of the function's further arguments, by name"""
 
     def rows(self) -> list[Act]:

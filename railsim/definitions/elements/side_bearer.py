@@ -1,10 +1,8 @@
 """A pad that presses and slides."""
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
-from pydantic import model_validator
-
-from railsim.definitions.base import NonNegative, Positive
+from railsim.definitions.base import NonNegative, Positive, check
 from railsim.definitions.elements.base import Compression, PointElement
 from railsim.definitions.elements.friction import SlidingFriction
 from railsim.definitions.elements.rows import NOTHING, Mount, Rows, pads
@@ -36,13 +34,12 @@ class SideBearer(SlidingFriction, PointElement):
     stop_stiffness: Positive | None = None
     """Stiffness of the solid stop beside that of the pad [N/m]"""
 
-    @model_validator(mode="after")
-    def _one_nominal_state(self) -> Self:
+    @check
+    def _one_nominal_state(self) -> None:
         if self.clearance > 0.0 and self.preload != 0.0:
             raise ValueError("either 'preload' or 'clearance', not both")
         if (self.stop_travel is None) != (self.stop_stiffness is None):
             raise ValueError("'stop_travel' and 'stop_stiffness' belong together")
-        return self
 
     @property
     def vertical_stiffness(self) -> float:

@@ -4,9 +4,7 @@ from itertools import pairwise
 from math import dist
 from typing import Literal, Self
 
-from pydantic import model_validator
-
-from railsim.definitions.base import AutoOrNumber, NonNegative, Vector
+from railsim.definitions.base import AutoOrNumber, NonNegative, Vector, check
 from railsim.definitions.elements.base import Characteristic, FreeLength, SidedElement, two_sided
 from railsim.definitions.elements.rows import Link, State
 
@@ -30,8 +28,8 @@ class SpringDamper(FreeLength, SidedElement):
     damper_table: Characteristic | None = None
     """Rows [velocity m/s, force N] instead of `damping`; from 0 on it serves both directions"""
 
-    @model_validator(mode="after")
-    def _one_law_each(self) -> Self:
+    @check
+    def _one_law_each(self) -> None:
         if self.points[0] == self.points[1]:
             raise ValueError("the two points are the same: the element has no direction")
         if self.stiffness > 0.0 and self.spring_table is not None:
@@ -42,7 +40,6 @@ class SpringDamper(FreeLength, SidedElement):
             raise ValueError("'series_stiffness' needs 'damping' or 'damper_table'")
         if self.has_free_length and self.stiffness == 0.0:
             raise ValueError("a free length needs 'stiffness'")
-        return self
 
     def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
         """Return the spring with the preload of its length, tension positive."""

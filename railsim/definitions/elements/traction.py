@@ -1,10 +1,10 @@
 """Torques on wheelsets: what drives and brakes have in common, and the drive."""
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Finite, NonNegative, Positive, rises
+from railsim.definitions.base import Finite, NonNegative, Positive, check, rises
 from railsim.definitions.elements.base import PairElement
 from railsim.definitions.elements.rows import Drive
 
@@ -26,11 +26,10 @@ class AxleTorque(PairElement):
     slip_control: tuple[NonNegative, Positive] | None = None
     """Slip (omega r - V)/V at which the torque begins to fall, and slip at which it is gone [1]"""
 
-    @model_validator(mode="after")
-    def _slip_rises(self) -> Self:
+    @check
+    def _slip_rises(self) -> None:
         if self.slip_control is not None and self.slip_control[0] >= self.slip_control[1]:
             raise ValueError("'slip_control' needs two rising slips, such as [0.01, 0.02]")
-        return self
 
     def rows(self) -> list[Drive]:
         """One drive."""

@@ -1,11 +1,18 @@
 """Friction wedges of a three-piece bogie."""
 
 from math import tan
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import AutoOrVector, Finite, NonNegative, NonNegativeVector, Positive
+from railsim.definitions.base import (
+    AutoOrVector,
+    Finite,
+    NonNegative,
+    NonNegativeVector,
+    Positive,
+    check,
+)
 from railsim.definitions.elements.base import PointElement, VerticalSpring
 from railsim.definitions.elements.rows import FrictionLimit, Mount, pads
 
@@ -35,8 +42,8 @@ class Wedge(VerticalSpring, PointElement):
     stick_stiffness: tuple[Positive, Positive]
     """Stiffness of the sticking wedges along y and z [N/m]"""
 
-    @model_validator(mode="after")
-    def _wedge_slides(self) -> Self:
+    @check
+    def _wedge_slides(self) -> None:
         if self.friction_coefficient >= tan(self.angle):
             raise ValueError(
                 "the wedge locks itself: 'friction_coefficient' must be smaller than tan(angle) = "
@@ -44,10 +51,9 @@ class Wedge(VerticalSpring, PointElement):
             )
         if self.stiffness[2] == 0.0:
             raise ValueError("the wedges need springs: 'stiffness' along z")
-        return self
 
-    @model_validator(mode="after")
-    def _wedge_presses(self) -> Self:
+    @check
+    def _wedge_presses(self) -> None:
         if self.preload != "auto" and self.preload[2] < 0.0:
             raise ValueError(
                 "wedges press and never pull: 'preload' along z, on the side frame and positive "
@@ -58,7 +64,6 @@ class Wedge(VerticalSpring, PointElement):
                 "the bolster, body 2, rests on the wedges, which stand on the side frame, body 1: "
                 "the point on body 1 must not lie above that on body 2 (z points down)"
             )
-        return self
 
     @property
     def share(self) -> float:

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Name, NonNegative
+from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative, check
 from railsim.definitions.excitations.base import (
     MIRROR,
     SHARES,
@@ -29,7 +29,7 @@ class ByLaw(Irregular):
     channel: Channel = "vertical"
     """Which of the four irregularities: both rails to the right or down, the left rail higher, or
     the rails apart"""
-    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    parameters: dict[Name, Finite] = EMPTY_TABLE
     """Values of the function's further arguments, by name"""
     factor: Finite = 1.0
     """Factor of what it gives [1]"""
@@ -42,11 +42,10 @@ class ByLaw(Irregular):
     fade: NonNegative = 10.0
     """Length over which it fades in and out within its ends [m]"""
 
-    @model_validator(mode="after")
-    def _has_a_length(self) -> Self:
+    @check
+    def _has_a_length(self) -> None:
         if self.end is not None and self.end <= self.begin:
             raise ValueError("'end' must lie behind 'begin'")
-        return self
 
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""

@@ -5,10 +5,9 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Flag, NonNegative, Positive, Text, rises
+from railsim.definitions.base import Finite, Flag, NonNegative, Positive, Text, check, rises
 from railsim.definitions.excitations.base import (
     COLUMNS,
     Amplitude,
@@ -66,8 +65,8 @@ class Measured(Irregular):
     fade: NonNegative = 10.0
     """Length over which the data fade in and out at both ends [m]"""
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @check
+    def _one_source(self) -> None:
         if (self.file is None) == (self.rows is None):
             raise ValueError("either 'file' or 'rows' is needed")
         if self.rows is not None and len(self.rows) < 4:
@@ -76,7 +75,6 @@ class Measured(Irregular):
             given = [key for key in READING if getattr(self, key) not in (None, (), False)]
             if given:
                 raise ValueError(f"'{given[0]}' belongs to 'file' and does not go with 'rows'")
-        return self
 
     def mirrored(self) -> Self:
         """Return the rows with the rails exchanged, displacements to the right turned round."""

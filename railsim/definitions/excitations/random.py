@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Flag, NonNegative
+from railsim.definitions.base import Finite, Flag, NonNegative, check
 from railsim.definitions.excitations.base import (
     CHANNELS,
     MIRROR,
@@ -59,8 +59,8 @@ class Random(Irregular):
     mirror: Flag = False
     """The mirror image of the same realisation: left and right exchanged"""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    @check
+    def _complete(self) -> None:
         if (self.spectrum == "own") != (self.coefficients is not None):
             raise ValueError("'coefficients' belong to spectrum = \"own\" and only to it")
         if self.end is not None and self.end <= self.begin:
@@ -70,7 +70,6 @@ class Random(Irregular):
             raise ValueError("'channels' names one irregularity twice")
         if self.spectrum == "china_trunk" and "gauge" in channels:
             raise ValueError("the spectra 'china_trunk' do not describe the gauge")
-        return self
 
     def mirrored(self) -> Self:
         """Return the mirror image of the same realisation."""

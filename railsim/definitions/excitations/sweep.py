@@ -3,10 +3,10 @@
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, NonNegative
+from railsim.definitions.base import Finite, NonNegative, check
 from railsim.definitions.excitations.base import (
     MIRROR,
     SHARES,
@@ -42,11 +42,10 @@ class Sweep(Irregular):
     fade: NonNegative = 10.0
     """Length over which it fades in and out within its ends [m]"""
 
-    @model_validator(mode="after")
-    def _has_a_length(self) -> Self:
+    @check
+    def _has_a_length(self) -> None:
         if self.end <= self.begin:
             raise ValueError("'end' must lie behind 'begin'")
-        return self
 
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""

@@ -8,11 +8,11 @@ What one key says is checked here, what several say together in `mechanism_fault
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
-from railsim.definitions.base import Count, Definition, Name, Remark, Text
+from railsim.definitions.base import EMPTY_TABLE, Count, Definition, Name, Remark, Text, check
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism.parts import (
     AUTO,
@@ -49,7 +49,7 @@ from railsim.definitions.mechanism.parts import (
     TorsionSpring,
     by_key,
 )
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import Fault, argument_error, nearest
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
 
@@ -165,8 +165,8 @@ class Motion(Definition):
     points: Annotated[int, Field(strict=True, ge=3, le=100_000)] = 401
     """Number of points in time"""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    @check
+    def _complete(self) -> None:
         if (self.actuator is None) == (self.angle is None):
             raise ValueError("either 'actuator' (its length) or 'angle' (of a body)")
         if self.law == "table":
@@ -177,7 +177,6 @@ class Motion(Definition):
                 raise ValueError("law = 'polynomial_345' needs a 'duration'")
         elif (self.speed is None) == (self.duration is None):
             raise ValueError("law = 'constant_speed' needs 'speed' or 'duration'")
-        return self
 
 
 class Release(Definition):
@@ -219,11 +218,10 @@ class CatalogueRow(Definition):
     lock_compression: Quantity | None = None
     """Force that it holds locked against compression, over F1"""
 
-    @model_validator(mode="after")
-    def _one(self) -> Self:
+    @check
+    def _one(self) -> None:
         if (self.stroke is None) == (self.strokes is None):
             raise ValueError("either 'stroke' or 'strokes'")
-        return self
 
 
 class Selection(Definition):
@@ -311,7 +309,7 @@ class Optimise(Definition):
     """Number of starts of the search; the first is the file's own"""
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     """Seed of the other starts"""
-    assemblies: dict[Name, tuple[Quantity, ...]] = Field(default_factory=dict)
+    assemblies: dict[Name, tuple[Quantity, ...]] = EMPTY_TABLE
     """Parameters that choose an assembly, with the values that starts may take"""
     bounds: dict[Name, tuple[Quantity, Quantity]] = Field(min_length=1)
     """Smallest and largest value of each parameter that may change"""
@@ -330,29 +328,29 @@ class Mechanism(FileDefinition):
     """Where it comes from"""
     remarks: tuple[Text, ...] = ()
     """Remarks on its numbers"""
-    parameters: dict[Name, QuantityOrAuto] = Field(default_factory=dict)
+    parameters: dict[Name, QuantityOrAuto] = EMPTY_TABLE
     """Numbers that may be varied, in SI and rad, or expressions of others"""
-    derived: dict[Name, Quantity] = Field(default_factory=dict)
+    derived: dict[Name, Quantity] = EMPTY_TABLE
     """Intermediate results by name, for use in other expressions"""
-    provenance: dict[Name, tuple[Name, ...]] = Field(default_factory=dict)
+    provenance: dict[Name, tuple[Name, ...]] = EMPTY_TABLE
     """Parameters by where they are from: printed, derived, reconstructed, new, ..."""
-    units: dict[Text, tuple[Name, ...]] = Field(default_factory=dict)
+    units: dict[Text, tuple[Name, ...]] = EMPTY_TABLE
     """Parameters by their unit; those not listed are lengths"""
     ground: Ground = Ground()
     """What does not move"""
     bodies: dict[Name, Body] = Field(min_length=1)
     """Bodies by name"""
-    start: dict[Name, Start] = Field(default_factory=dict)
+    start: dict[Name, Start] = EMPTY_TABLE
     """Pose of the bodies at the driver's start, roughly"""
     joints: dict[Name, Joint] = Field(min_length=1)
     """Joints by name"""
     driver: Driver
     """The coordinate that moves the mechanism"""
-    actuators: dict[Name, Actuator] = Field(default_factory=dict)
+    actuators: dict[Name, Actuator] = EMPTY_TABLE
     """Actuators and other unknown forces by name"""
-    elements: dict[Name, Element] = Field(default_factory=dict)
+    elements: dict[Name, Element] = EMPTY_TABLE
     """Masses, springs, dampers, given forces by name"""
-    angles: dict[Name, Angle] = Field(default_factory=dict)
+    angles: dict[Name, Angle] = EMPTY_TABLE
     """Transmission angles by name"""
     sampling: Sampling = Sampling()
     """Positions at which results are written"""
@@ -368,7 +366,7 @@ class Mechanism(FileDefinition):
     """Motion law for inverse dynamics"""
     release: Release | None = None
     """Free motion"""
-    catalogues: dict[Name, tuple[CatalogueRow, ...]] = Field(default_factory=dict)
+    catalogues: dict[Name, tuple[CatalogueRow, ...]] = EMPTY_TABLE
     """Catalogues of gas springs by name"""
     selection: tuple[Selection, ...] = ()
     """Gas springs to be found in a catalogue"""
@@ -376,11 +374,11 @@ class Mechanism(FileDefinition):
     """Quick check of a lid's gas springs"""
     optimise: Optimise | None = None
     """Search for parameters"""
-    published: dict[Name, Quantity] = Field(default_factory=dict)
+    published: dict[Name, Quantity] = EMPTY_TABLE
     """Results that the source prints, by their names, shown beside ours [SI]"""
-    tolerances: dict[Name, Quantity] = Field(default_factory=dict)
+    tolerances: dict[Name, Quantity] = EMPTY_TABLE
     """Tolerances of parameters, plus and minus"""
-    cases: dict[Name, dict[Name, QuantityOrAuto]] = Field(default_factory=dict)
+    cases: dict[Name, dict[Name, QuantityOrAuto]] = EMPTY_TABLE
     """Other values of parameters by the name of a case"""
 
     @classmethod
@@ -418,7 +416,7 @@ class Mechanism(FileDefinition):
             return self
         if case not in self.cases:
             allowed = nearest(case, self.cases) if self.cases else "the file has no cases"
-            raise InputError([argument_fault("case", "", f"no case '{case}'", allowed)])
+            raise argument_error("case", f"no case '{case}'", allowed)
         return self.with_parameters(self.cases[case])
 
     @property

@@ -2,19 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    Discriminator,
-    Field,
-    PlainValidator,
-    Tag,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
 
-from railsim.definitions.base import Definition, Flag, Name
+from railsim.definitions.base import EMPTY_TABLE, Definition, Flag, Name, check
 from railsim.definitions.mechanism.expressions import Expression
 
 AUTO = "auto"
@@ -99,7 +91,7 @@ Coordinates = Annotated[
 class Ground(Definition):
     """What does not move."""
 
-    points: dict[Name, Coordinates] = Field(default_factory=dict)
+    points: dict[Name, Coordinates] = EMPTY_TABLE
     """Points by name [m]"""
     gravity: Quantity = 9.81
     """Gravitational acceleration along -y [m/s2]"""
@@ -108,7 +100,7 @@ class Ground(Definition):
 class Body(Definition):
     """A rigid body; its axes are where its points say."""
 
-    points: dict[Name, Coordinates] = Field(default_factory=dict)
+    points: dict[Name, Coordinates] = EMPTY_TABLE
     """Points by name in the body's axes [m]"""
     mass: Quantity = 0.0
     """Mass [kg]"""
@@ -188,11 +180,10 @@ class Arc(Definition):
     end: Quantity | None = None
     """The same for its end [rad]"""
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    @check
+    def _one_way(self) -> None:
         if (self.length is None) == (self.centre is None):
             raise ValueError("either 'length' (tangent arcs) or 'centre'")
-        return self
 
 
 class Cam(Definition):
@@ -209,14 +200,13 @@ class Cam(Definition):
     arcs: tuple[Arc, ...] = Field(min_length=1)
     """Arcs from the begin of the motion on"""
 
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
+    @check
+    def _one_kind(self) -> None:
         tangent = [arc.length is not None for arc in self.arcs]
         if any(tangent) != all(tangent):
             raise ValueError("all arcs with 'length', or all with 'centre'")
         if tangent[0] == (self.path is None) or tangent[0] != (self.body is None):
             raise ValueError("'path' goes with arcs of a 'length', 'body' with arcs of a 'centre'")
-        return self
 
 
 def by_key(*keys: str) -> Any:
@@ -273,14 +263,13 @@ class AirSpring(Definition):
     supply_pressure: Quantity | None = None
     """Available pressure [Pa]"""
 
-    @model_validator(mode="after")
-    def _rectangular(self) -> Self:
+    @check
+    def _rectangular(self) -> None:
         if len(self.forces) != len(self.heights):
             raise ValueError(f"{len(self.forces)} rows of 'forces', {len(self.heights)} 'heights'")
         for row in self.forces:
             if len(row) != len(self.pressures):
                 raise ValueError(f"a row of {len(row)} 'forces', {len(self.pressures)} 'pressures'")
-        return self
 
 
 class Piston(Definition):
@@ -362,10 +351,9 @@ class Spring(Definition):
     table: Rows | None = None
     """Rows [length m, push N], lengths rising, straight in between, instead"""
 
-    @model_validator(mode="after")
-    def _law(self) -> Self:
+    @check
+    def _law(self) -> None:
         _one_law(self, "free_length")
-        return self
 
 
 class TorsionSpring(Definition):
@@ -380,10 +368,9 @@ class TorsionSpring(Definition):
     table: Rows | None = None
     """Rows [angle rad, torque on the first body N m], angles rising, straight in between"""
 
-    @model_validator(mode="after")
-    def _law(self) -> Self:
+    @check
+    def _law(self) -> None:
         _one_law(self, "free_angle")
-        return self
 
 
 class JointFriction(Definition):
@@ -472,11 +459,10 @@ class Driver(Definition):
     end: Quantity
     """Value of the driver at its end [rad or m]"""
 
-    @model_validator(mode="after")
-    def _one(self) -> Self:
+    @check
+    def _one(self) -> None:
         if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
             raise ValueError("one of 'angle', 'length' and 'coordinate'")
-        return self
 
 
 class Angle(Definition):

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.expressions import Expression, evaluate
 from railsim.definitions.mechanism.parts import Link, Polar, Prismatic, Slot
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 
 PARTS = ("length", "free_length", "stroke", "extended", "bore", "rod", "pin_to_pin", "end_length")
 """Lengths of actuators and elements."""
@@ -65,7 +65,7 @@ def parameter_values(
         ]
         if not ready:
             names = ", ".join(sorted(waiting))
-            raise InputError([Fault("", "parameters", f"{names} refer to each other", "")])
+            raise input_error("", f"{names} refer to each other", key="parameters")
         for name in ready:
             values[name] = number(waiting.pop(name), values, home[name])
     return values
@@ -86,7 +86,7 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
         hint = ""
         if "acos" in str(error) or "asin" in str(error) or "root" in str(error):
             hint = "the links cannot be assembled at the start with these parameters"
-        raise InputError([Fault("", key, str(error), hint)]) from None
+        raise input_error("", str(error), hint, key=key) from None
 
 
 def coordinates(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:

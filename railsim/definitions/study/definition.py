@@ -1,11 +1,21 @@
 """Study files, `railsim-study/1`: what is combined, linked and sampled, under version control."""
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Count, Definition, Finite, Name, NonNegative, Positive, Text
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Count,
+    Definition,
+    Finite,
+    Name,
+    NonNegative,
+    Positive,
+    Text,
+    check,
+)
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.study.analyses import Analysis, needs_speed
 from railsim.definitions.study.design import Optimise
@@ -65,8 +75,8 @@ class Spread(Definition):
     deviation: Positive | None = None
     """Its standard deviation [SI]"""
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    @check
+    def _one_way(self) -> None:
         pairs = ((self.low, self.high), (self.nominal, self.tolerance), (self.mean, self.deviation))
         whole = [None not in pair for pair in pairs]
         begun = [pair != (None, None) for pair in pairs]
@@ -80,7 +90,6 @@ class Spread(Definition):
                 raise ValueError("'low' must be below 'high'")
             if self.scale == "log" and not self.low * self.high > 0.0:
                 raise ValueError('scale = "log" needs two ends of the same sign, neither zero')
-        return self
 
 
 class Sample(Definition):
@@ -95,11 +104,10 @@ class Sample(Definition):
     parameters: Annotated[dict[Text, Spread], Field(min_length=1)]
     """Parameters by their paths, or `speed`"""
 
-    @model_validator(mode="after")
-    def _balanced(self) -> Self:
+    @check
+    def _balanced(self) -> None:
         if self.method == "sobol" and self.number & (self.number - 1):
             raise ValueError("'number' must be a power of two for method = \"sobol\"")
-        return self
 
 
 class Study(FileDefinition):
@@ -130,13 +138,13 @@ class Study(FileDefinition):
     """End of all runs: distance [m]"""
     assignments: tuple[Text, ...] = ()
     """`key.path=value` for all runs, the paths beginning with `vehicle.`, `track.`, `settings.`"""
-    grid: dict[Text, Values] = Field(default_factory=dict)
+    grid: dict[Text, Values] = EMPTY_TABLE
     """Values of further keys: all combinations"""
     linked: tuple[dict[Text, Values], ...] = ()
     """Keys whose values go together: the first of one with the first of the others"""
     sample: Sample | None = None
     """Random values of further keys"""
-    analyses: dict[Name, Analysis] = Field(default_factory=dict)
+    analyses: dict[Name, Analysis] = EMPTY_TABLE
     """What is done at each point, by a name of one's own; by default a run"""
     optimise: Optimise | None = None
     """Variables, objectives and constraints of `railsim optimise`"""
@@ -150,8 +158,8 @@ class Study(FileDefinition):
         lists += [self.sample.number] if self.sample else []
         return math.prod([len(self.vehicles), len(self.tracks), *lists])
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    @check
+    def _consistent(self) -> None:
         for name, values in [*self.grid.items(), *(p for t in self.linked for p in t.items())]:
             try:
                 value_texts(values)
@@ -172,4 +180,3 @@ class Study(FileDefinition):
         given = (self.speeds is not None) + ("speed" in names)
         if given > 1 or (not given and needs_speed(self.analyses)):
             raise ValueError("'speeds' is needed, or 'speed' linked or sampled; not both")
-        return self

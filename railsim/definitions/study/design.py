@@ -1,10 +1,10 @@
 """The table `optimise` of a study file: variables, objectives and constraints of a design."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Count, Definition, Finite, Flag, Text
+from railsim.definitions.base import EMPTY_TABLE, Count, Definition, Finite, Flag, Text, check
 
 
 class Variable(Definition):
@@ -19,13 +19,12 @@ class Variable(Definition):
     also: tuple[Text, ...] = ()
     """Paths of further keys that get the same value"""
 
-    @model_validator(mode="after")
-    def _rising(self) -> Self:
+    @check
+    def _rising(self) -> None:
         if not self.low < self.high:
             raise ValueError("'low' must be below 'high'")
         if self.scale == "log" and not self.low > 0.0:
             raise ValueError('scale = "log" needs bounds above zero')
-        return self
 
 
 class Value(Definition):
@@ -35,7 +34,7 @@ class Value(Definition):
     """Column of `summary.csv`, without its unit"""
     magnitude: Flag = False
     """Take the value without its sign"""
-    where: dict[Text, Text | Finite] = Field(default_factory=dict)
+    where: dict[Text, Text | Finite] = EMPTY_TABLE
     """Only the runs with these labels, such as `track` or a key of the grid; by default all"""
 
 
@@ -56,11 +55,10 @@ class Constraint(Value):
     high: Finite | None = None
     """Upper limit [SI]"""
 
-    @model_validator(mode="after")
-    def _some_limit(self) -> Self:
+    @check
+    def _some_limit(self) -> None:
         if self.low is None and self.high is None:
             raise ValueError("'low' or 'high' is needed")
-        return self
 
 
 class Optimise(Definition):
@@ -81,8 +79,8 @@ class Optimise(Definition):
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     """Where the random numbers begin: the same seed gives the same designs"""
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    @check
+    def _consistent(self) -> None:
         names = [*self.variables, *(key for v in self.variables.values() for key in v.also)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"'{twice[0]}' is varied twice")
@@ -91,4 +89,3 @@ class Optimise(Definition):
             raise ValueError(f"'{wrong[0]}' is no key of a vehicle; paths begin with vehicle.")
         if self.method == "differential_evolution" and len(self.objectives) > 1:
             raise ValueError('method = "differential_evolution" takes one objective')
-        return self

@@ -3,11 +3,20 @@
 Each part is a track and a speed that follows from the vehicle's service table.
 """
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Definition, Finite, Flag, Name, Positive, Text
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Definition,
+    Finite,
+    Flag,
+    Name,
+    Positive,
+    Text,
+    check,
+)
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.vehicle.loads import LoadName
 
@@ -30,14 +39,13 @@ class Speed(Definition):
     cant: Finite = 0.0
     """[m]"""
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    @check
+    def _one_way(self) -> None:
         other = self.admissible is not None or self.cant_deficiency is not None
         if (self.fixed is not None) == other:
             raise ValueError("'fixed' is needed, or 'admissible', 'cant_deficiency' or both")
         if (self.cant_deficiency is None) != (self.radius is None):
             raise ValueError("'radius' belongs to 'cant_deficiency' and only to it")
-        return self
 
 
 class Part(Definition):
@@ -58,7 +66,7 @@ class TestCondition(Definition):
 
     load: LoadName | None = None
     """Load case; the condition is left out for vehicles without it"""
-    wheels: dict[Text, Text] = Field(default_factory=dict)
+    wheels: dict[Text, Text] = EMPTY_TABLE
     """Wheel profiles by those that they replace, built-in names or files; the condition is left out
     for vehicles without any of these"""
     assignments: tuple[Text, ...] = ()
@@ -86,11 +94,11 @@ class Scenario(FileDefinition):
     """With wheel forces, or with accelerations only"""
     assignments: tuple[Text, ...] = ()
     """`key.path=value` for all runs, the paths beginning with `vehicle.`, `track.`, `settings.`"""
-    grid: dict[Text, tuple[Text, ...]] = Field(default_factory=dict)
+    grid: dict[Text, tuple[Text, ...]] = EMPTY_TABLE
     """Values of further keys: every part is run with each combination"""
     single: Flag = False
     """Store quantities with 4 bytes a number: 7 digits"""
-    conditions: dict[Name, TestCondition] = Field(default_factory=dict)
+    conditions: dict[Name, TestCondition] = EMPTY_TABLE
     """Conditions in which the vehicle is tested; by default as its file says"""
     to_standard: Flag = False
     """Repeat every part with further seeds until its zone has the sections that the standard

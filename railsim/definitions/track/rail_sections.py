@@ -3,9 +3,9 @@
 from itertools import accumulate, pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Definition, Finite, Text
+from railsim.definitions.base import Definition, Finite, Text, check
 from railsim.definitions.section_files import MOST_SECTIONS, read_sections
 from railsim.definitions.track.check_rail import OTHER
 from railsim.errors import Fault, InputError
@@ -31,8 +31,8 @@ class Contour(Definition):
     z: Coordinates
     """How far they are below the rail tops [m]"""
 
-    @model_validator(mode="after")
-    def _matching(self) -> Self:
+    @check
+    def _matching(self) -> None:
         if len(self.y) != len(self.z):
             raise ValueError(f"{len(self.y)} values of y and {len(self.z)} of z")
         back = 1e3 * max(high - y for high, y in zip(accumulate(self.y, max), self.y, strict=True))
@@ -47,7 +47,6 @@ class Contour(Definition):
                 f"the section at {self.s:g} m has its top at z = {top:.3g} mm; within "
                 f"{1e3 * MOST_HEIGHT:g} mm of the rail tops, z positive down"
             )
-        return self
 
     def jump(self, after: Self) -> float:
         """Shift of the whole section to the next one, sideways or in height [m]."""
@@ -78,8 +77,8 @@ class RailSections(Definition):
     end: Finite
     """Where it ends [m]; at both ends the contact is that of the plain rail"""
 
-    @model_validator(mode="after")
-    def _range(self) -> Self:
+    @check
+    def _range(self) -> None:
         if (self.file is None) == (self.contours is None):
             raise ValueError("either 'file' or 'contours' is needed")
         if self.end < self.begin + 0.1:
@@ -104,7 +103,6 @@ class RailSections(Definition):
                     f"no section from {a:g} to {b:g} m, more than half the range; are the "
                     "positions in m?"
                 )
-        return self
 
     def _gap(self) -> tuple[float, float]:
         """Ends of the longest part of the range without a section, along the track [m]."""

@@ -18,9 +18,9 @@ slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and
 """
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema, model_validator
+from pydantic import Field, WithJsonSchema
 
 from railsim.definitions.base import (
     NUMBERS,
@@ -30,6 +30,7 @@ from railsim.definitions.base import (
     NonNegative,
     Positive,
     both_sides,
+    check,
     rises,
 )
 
@@ -139,8 +140,8 @@ class Support(Definition):
     """Rows [s, factor] or [s, pads, ballast]: factors of stiffness and damping along the track,
     linear in between, constant beyond [m, 1]"""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    @check
+    def _complete(self) -> None:
         given = [
             name for name in SupportValues.__dataclass_fields__ if getattr(self, name) is not None
         ]
@@ -149,7 +150,7 @@ class Support(Definition):
             if given or self.variation:
                 key = given[0] if given else "variation"
                 raise ValueError(f"'{key}' belongs to elastic rails, not to preset = \"rigid\"")
-            return self
+            return
         values = self.values
         assert values is not None
         sleeper = [values.ballast_vertical, values.ballast_lateral]
@@ -168,7 +169,6 @@ class Support(Definition):
             raise ValueError("a sleeper needs 'ballast_vertical' and 'ballast_lateral'")
         if values.massless and not self._damped(values):
             raise ValueError("without masses every spring needs a damping above 0")
-        return self
 
     @staticmethod
     def _damped(values: SupportValues) -> bool:

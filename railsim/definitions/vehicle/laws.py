@@ -7,11 +7,12 @@ told apart by it, and workers get it.  Nothing is executed here (see `railsim.la
 import ast
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from railsim.definitions.base import (
+    EMPTY_TABLE,
     Count,
     Definition,
     Finite,
@@ -20,8 +21,9 @@ from railsim.definitions.base import (
     Positive,
     Text,
     Vector,
+    check,
 )
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.files.access import DEFINITION_BYTES, read_text
 from railsim.files.sources import library_files
 
@@ -38,11 +40,10 @@ class Law(Definition):
     compiled: Annotated[bool, Field(strict=True)] = True
     """`false`: called as Python, slowly"""
 
-    @model_validator(mode="after")
-    def _has_a_source(self) -> Self:
+    @check
+    def _has_a_source(self) -> None:
         if self.file is None and self.source is None:
             raise ValueError("'file' is needed")
-        return self
 
 
 class LawUse(Definition):
@@ -50,14 +51,14 @@ class LawUse(Definition):
 
     law: Name
     """Name of the law in the table `laws`"""
-    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    parameters: dict[Name, Finite] = EMPTY_TABLE
     """Values of the function's further arguments, by name"""
 
 
 class OwnOutput(LawUse):
     """A quantity of the result by a law of one's own, of other quantities at the same instant."""
 
-    inputs: dict[Name, Text] = Field(default_factory=dict)
+    inputs: dict[Name, Text] = EMPTY_TABLE
     """Arguments of the function: to each a quantity with the labels wanted, such as `Q:1:left`"""
     unit: Text = "1"
     """SI unit of what it gives"""
@@ -120,8 +121,8 @@ class Signal(Definition):
             **{"speed": "m/s", "speed_change": "m/s2", "distance": "m", "time": "s"},
         }[self.quantity]
 
-    @model_validator(mode="after")
-    def _what_belongs_together(self) -> Self:
+    @check
+    def _what_belongs_together(self) -> None:
         needs = {"body": BODY_SIGNALS, "element": ELEMENT_SIGNALS, "wheelset": WHEEL_SIGNALS}
         for key, quantities in needs.items():
             if (self.quantity in quantities) != (getattr(self, key) is not None):
@@ -137,7 +138,6 @@ class Signal(Definition):
             raise ValueError(f"the axis of {self.quantity} is roll, pitch or yaw")
         if self.rate is None and (self.delay > 0.0 or self.noise > 0.0):
             raise ValueError("'delay' and 'noise' need 'rate'")
-        return self
 
 
 class Controller(Definition):
@@ -147,12 +147,12 @@ class Controller(Definition):
     """Name of the law in the table `laws`"""
     period: Positive
     """Time between two calls [s]"""
-    inputs: dict[Name, Name] = Field(default_factory=dict)
+    inputs: dict[Name, Name] = EMPTY_TABLE
     """Signals by the arguments of the function that take them"""
     outputs: tuple[Text, ...] = Field(min_length=1)
     """Full names of the actuators, in the order of what the function returns;
     one value is for all"""
-    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    parameters: dict[Name, Finite] = EMPTY_TABLE
     """Values of the function's further arguments, by name"""
     memory: Count | None = None
     """How many numbers its argument `memory` keeps from call to call, 0 at the begin"""
@@ -181,7 +181,7 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
         try:
             if path.suffix != ".py":
                 found = f"found '{law['file']}'"
-                raise InputError([Fault("", "", found, "a file .py, or the name of a library's")])
+                raise input_error("", found, "a file .py, or the name of a library's")
             law["source"] = read_text(path, DEFINITION_BYTES)
             ast.parse(law["source"])
             law["file"] = path.name  # results are the same from whatever folder

@@ -6,11 +6,20 @@ static equilibrium finds ride height, roll and pitch.
 """
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator
 
-from railsim.definitions.base import Definition, Name, Positive, PositiveVector, Text, Vector
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Definition,
+    Name,
+    Positive,
+    PositiveVector,
+    Text,
+    Vector,
+    check,
+)
 from railsim.errors import Fault, nearest
 
 DESIGN = "design"  # the load of the vehicle's own numbers, as a load case is called
@@ -34,19 +43,18 @@ class BodyLoad(Definition):
     position: Vector | None = None
     """Common centre of gravity, where the body is in its nominal position [m]"""
 
-    @model_validator(mode="after")
-    def _something_changes(self) -> Self:
+    @check
+    def _something_changes(self) -> None:
         if self.mass is None and self.inertia is None and self.position is None:
             raise ValueError("'mass', 'inertia' or 'position' is needed")
-        return self
 
 
 class LoadGroup(Definition):
     """Bodies of the vehicle, or of one of its assemblies, that a load case changes."""
 
-    bodies: dict[Name, BodyLoad] = Field(default_factory=dict)
+    bodies: dict[Name, BodyLoad] = EMPTY_TABLE
     """Changed bodies by their names"""
-    assemblies: dict[Name, "LoadGroup"] = Field(default_factory=dict)
+    assemblies: dict[Name, "LoadGroup"] = EMPTY_TABLE
     """Assemblies with changed bodies by their names"""
 
 

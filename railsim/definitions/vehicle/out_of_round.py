@@ -6,11 +6,11 @@ file at the angle phi touches the rail at the pitch -phi.
 """
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from railsim.definitions.base import Definition, Finite, Positive, Text, rises
+from railsim.definitions.base import Definition, Finite, Positive, Text, check, rises
 
 Change = Annotated[Finite, Field(ge=-0.05, le=0.05)]
 Angle = Annotated[Finite, Field(ge=-7.0, le=7.0)]
@@ -37,12 +37,11 @@ class Harmonics(Uneven):
     ]
     """Rows of order, amplitude [m] and phase [rad]"""
 
-    @model_validator(mode="after")
-    def _whole_orders(self) -> Self:
+    @check
+    def _whole_orders(self) -> None:
         for order, _, _ in self.waves:
             if order != round(order):
                 raise ValueError(f"the order {order:g} is no whole number")
-        return self
 
 
 class RadiusTable(Uneven):
@@ -54,11 +53,10 @@ class RadiusTable(Uneven):
     ]
     """Rows [angle, change of the radius], over less than one turn [rad, m]"""
 
-    @model_validator(mode="after")
-    def _one_turn(self) -> Self:
+    @check
+    def _one_turn(self) -> None:
         if self.rows[-1][0] - self.rows[0][0] >= 6.283:
             raise ValueError("the angles span a turn or more; the first row closes it")
-        return self
 
 
 class Flat(Uneven):
@@ -86,8 +84,8 @@ class Sections(Uneven):
     heights: tuple[tuple[Finite, ...], ...] | None = None
     """Of every section the radius at the positions, less the nominal one [m]"""
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @check
+    def _one_source(self) -> None:
         parts = (self.angles, self.positions, self.heights)
         if (self.file is None) == (None in parts) or (self.file and parts != (None,) * 3):
             raise ValueError("either 'file', or 'angles', 'positions' and 'heights' are needed")
@@ -101,7 +99,6 @@ class Sections(Uneven):
                 len(row) != len(self.positions) for row in self.heights
             ):
                 raise ValueError("'heights' needs a row for every angle, a number for every place")
-        return self
 
 
 OutOfRound = Annotated[Harmonics | RadiusTable | Flat | Sections, Field(discriminator="type")]

@@ -11,6 +11,7 @@ from typing import Literal
 from pydantic import Field
 
 from railsim.definitions.base import (
+    EMPTY_TABLE,
     Definition,
     Flag,
     Name,
@@ -60,7 +61,7 @@ class Wheelset(Definition):
     """Distance between the wheels' backs [m]"""
     tape_circle_distance: Positive = 1.5
     """Distance between the nominal rolling circles [m]"""
-    out_of_round: dict[Name, OutOfRound] = Field(default_factory=dict)
+    out_of_round: dict[Name, OutOfRound] = EMPTY_TABLE
     """How its wheels deviate from circles, by names"""
 
 
@@ -93,15 +94,15 @@ class Assembly(Definition):
 
     placements: tuple[Placement, ...] = Field(min_length=1)
     """Where the assembly stands"""
-    bodies: dict[Name, Body] = Field(default_factory=dict)
+    bodies: dict[Name, Body] = EMPTY_TABLE
     """Bodies by name"""
-    wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
+    wheelsets: dict[Name, Wheelset] = EMPTY_TABLE
     """Wheelsets by name"""
-    axleboxes: dict[Name, Axlebox] = Field(default_factory=dict)
+    axleboxes: dict[Name, Axlebox] = EMPTY_TABLE
     """Axleboxes by name"""
-    elements: dict[Name, AnyElement] = Field(default_factory=dict)
+    elements: dict[Name, AnyElement] = EMPTY_TABLE
     """Force elements by name"""
-    assemblies: dict[Name, "Assembly"] = Field(default_factory=dict)
+    assemblies: dict[Name, "Assembly"] = EMPTY_TABLE
     """Assemblies within this one, by name"""
 
 
@@ -125,7 +126,7 @@ class Service(Definition):
     """Category, which decides on limits"""
     floor_height: Positive = 1.2
     """Height of the floor above the rails, where accelerations are taken [m]"""
-    points: dict[Name, Point] = Field(default_factory=dict)
+    points: dict[Name, Point] = EMPTY_TABLE
     """Further points at which accelerations are taken, by name"""
     condition: Text | None = None
     """Condition in which it is tested, such as `worn laden`: assessed together with the vehicles
@@ -145,14 +146,14 @@ class VehicleTables(FileDefinition):
     """Where the numbers come from"""
     load: LoadName | None = None
     """Load case in force; `design`, the default: the numbers of the bodies themselves"""
-    loads: dict[Name, LoadCase] = Field(default_factory=dict)
+    loads: dict[Name, LoadCase] = EMPTY_TABLE
     """Load cases by name"""
     reference: Text | None = None
     """Full name of the body whose travelled distance is the vehicle's `distance`; by default the
     first body, else the first wheelset"""
     service: Service | None = None
     """Approved operating conditions of the vehicle; assessments need it"""
-    sensors: dict[Name, Point] = Field(default_factory=dict)
+    sensors: dict[Name, Point] = EMPTY_TABLE
     """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
     standard ones"""
     laws: dict[Name, Law] | None = None
@@ -161,15 +162,15 @@ class VehicleTables(FileDefinition):
     """What is measured during a run, by name"""
     controllers: dict[Name, Controller] | None = None
     """What reads signals and commands actuators, by name"""
-    bodies: dict[Name, Body] = Field(default_factory=dict)
+    bodies: dict[Name, Body] = EMPTY_TABLE
     """Bodies by name"""
-    wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
+    wheelsets: dict[Name, Wheelset] = EMPTY_TABLE
     """Wheelsets by name"""
-    axleboxes: dict[Name, Axlebox] = Field(default_factory=dict)
+    axleboxes: dict[Name, Axlebox] = EMPTY_TABLE
     """Axleboxes by name"""
-    elements: dict[Name, AnyElement] = Field(default_factory=dict)
+    elements: dict[Name, AnyElement] = EMPTY_TABLE
     """Force elements by name"""
-    assemblies: dict[Name, Assembly] = Field(default_factory=dict)
+    assemblies: dict[Name, Assembly] = EMPTY_TABLE
     """Assemblies by name"""
 
 
