@@ -125,18 +125,10 @@ def railsim() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Arguments after the program's name; by default those of the process.
-
-    Returns
-    -------
-    int
-        0 done, 2 wrong input, 3 ended early for a physical reason, 4 a limit is exceeded where
-        that was asked for, 130 interrupted by Ctrl-C (143 by SIGTERM), 1 anything else, such as a
-        full disk.  An unforeseen error is one line too, with the path of a report
-        (`railsim.cli.fault_report`).
+    `arguments`: arguments after the program's name; by default those of the process. Returns: 0
+    done, 2 wrong input, 3 ended early for a physical reason, 4 a limit is exceeded where that was
+    asked for, 130 interrupted by Ctrl-C (143 by SIGTERM), 1 anything else, such as a full disk. An
+    unforeseen error is one line too, with the path of a report (`railsim.cli.fault_report`).
     """
     if arguments is None:
         gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)

@@ -20,15 +20,9 @@ def run_campaign(
 ) -> int:
     """Run a scenario for vehicles, print and write its assessment; return the exit status.
 
-    Parameters
-    ----------
-    taken : sequence of str
-        Options and arguments that are given although the scenario, which knows its tracks and
-        speeds, holds them.
-    report : bool
-        Write the page too.
-    how
-        assignments, workers, scheduler, resume of `railsim.studies.campaign`.
+    `taken`: options and arguments that are given although the scenario, which knows its tracks and
+    speeds, holds them; `report`: write the page too; `how`: assignments, workers, scheduler, resume
+    of `railsim.studies.campaign`.
     """
     from railsim.assessment.tables import assessment_lines
     from railsim.cli import DONE

@@ -190,12 +190,8 @@ def code_options(function: F) -> F:
 def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:
     """Return what adds options to a command, which takes their values as one object.
 
-    Parameters
-    ----------
-    name : str
-        Parameter of the command.
-    kind : type
-        Dataclass of the object, with the options' parameters as its fields.
+    `name`: parameter of the command; `kind`: dataclass of the object, with the options' parameters
+    as its fields.
     """
     keys = [field.name for field in fields(kind) if field.init]
 
@@ -234,14 +230,9 @@ def linearisation_options(function: F) -> F:
 def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
     """Let faults that computing finds name the file of their key, as those of loading do.
 
-    Parameters
-    ----------
-    file : str
-        As given on the command line: a path, or the name of a shipped file.
-    kind : str
-        What it holds: spring, mechanism.
-    name : str
-        The definition's own name, which faults found by computing bear.
+    `file`: as given on the command line: a path, or the name of a shipped file; `kind`: what it
+    holds: spring, mechanism; `name`: the definition's own name, which faults found by computing
+    bear.
     """
     from railsim.errors import InputError
     from railsim.files.sources import find_file, read_source

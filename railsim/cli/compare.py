@@ -107,9 +107,7 @@ def _named(name: str, title: str) -> str:
 def _groups(files: tuple[str, ...], output: Output) -> dict[str, Group]:
     """Return what is compared with each other, by titles; a single group has none.
 
-    Raises
-    ------
-    InputError : what cannot be compared, with the reason.
+    Raises InputError: what cannot be compared, with the reason.
     """
     folders = [file for file in files if os.path.isdir(file)]
     if not folders:

@@ -19,16 +19,9 @@ STUDY_FILES = ("study.json", "summary.csv")
 class Gathered:
     """Runs by their names.
 
-    Attributes
-    ----------
-    records : list of Record
-        One for each run, as in the journal of a study.
-    paths : dict of str to Path
-        Result files by the names of the runs that have one.
-    remarks : list of str
-        What was not found as the records say.
-    inputs : dict
-        Inputs of the study, if they are the runs of one.
+    `records`: one for each run, as in the journal of a study; `paths`: result files by the names of
+    the runs that have one; `remarks`: what was not found as the records say; `inputs`: inputs of
+    the study, if they are the runs of one.
     """
 
     records: list[Record] = field(default_factory=list)
@@ -46,9 +39,7 @@ class Gathered:
 def opened(paths: Sequence[Path]) -> "dict[str, Result]":
     """Open results under the shortest names that tell them apart.
 
-    Raises
-    ------
-    InputError : everything that cannot be read, or is given twice.
+    Raises InputError: everything that cannot be read, or is given twice.
     """
     from railsim.errors import Fault, Faults
     from railsim.result import open_run
@@ -71,9 +62,7 @@ def gather(files: Sequence[str]) -> Gathered:
 
     A folder is that of a study, or all results in it; so is a file with the table of a study.
 
-    Raises
-    ------
-    InputError : everything that cannot be read.
+    Raises InputError: everything that cannot be read.
     """
     from railsim.errors import Fault, Faults
 

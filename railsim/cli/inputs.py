@@ -42,9 +42,7 @@ class Given:
     def inputs(self, vehicle: str, track: str | None, changes: Sequence[str] = ()) -> Inputs:
         """Load vehicle, track (by default ``straight``) and settings, with further assignments.
 
-        Raises
-        ------
-        InputError : everything that is wrong in any of them.
+        Raises InputError: everything that is wrong in any of them.
         """
         from railsim.definitions.loading import load_settings, load_track, load_vehicle
         from railsim.files.overrides import split_overrides

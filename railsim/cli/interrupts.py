@@ -35,10 +35,7 @@ _heard: list[int] = []
 class Interrupted(KeyboardInterrupt):
     """Somebody wants the program to end.
 
-    Attributes
-    ----------
-    status : int
-        Exit status: 128 and the number of the signal, as shells have it; 130 for Ctrl-C.
+    `status`: exit status: 128 and the number of the signal, as shells have it; 130 for Ctrl-C.
     """
 
     def __init__(self, number: int = signal.SIGINT) -> None:
@@ -119,9 +116,7 @@ def _hear(number: int, _: FrameType | None) -> None:
 def raise_pending_signal() -> None:
     """Raise what was heard and lost.
 
-    Raises
-    ------
-    Interrupted : a signal came since `remembered_interrupts` began.
+    Raises Interrupted: a signal came since `remembered_interrupts` began.
     """
     if _heard:
         raise Interrupted(_heard[0])

@@ -29,10 +29,7 @@ if TYPE_CHECKING:
 class Output:
     """Values of ``--out``, ``--overwrite``, ``--json``, ``--quiet``.
 
-    Attributes
-    ----------
-    written : list of Path
-        Files written so far.
+    `written`: files written so far.
     """
 
     out: str | None = None
@@ -63,13 +60,8 @@ class Output:
     def write(self, name: str, content: Any) -> None:
         """Write a file into the folder, if there is one.
 
-        Parameters
-        ----------
-        name : str
-            Its name.
-        content : object
-            Bytes, a text, a `Table` (as CSV), a figure, or plain data (as JSON); a function that
-            returns one of them is called only where something is written.
+        `name`: its name; `content`: bytes, a text, a `Table` (as CSV), a figure, or plain data (as
+        JSON); a function that returns one of them is called only where something is written.
         """
         if self.folder is None:
             return

@@ -59,12 +59,8 @@ def _is_cached() -> bool:
 def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]]:
     """Give a function that takes the finished fraction and shows it.
 
-    Parameters
-    ----------
-    words : str
-        What is going on.
-    quiet : bool
-        Show nothing at all.  Without a terminal there is no bar either.
+    `words`: what is going on; `quiet`: show nothing at all. Without a terminal there is no bar
+    either.
     """
     raise_pending_signal()
     if quiet:

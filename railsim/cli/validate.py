@@ -68,9 +68,7 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
 def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     """Check one file and return its kind and the remarks on it.
 
-    Raises
-    ------
-    InputError : all its faults.
+    Raises InputError: all its faults.
     """
     suffix = Path(file).suffix.lower()
     if suffix in PROFILE_SUFFIXES or _is_profile(file):

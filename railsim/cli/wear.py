@@ -155,18 +155,10 @@ def rails(track: str, traffic: Mix, given: Given, **how: Any) -> None:
 class Wearing:
     """What wears, and how it is shown.
 
-    Attributes
-    ----------
-    name, unit, scale, option : str, str, float, str
-        Heading; unit of distance or tonnage, its factor to SI, and the option that gives it.
-    record : dict
-        What stands first in the record.
-    shares : sequence of (str, float, float)
-        Runs, speeds and shares.
-    note : str
-        What is averaged, and where y begins.
-    loop, rows : callable
-        The study; its steps to the rows of each profile.
+    `name`, `unit`, `scale`, `option`: heading; unit of distance or tonnage, its factor to SI, and
+    the option that gives it; `record`: what stands first in the record; `shares`: runs, speeds and
+    shares; `note`: what is averaged, and where y begins; `loop`, `rows`: the study; its steps to
+    the rows of each profile.
     """
 
     name: str

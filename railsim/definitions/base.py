@@ -164,12 +164,7 @@ def meanings(model: type[BaseModel]) -> dict[str, str]:
 class Remark:
     """Something allowed that an engineer would still want to know.
 
-    Attributes
-    ----------
-    key : str
-        Dotted path of the key within the file.
-    text : str
-        What is unusual.
+    `key`: dotted path of the key within the file; `text`: what is unusual.
     """
 
     key: str

@@ -8,23 +8,14 @@ from typing import TYPE_CHECKING, Literal
 class CreepLaw:
     """What is known of a creep law.
 
-    Attributes
-    ----------
-    number : int
-        Its number in `railsim.kernels.creep`.
-    label : str
-        How it is called in texts and pictures.
-    colour : int
-        Its colour in pictures, an index of `railsim.plot.style.DISTINCT`.
-    meaning : str
-        What it is, in one line.
-    grid : bool
-        Whether it divides the patch into cells, `settings.fastsim_grid`.
-    ratio : float
-        Range of the ratio of semi-axes: 1/ratio <= a/b <= ratio; beyond it the nearest is taken,
-        and the patch is counted.
-    measured : bool
-        Whether it needs a curve of the user's own, `settings.adhesion_curve`.
+    - `number`: its number in `railsim.kernels.creep`
+    - `label`: how it is called in texts and pictures
+    - `colour`: its colour in pictures, an index of `railsim.plot.style.DISTINCT`
+    - `meaning`: what it is, in one line
+    - `grid`: whether it divides the patch into cells, `settings.fastsim_grid`
+    - `ratio`: range of the ratio of semi-axes: 1/ratio <= a/b <= ratio; beyond it the nearest is
+      taken, and the patch is counted
+    - `measured`: whether it needs a curve of the user's own, `settings.adhesion_curve`
     """
 
     number: int

@@ -19,14 +19,8 @@ def validation_faults(
 ) -> list[Fault]:
     """Return a fault for everything that is wrong in single values.
 
-    Parameters
-    ----------
-    error : ValidationError
-        What pydantic found.
-    source : Source
-        The plain tables and the files that they came from.
-    model : type
-        The definition that was expected.
+    `error`: what pydantic found; `source`: the plain tables and the files that they came from;
+    `model`: the definition that was expected.
     """
     faults: list[Fault] = []
     for number, detail in enumerate(error.errors(include_url=False)):

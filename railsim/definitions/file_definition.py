@@ -32,10 +32,7 @@ class FileDefinition(Definition):
     def __init__(self, /, **values: Any) -> None:
         """Check the values.
 
-        Raises
-        ------
-        InputError
-            Everything that is wrong in them.
+        Raises InputError: everything that is wrong in them.
         """
         try:
             super().__init__(**values)
@@ -161,10 +158,7 @@ class FileDefinition(Definition):
 def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:
     """Return the definition of a source with assignments.
 
-    Raises
-    ------
-    InputError
-        Another format, and everything that is wrong.
+    Raises InputError: another format, and everything that is wrong.
     """
     if source.data.get("format") != model.format_name():
         file = source.file_of(("format",))
@@ -182,10 +176,7 @@ def _defaults(model: type[FileDefinition]) -> dict[str, Any]:
 def validated(model: type[D], source: Source) -> D:
     """Return the definition of a source.
 
-    Raises
-    ------
-    InputError
-        Everything that is wrong.
+    Raises InputError: everything that is wrong.
     """
 
     def located(faults: Iterable[Fault]) -> list[Fault]:

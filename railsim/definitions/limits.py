@@ -67,20 +67,8 @@ class Value(Sourced):
 class Situation:
     """What a limit may depend on: one wheelset, wheel or sensor in one zone.
 
-    Attributes
-    ----------
-    vehicle : Vehicle
-    service : Service
-    zone : str
-        1 to 4.
-    radius : float
-        Mean radius of the sections [m].
-    wheelset : int or None
-        From 0; None for what belongs to none.
-    Q0 : float
-        Mean static load of its two wheels [N].
-    limits : mapping of str to law
-        All limits of the file.
+    `zone`: 1 to 4; `radius`: mean radius of the sections [m]; `wheelset`: from 0; None for what
+    belongs to none; `Q0`: mean static load of its two wheels [N]; `limits`: all limits of the file.
     """
 
     vehicle: Vehicle

@@ -253,10 +253,7 @@ def load_settings_json(text: str, file: str = "settings_json") -> Settings:
 def load_any(path: str | Path, overrides: Iterable[str] = ()) -> FileDefinition:
     """Load a file of whatever definition its `format` key names, or a shipped one by its name.
 
-    Raises
-    ------
-    InputError
-        Everything that is wrong in it; an unknown format.
+    Raises InputError: everything that is wrong in it; an unknown format.
     """
     file = sources.find_any(path)
     data = sources.read_toml(file)

@@ -33,15 +33,9 @@ NARROWEST = 0.01  # m
 class SectionList:
     """Sections in the order of their positions.
 
-    Attributes
-    ----------
-    positions : ndarray, shape (n,)
-        Arc length [m] or angle [rad].
-    points : tuple of ndarray, shape (2, k)
-        y, z along the contour of each section [m].
-    features : ndarray, shape (n, m)
-        Lengths along the contours at which features lie [m], nan where a section lacks one; m = 0
-        where no features are given.
+    `positions`, shape (n,): arc length [m] or angle [rad]; `points`, shape (2, k): y, z along the
+    contour of each section [m]; `features`, shape (n, m): lengths along the contours at which
+    features lie [m], nan where a section lacks one; m = 0 where no features are given.
     """
 
     positions: Floats
@@ -52,17 +46,9 @@ class SectionList:
 def read_sections(path: str | Path, kind: str) -> SectionList:
     """Read a list of sections and its files.
 
-    Parameters
-    ----------
-    path : str or Path
-        `.slcs`, `.slcw` or `.csv`; names of sections count from its folder.
-    kind : "rail" or "wheel"
-        What the sections are of.
-
-    Raises
-    ------
-    InputError
-        A file is missing or no such list; positions do not increase; a section is no contour.
+    `path`: `.slcs`, `.slcw` or `.csv`; names of sections count from its folder; `kind`: what the
+    sections are of. Raises InputError: a file is missing or no such list; positions do not
+    increase; a section is no contour.
     """
     path = Path(path)
     suffix, own = path.suffix.lower(), ".slcs" if kind == "rail" else ".slcw"
@@ -247,9 +233,7 @@ def wheel_heights(sections: SectionList) -> tuple[list[float], list[float], list
     Smoothing splines (Reinsch 1967) minimise sum (z - f)^2 + lambda integral f''^2 dy with a
     lambda of 5 mm3.
 
-    Returns
-    -------
-    angles [rad], positions [m], heights [m] : lists
+    Returns: `angles [rad], positions [m], heights [m]`.
     """
     from scipy.interpolate import make_smoothing_spline
 

@@ -16,11 +16,7 @@ from railsim.table import Column, Table
 def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Description:
     """Return how a vehicle stands at rest, and how its bodies oscillate, in several load cases.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    loads : sequence of str or None
-        Load cases, None for the design load; by default all.
+    `loads`: load cases, None for the design load; by default all.
     """
     cases = loads or (None, *vehicle.loads)
     data: dict[str, Any] = {}

@@ -43,20 +43,9 @@ def check_file(
 ) -> None:
     """Refuse a file for output that may not or cannot be written.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    overwrite : bool
-        Whether it may exist.
-    option : str
-        What the user knows the path by, for messages.
-    endings : sequence of str
-        Allowed endings of its name, in small letters; by default any.
-
-    Raises
-    ------
-    InputError : one of these is not fulfilled.
+    `path`: the file; `overwrite`: whether it may exist; `option`: what the user knows the path by,
+    for messages; `endings`: allowed endings of its name, in small letters; by default any. Raises
+    InputError: one of these is not fulfilled.
     """
     ending = path.suffix
     found, allowed = _invalid_name(path), "choose another name"
@@ -79,10 +68,8 @@ def check_file(
 def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = False) -> None:
     """Refuse a folder for output, which need not exist, and in which `names` will be written.
 
-    Raises
-    ------
-    InputError : it is a file or called like one, cannot be written to, or holds one of `names` and
-        not `overwrite`.
+    Raises InputError: it is a file or called like one, cannot be written to, or holds one of
+    `names` and not `overwrite`.
     """
     found, allowed = _invalid_name(folder), "choose another name"
     if found:
@@ -103,9 +90,7 @@ def write_folder(
 ) -> list[Path]:
     """Write files by their names into a folder, created if it does not exist; their paths.
 
-    Raises
-    ------
-    InputError : one of them exists and may not be overwritten; nothing is written then.
+    Raises InputError: one of them exists and may not be overwritten; nothing is written then.
     """
     check_folder(folder, content, overwrite=overwrite)
     make_folder(folder)
@@ -118,9 +103,7 @@ def write_folder(
 def make_folder(folder: Path) -> None:
     """Make a folder for output, with those above it.
 
-    Raises
-    ------
-    InputError : it cannot be made.
+    Raises InputError: it cannot be made.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -169,9 +152,7 @@ def is_file(path: str | Path) -> bool:
 def read_bytes(path: str | Path, limit: int) -> bytes:
     """Read a regular file of at most `limit` bytes; a link may lead to it.
 
-    Raises
-    ------
-    InputError : as `open_regular`; or it is larger.
+    Raises InputError: as `open_regular`; or it is larger.
     """
     path = Path(path)
     with open_regular(path) as file:
@@ -188,10 +169,8 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
 def open_regular(path: str | Path) -> BinaryIO:
     """Open a regular file for reading, to be closed by the caller; a link may lead to it.
 
-    Raises
-    ------
-    InputError : it cannot be read, or is a folder, a device, a pipe or a file of the system's
-        (/proc, /sys, /dev).
+    Raises InputError: it cannot be read, or is a folder, a device, a pipe or a file of the system's
+    (/proc, /sys, /dev).
     """
     path = Path(path)
     try:
@@ -230,24 +209,10 @@ class PartialFile:
 
     Left without `finish` it disappears.  As long as it exists, this process holds a lock on it.
 
-    Parameters
-    ----------
-    target : Path
-        The name that it is to get.
-    alone : bool
-        Refuse where another process is writing the same file.
-    option : str
-        What the user knows the path by, for messages.
-
-    Attributes
-    ----------
-    path : Path
-        The hidden name, to be written to.
-
-    Raises
-    ------
-    InputError : another process is writing the same file.
-    OSError : it cannot be created.
+    `target`: the name that it is to get; `alone`: refuse where another process is writing the same
+    file; `option`: what the user knows the path by, for messages; `path`: the hidden name, to be
+    written to. Raises InputError: another process is writing the same file. OSError: it cannot be
+    created.
     """
 
     def __init__(self, target: Path, *, alone: bool = False, option: str = "--out") -> None:
@@ -332,9 +297,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def locked(handle: int) -> bool:
     """Lock an open file for as long as it stays open; return False where another process has.
 
-    Raises
-    ------
-    OSError : a file system without locks.
+    Raises OSError: a file system without locks.
     """
     from filelock import lock_descriptor  # a tenth of the time of `railsim --help`
 

@@ -21,14 +21,12 @@ NEW_MEMBERS: dict[str, str] = {}
 def key_path(key: str) -> list[str]:
     """Return the parts of a dotted key; parts may be quoted as in TOML.
 
+    Raises KeyError: it is no key.
+
     Examples
     --------
     >>> key_path('initial."front.frame".y')
     ['initial', 'front.frame', 'y']
-
-    Raises
-    ------
-    KeyError : it is no key.
     """
     parts = []
     try:
@@ -46,21 +44,9 @@ def descend(
 ) -> tuple[Any, Any]:
     """Return the table or list that holds the last part of the path, and its key or index.
 
-    Parameters
-    ----------
-    data : dict or list
-        Tables as read.
-    path : sequence of str
-        Keys, names of members, indices.
-    create : bool
-        Make tables that are missing.
-    defaults : dict, optional
-        What holds where `data` gives no value: its tables and lists come into `data` when the path
-        leads through them.
-
-    Raises
-    ------
-    KeyError : the path leads nowhere.
+    `data`: tables as read; `path`: keys, names of members, indices; `create`: make tables that are
+    missing; `defaults`: what holds where `data` gives no value: its tables and lists come into
+    `data` when the path leads through them. Raises KeyError: the path leads nowhere.
     """
     node = data
     for depth, part in enumerate(path):
@@ -107,23 +93,9 @@ LOADS = "loads"
 def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]:
     """Return the whole path of a short one: its parts in their order, others between them.
 
-    Parameters
-    ----------
-    data : dict
-        Tables as read.
-    path : sequence of str
-        Keys, the last of them the one that is meant.
-    defaults : dict, optional
-        As for `descend`.
-
-    Returns
-    -------
-    list of str
-        The path itself where it leads somewhere, or where nothing has these parts.
-
-    Raises
-    ------
-    KeyError : several keys have these parts.
+    `data`: tables as read; `path`: keys, the last of them the one that is meant; `defaults`: as for
+    `descend`. Returns: the path itself where it leads somewhere, or where nothing has these parts.
+    Raises KeyError: several keys have these parts.
 
     Examples
     --------

@@ -30,20 +30,11 @@ def apply_overrides(
 ) -> Source:
     """Return the source with `key.path=value` texts applied in their order.
 
-    Parameters
-    ----------
-    source : Source
-        What to change; it stays as it is.
-    overrides : iterable of str, or str
-        Assignments with TOML values; members of lists are named by their `name`, else by index.
-    free : sequence of str
-        Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
-    defaults : mapping, optional
-        What holds where the source gives no value, so that `fastsim_grid.0=20` changes one of two.
-
-    Raises
-    ------
-    InputError : an assignment that means nothing; all of them at once.
+    `source`: what to change; it stays as it is; `overrides`: assignments with TOML values; members
+    of lists are named by their `name`, else by index; `free`: tables by dotted names:
+    `initial.front.frame.y` is key `y` of body `front.frame`; `defaults`: what holds where the
+    source gives no value, so that `fastsim_grid.0=20` changes one of two. Raises InputError: an
+    assignment that means nothing; all of them at once.
     """
     texts = [overrides] if isinstance(overrides, str) else overrides
     return _changed(source, map(_parsed, texts), free, defaults, OVERRIDE)
@@ -59,9 +50,7 @@ def with_values(
 
     Arrays and numbers of numpy count as lists and numbers.
 
-    Raises
-    ------
-    InputError : keys that lead nowhere; all of them at once.
+    Raises InputError: keys that lead nowhere; all of them at once.
     """
     given = ((key, partial(_given, value)) for key, value in values.items())
     return _changed(source, given, free, defaults, source.file)
@@ -148,14 +137,12 @@ def _value(written: str, present: Any) -> Any:
 def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
     """Sort `vehicle.`, `track.` and `settings.` assignments; the prefixes are taken off.
 
+    Raises InputError: an assignment with another beginning.
+
     Examples
     --------
     >>> split_overrides(["track.friction=0.3", "settings.scheme=rk4"])
     {'vehicle': [], 'track': ['friction=0.3'], 'settings': ['scheme=rk4']}
-
-    Raises
-    ------
-    InputError : an assignment with another beginning.
     """
     sorted_ones: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
     faults = Faults()

@@ -69,14 +69,8 @@ def located_fault(file: str, key: str, found: str, allowed: str) -> Fault:
 class Source:
     """A definition as plain values.
 
-    Attributes
-    ----------
-    file : str
-        File that was asked for.
-    data : dict
-        Its content with `extends` resolved and overrides applied.
-    origin : dict
-        File by key path; a key without an entry of its own came with its table.
+    `file`: file that was asked for; `data`: its content with `extends` resolved and overrides
+    applied; `origin`: file by key path; a key without an entry of its own came with its table.
     """
 
     file: str
@@ -144,18 +138,9 @@ def shipped_names(kind: str) -> list[str]:
 def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     """Return the file that a path or a bare name means; a path wins over a name.
 
-    Parameters
-    ----------
-    name : str or Path
-        Path, or name of a shipped file without its ending.
-    kind : {'vehicle', 'track', 'settings'}
-        What is looked for; settings have no shipped files.
-    beside : Path, optional
-        File that names it: relative paths count from its folder.
-
-    Raises
-    ------
-    InputError : there is no such file.
+    `name`: path, or name of a shipped file without its ending; `kind`: what is looked for; settings
+    have no shipped files; `beside`: file that names it: relative paths count from its folder.
+    Raises InputError: there is no such file.
     """
     folder = beside.parent if beside is not None else Path()
     candidates = [folder / name]
@@ -181,9 +166,7 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
 def find_any(name: str | Path) -> Path:
     """Return the file that a path or the bare name of anything shipped means.
 
-    Raises
-    ------
-    InputError : there is no such file.
+    Raises InputError: there is no such file.
     """
     if is_file(name):
         return Path(name)
@@ -210,9 +193,7 @@ def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fa
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
-    Raises
-    ------
-    InputError : it cannot be read, is not text or not TOML (with the line).
+    Raises InputError: it cannot be read, is not text or not TOML (with the line).
     """
     return parse_toml(read_text(path, DEFINITION_BYTES), str(path))
 
@@ -220,9 +201,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 def parse_toml(text: str, file: str) -> dict[str, Any]:
     """Parse TOML text; `file` is its name in messages.
 
-    Raises
-    ------
-    InputError : a syntax error, with its line; tables nested too deeply, too long a number.
+    Raises InputError: a syntax error, with its line; tables nested too deeply, too long a number.
     """
     if max(text.count("=") + text.count("\n["), text.count("{")) > MOST_KEYS:
         raise input_error(file, "too many keys", f"{MOST_KEYS} at most")
@@ -253,9 +232,7 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
 def _depth(data: Any) -> int:
     """Return how deeply tables and lists are nested; at most one more than `DEEPEST`.
 
-    Raises
-    ------
-    ValueError : a whole number that needs more than TOML's 64 bits.
+    Raises ValueError: a whole number that needs more than TOML's 64 bits.
     """
     level, depth = [data], 0
     while level and depth <= DEEPEST:
@@ -272,9 +249,7 @@ def _depth(data: Any) -> int:
 def read_source(path: Path, kind: str, data: dict[str, Any] | None = None) -> Source:
     """Read a file, unless its content is given, and everything that it extends.
 
-    Raises
-    ------
-    InputError : a file is missing or broken, or the chain of `extends` runs in a circle.
+    Raises InputError: a file is missing or broken, or the chain of `extends` runs in a circle.
     """
     return _extended(data or read_toml(path), path, kind, (path.resolve(),))
 

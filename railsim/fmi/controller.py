@@ -25,26 +25,12 @@ class Controller:
     Over a period both run side by side: the unit gets what is read at its beginning, the
     actuators get at its end what the unit gives, so that a command acts one period late.
 
-    Parameters
-    ----------
-    path : str or Path
-        Unit of FMI 3.0 for co-simulation.
-    inputs : mapping of str to str
-        Inputs of the unit: to each a signal of the vehicle, or a quantity with indices, such as
-        ``sensor_acceleration:0:1``, counted from 0.
-    outputs : mapping of str to str
-        Outputs of the unit: to each an actuator of the vehicle.
-    period : float
-        Step of communication [s].
-    allow_code : bool
-        Units hold native code, which may do whatever the user may: without True none is loaded.
-
-    Raises
-    ------
-    InputError
-        The unit has no such variables, is no unit for co-simulation, or may not be loaded.
-    ImportError
-        FMPy is not installed.
+    `path`: unit of FMI 3.0 for co-simulation; `inputs`: inputs of the unit: to each a signal of the
+    vehicle, or a quantity with indices, such as ``sensor_acceleration:0:1``, counted from 0;
+    `outputs`: outputs of the unit: to each an actuator of the vehicle; `period`: step of
+    communication [s]; `allow_code`: units hold native code, which may do whatever the user may:
+    without True none is loaded. Raises InputError: the unit has no such variables, is no unit for
+    co-simulation, or may not be loaded. ImportError FMPy is not installed.
     """
 
     def __init__(
@@ -89,12 +75,8 @@ class Controller:
     ) -> bool:
         """Advance a run under this controller; whether it goes on.
 
-        Parameters
-        ----------
-        simulation
-            The run.
-        until, duration : float, optional
-            Arc length [m] to run to, or time [s] to run for; otherwise to its end.
+        `simulation`: the run; `until`, `duration`: arc length [m] to run to, or time [s] to run
+        for; otherwise to its end.
         """
         end = np.inf if duration is None else simulation.time + duration
         if self._time is None:

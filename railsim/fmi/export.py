@@ -47,33 +47,14 @@ def fmu(
 ) -> Path:
     """Write a unit for co-simulation that runs this vehicle on this track.
 
-    Parameters
-    ----------
-    vehicle, track
-        What runs; the unit holds both as they are here, without references to files.
-    path : str or Path
-        File to be written, ending in ``.fmu``.
-    inputs : sequence of str, optional
-        Actuators that the calling program commands; by default all.
-    outputs : sequence of str
-        Signals of the vehicle, and quantities over time with the labels wanted: ``Q``,
-        ``Y:1:left``, ``body_acceleration:carbody:y``.
-    overwrite : bool
-        Whether a file of this name may be replaced.
-    **conditions
-        Speed, settings, start, duration, until and profiles, as in `railsim.simulate`.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        An actuator, signal or quantity does not exist, or the run is no run.
-    ImportError
-        PythonFMU3 is not installed.
+    `vehicle`, `track`: what runs; the unit holds both as they are here, without references to
+    files; `path`: file to be written, ending in ``.fmu``; `inputs`: actuators that the calling
+    program commands; by default all; `outputs`: signals of the vehicle, and quantities over time
+    with the labels wanted: ``Q``, ``Y:1:left``, ``body_acceleration:carbody:y``; `overwrite`:
+    whether a file of this name may be replaced; `**conditions`: speed, settings, start, duration,
+    until and profiles, as in `railsim.simulate`. Returns: the file. Raises InputError: an actuator,
+    signal or quantity does not exist, or the run is no run. ImportError PythonFMU3 is not
+    installed.
     """
     wrapper = optional_package("pythonfmu3", "fmu", "'railsim[fmi]'")
     path = Path(path)

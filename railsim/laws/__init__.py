@@ -60,13 +60,9 @@ excitation = _mark("excitation", "the law of an irregularity over the arc length
 def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
     """Return the law of a function that is written in Python, permitted as it is given here.
 
-    Parameters
-    ----------
-    function : callable
-        Its source has to be readable: of a module, a script or a notebook.  It knows the
-        functions of `math`, numpy as ``np`` and nothing else beside its arguments.
-    compiled : bool
-        Whether it is compiled; called as Python it is slower by far.
+    `function`: its source has to be readable: of a module, a script or a notebook. It knows the
+    functions of `math`, numpy as ``np`` and nothing else beside its arguments; `compiled`: whether
+    it is compiled; called as Python it is slower by far.
     """
     name = getattr(function, "__name__", repr(function))
     try:

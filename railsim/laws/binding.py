@@ -35,18 +35,10 @@ _bound: dict[tuple[str, ...], "Bound"] = {}
 class Takes:
     """What a law is given and gives.
 
-    Attributes
-    ----------
-    words : str
-        What it is: ``a force element``.
-    given : tuple of str
-        Names of the arguments that the loop gives, in the order of the block.
-    named : tuple of str
-        Further arguments that have to be there: the inputs of a controller.
-    gives : tuple of int
-        How many numbers it may return.
-    states : bool
-        Whether arguments ``state_1``, ... are states whose rates it returns.
+    `words`: what it is: ``a force element``; `given`: names of the arguments that the loop gives,
+    in the order of the block; `named`: further arguments that have to be there: the inputs of a
+    controller; `gives`: how many numbers it may return; `states`: whether arguments ``state_1``,
+    ... are states whose rates it returns.
     """
 
     words: str
@@ -70,20 +62,9 @@ EXCITATION = Takes("an excitation", ("s",))
 class Bound:
     """A law that the time loop can call.
 
-    Attributes
-    ----------
-    name : str
-        Name of the law.
-    address : int
-        Where it stands.
-    states : int
-        Number of its states.
-    further : tuple of str
-        Names of its parameters, in the order of the block.
-    defaults : mapping of str to float
-        Values of parameters that need not be given.
-    kept : tuple
-        What has to live as long as the address is called.
+    `name`: name of the law; `address`: where it stands; `states`: number of its states; `further`:
+    names of its parameters, in the order of the block; `defaults`: values of parameters that need
+    not be given; `kept`: what has to live as long as the address is called.
     """
 
     name: str
@@ -96,15 +77,7 @@ class Bound:
     def values(self, given: NDArray[np.float64], parameters: Sequence[float]) -> Any:
         """What a law of one value gives, called beside the loop.
 
-        Parameters
-        ----------
-        given : float64[n, number of its arguments]
-        parameters : sequence of float
-            As `parameters` returns them.
-
-        Returns
-        -------
-        float64[n]
+        `parameters`: as `parameters` returns them.
         """
         n, k = given.shape
         block, found = np.array([0.0] * (1 + k) + list(parameters)), np.empty(n)
@@ -118,10 +91,7 @@ class Bound:
     def parameters(self, key: str, given: Mapping[str, float]) -> list[float]:
         """Values of its parameters in their order.
 
-        Raises
-        ------
-        InputError
-            One is missing, or one too many is given.
+        Raises InputError: one is missing, or one too many is given.
         """
         own = {**self.defaults, **given}
         wrong = [n for n in given if n not in self.further]
@@ -143,21 +113,10 @@ def _listed(names: Sequence[str]) -> str:
 def bind(name: str, law: Law, takes: Takes, gives: int | None = None, memory: int = 0) -> Bound:
     """Compile a law, or take it as it was compiled before.
 
-    Parameters
-    ----------
-    name : str
-        Name of the law in the file.
-    takes : Takes
-        What the loop gives and what it needs.
-    gives : int, optional
-        How many numbers it has to return; by default what `takes` allows.
-    memory : int
-        Length of its memory.
-
-    Raises
-    ------
-    InputError
-        It is not permitted, raises errors, has wrong arguments or cannot be compiled.
+    `name`: name of the law in the file; `takes`: what the loop gives and what it needs; `gives`:
+    how many numbers it has to return; by default what `takes` allows; `memory`: length of its
+    memory. Raises InputError: it is not permitted, raises errors, has wrong arguments or cannot be
+    compiled.
     """
     check_laws([(name, law)])
     kept = (

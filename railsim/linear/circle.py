@@ -31,16 +31,9 @@ def circle(
 ) -> Track:
     """Return a track of constant curvature and cant with rails, gauge and friction of another.
 
-    Parameters
-    ----------
-    track : Track
-        Whose rails they are.
-    curvature : float
-        1/radius, positive to the right [1/m].
-    cant : float
-        Left rail over the right one, on 1.5 m [m].
-    friction : float or pair, optional
-        Coefficient of friction; by default that of `track` at its beginning.
+    `track`: whose rails they are; `curvature`: 1/radius, positive to the right [1/m]; `cant`: left
+    rail over the right one, on 1.5 m [m]; `friction`: coefficient of friction; by default that of
+    `track` at its beginning.
     """
     radius = 1.0 / curvature if curvature else math.inf
     element = {"type": "CIR", "length": LENGTH, "radius": radius}

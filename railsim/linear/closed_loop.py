@@ -55,24 +55,10 @@ def closed_loop(
 ) -> Linearisation:
     """Linearise a vehicle with its controllers about steady rolling.
 
-    Parameters
-    ----------
-    speed : float
-        [m/s].
-    step : float
-        Step of the loop, after which a command acts [s].
-    settings, how
-        As for `railsim.linear.vehicle.LinearVehicle`.
-
-    Returns
-    -------
-    Linearisation
-        The last coordinates are those of the delays, named after the actuators.
-
-    Raises
-    ------
-    ModelError
-        The vehicle or a controller has no finite value there.
+    `speed`: [m/s]; `step`: step of the loop, after which a command acts [s]; `settings`, `how`: as
+    for `railsim.linear.vehicle.LinearVehicle`. Returns: the last coordinates are those of the
+    delays, named after the actuators. Raises ModelError: the vehicle or a controller has no finite
+    value there.
     """
     prepared = LinearVehicle(vehicle, track, settings=settings, **how)
     free = prepared.free(speed)

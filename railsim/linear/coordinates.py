@@ -42,22 +42,13 @@ STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
 class Coordinates:
     """Which entries of the state vector are coordinates of the analysis.
 
-    Attributes
-    ----------
-    names : tuple of str
-        ``carbody.y``, of its rate ``carbody.y'``; of an internal state the element's name; of the
-        track ``front.outer.wheelset.rail.left.y``.
-    indices : int64[n]
-        Indices in the state vector: positions and velocities of the bodies, internal states of
-        elements, displacements of elastic rails, their rates.
-    bodies, components : int64[n]
-        Body and component of positions and velocities, -1 of all others.
-    n_positions, n_velocities : int
-        Of the bodies.
-    steps : float64[n]
-        Steps of difference quotients.
-    forceless : int64[...]
-        Rates of rails without mass: their equations say that the forces balance.
+    `names`: ``carbody.y``, of its rate ``carbody.y'``; of an internal state the element's name; of
+    the track ``front.outer.wheelset.rail.left.y``; `indices`: indices in the state vector:
+    positions and velocities of the bodies, internal states of elements, displacements of elastic
+    rails, their rates; `bodies`, `components`: body and component of positions and velocities, -1
+    of all others; `n_positions`, `n_velocities`: of the bodies; `steps`: steps of difference
+    quotients; `forceless`: rates of rails without mass: their equations say that the forces
+    balance.
     """
 
     names: tuple[str, ...]
@@ -88,13 +79,8 @@ class Coordinates:
 def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -> Coordinates:
     """Return the coordinates of a vehicle.
 
-    Parameters
-    ----------
-    model : Model
-    held : bool
-        Leave out all coordinates of the wheelsets; axleboxes pitch.
-    hold : sequence of str
-        Bodies that are fixed to the moving track frame where they are in steady rolling.
+    `held`: leave out all coordinates of the wheelsets; axleboxes pitch; `hold`: bodies that are
+    fixed to the moving track frame where they are in steady rolling.
     """
     positions, velocities = [], []
     n = model.index.n_bodies
@@ -170,18 +156,8 @@ class FreeVehicle:
     back to all bodies, with the traction that keeps the speed, it gives the motion of the free body
     seen from frames that move at constant speed.
 
-    Parameters
-    ----------
-    model : Model
-        With preloads.
-    system : System
-        On its track.
-    state : float64[n_state]
-        Steady rolling.
-    held : bool
-        Whether the wheelsets are held.
-    hold : sequence of str
-        Other bodies that are held, as in `coordinates`.
+    `model`: with preloads; `system`: on its track; `state`: steady rolling; `held`: whether the
+    wheelsets are held; `hold`: other bodies that are held, as in `coordinates`.
     """
 
     def __init__(
@@ -220,10 +196,7 @@ class FreeVehicle:
     def tangent(self) -> Floats:
         """Jacobian of `rate` at the state of steady rolling, float64[n, n].
 
-        Raises
-        ------
-        ModelError
-            It is not finite.
+        Raises ModelError: it is not finite.
         """
         matrix = jacobian(self.rates, self.x, self.coordinates.steps)
         if not np.isfinite(matrix).all():
@@ -254,10 +227,7 @@ class FreeVehicle:
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a whole state as the kernels give it; leaves forces in `work`.
 
-        Raises
-        ------
-        ModelError
-            The state lies outside the range of the model.
+        Raises ModelError: the state lies outside the range of the model.
         """
         return np.asarray(self._evaluated(state[None])[0])
 

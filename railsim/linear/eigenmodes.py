@@ -35,15 +35,8 @@ MOST_HALVINGS = 3
 class Eigenmodes:
     """Modes of one linearisation; of a conjugate pair the one with Im(lambda) > 0.
 
-    Attributes
-    ----------
-    linearisation : Linearisation
-    eigenvalues : complex128[m]
-        By rising magnitude [1/s].
-    shapes : complex128[m, n]
-        Right eigenvectors, largest component 1.
-    left : complex128[m, n]
-        Left eigenvectors with l r = 1 (where they can be scaled so).
+    `eigenvalues`: by rising magnitude [1/s]; `shapes`: right eigenvectors, largest component 1;
+    `left`: left eigenvectors with l r = 1 (where they can be scaled so).
     """
 
     linearisation: Linearisation
@@ -124,19 +117,9 @@ def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[
     oscillation that becomes overdamped, or leaves the range of frequencies, leaves its entry empty,
     one that appears gets a new entry: empty entries hold NaN.
 
-    Parameters
-    ----------
-    at : callable
-        Parameter to linearisation.
-    parameters : sequence of float
-        Rising or falling.
-    most : float
-        Largest undamped frequency of a mode that is followed [Hz].
-
-    Returns
-    -------
-    list of Eigenmodes
-        One for each parameter, all with the same number of entries.
+    `at`: parameter to linearisation; `parameters`: rising or falling; `most`: largest undamped
+    frequency of a mode that is followed [Hz]. Returns: one for each parameter, all with the same
+    number of entries.
     """
     sets = [oscillations(eigenmodes(at(parameter)), most) for parameter in parameters]
     chains: list[list[int]] = [[i] for i in range(len(sets[0].eigenvalues))]
@@ -192,15 +175,10 @@ def _ordered(modes: Eigenmodes, indices: NDArray[np.intp]) -> Eigenmodes:
 class LossOfStability:
     """Where an equilibrium loses its stability to an oscillation, or that it does not.
 
-    Attributes
-    ----------
-    parameter : float or None
-        Lowest value with Re(lambda) = 0 (a Hopf bifurcation); None if there is none in the range.
-    already : bool
-        Whether the equilibrium is unstable at the range's lower end.
-    modes : tuple of Eigenmodes
-        One mode each: the critical one at `parameter`; where there is none, the least damped ones
-        at both ends of the range.
+    `parameter`: lowest value with Re(lambda) = 0 (a Hopf bifurcation); None if there is none in the
+    range; `already`: whether the equilibrium is unstable at the range's lower end; `modes`: one
+    mode each: the critical one at `parameter`; where there is none, the least damped ones at both
+    ends of the range.
     """
 
     parameter: float | None
@@ -217,16 +195,9 @@ def loss_of_stability(
 ) -> LossOfStability:
     """Find the lowest parameter at which an oscillation is no longer damped.
 
-    Parameters
-    ----------
-    at : callable
-        Parameter to linearisation.
-    low, high : float
-        Range of the search.
-    counts : callable, optional
-        Whether a mode that is undamped counts; by default all do.
-    points : int
-        Values of the parameter at which the range is looked through.
+    `at`: parameter to linearisation; `low`, `high`: range of the search; `counts`: whether a mode
+    that is undamped counts; by default all do; `points`: values of the parameter at which the range
+    is looked through.
     """
     known: dict[float, Eigenmodes] = {}
 

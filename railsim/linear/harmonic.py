@@ -34,10 +34,7 @@ Y, Z, ROLL = 1, 2, 3
 class ContactPath:
     """Wheelsets moved along their contact path by one amplitude.
 
-    Parameters
-    ----------
-    amplitude : float
-        a [m].
+    `amplitude`: a [m].
     """
 
     def __init__(self, amplitude: float) -> None:
@@ -49,16 +46,8 @@ class ContactPath:
     def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
         """Return the matrix of a linearisation with the columns of y replaced.
 
-        Parameters
-        ----------
-        vehicle : FreeVehicle
-        tangent : float64[n, n]
-            Its tangent matrix.
-
-        Raises
-        ------
-        InputError
-            The contact table is narrower than the amplitude.
+        `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
+        amplitude.
         """
         found = tangent.copy()
         for body in vehicle.system.contact.body:

@@ -38,17 +38,10 @@ DAMPING = Column("damping_ratio", "damping", "%", ".2f")
 class Mode:
     """One mode of a vehicle.
 
-    Attributes
-    ----------
-    name : str
-        After the field, see `railsim.linear.naming`; empty, and NaN values, where a root locus has
-        no such mode.
-    eigenvalue : complex
-        lambda [1/s].
-    participation : dict of str to float
-        Share of the kinetic energy by ``body.component``, largest first.
-    shape : dict of str to complex
-        Displacements by ``body.component``, the largest 1 [m, rad].
+    `name`: after the field, see `railsim.linear.naming`; empty, and NaN values, where a root locus
+    has no such mode; `eigenvalue`: lambda [1/s]; `participation`: share of the kinetic energy by
+    ``body.component``, largest first; `shape`: displacements by ``body.component``, the largest 1
+    [m, rad].
     """
 
     name: str
@@ -99,20 +92,9 @@ class Mode:
 class Modes(Plottable):
     """Modes of a vehicle at one speed.
 
-    Attributes
-    ----------
-    speed : float
-        [m/s].
-    contact : Contact
-        How the contact was linearised.
-    modes : tuple of Mode
-        By rising |lambda|, or in the order of the root locus.
-    remarks : tuple of str
-        Remarks for the reader.
-    parameter : tuple of str and float, or None
-        Key and value of another parameter than the speed.
-    vehicle, place : str
-        Name of the vehicle; the track in words.
+    `speed`: [m/s]; `contact`: how the contact was linearised; `modes`: by rising |lambda|, or in
+    the order of the root locus; `remarks`: remarks for the reader; `parameter`: key and value of
+    another parameter than the speed; `vehicle`, `place`: name of the vehicle; the track in words.
     """
 
     speed: float
@@ -199,14 +181,7 @@ class Modes(Plottable):
 class RootLocus(Plottable):
     """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
 
-    Attributes
-    ----------
-    key : str
-        ``speed`` or the key of the parameter.
-    values : tuple of float
-        Its values.
-    sets : tuple of Modes
-        One for each value.
+    `key`: ``speed`` or the key of the parameter; `values`: its values; `sets`: one for each value.
     """
 
     key: str
@@ -398,15 +373,8 @@ def parameter_locus(
 ) -> RootLocus:
     """Return the modes of a vehicle over any parameter of its files.
 
-    Parameters
-    ----------
-    prepared : callable
-        Value of the parameter to the vehicle.
-    key : str
-        What the parameter is called.
-    values : sequence of float
-    speed : float
-        [m/s].
+    `prepared`: value of the parameter to the vehicle; `key`: what the parameter is called; `speed`:
+    [m/s].
     """
     (speed,) = checked_speeds([speed])
     of = cache(prepared)
@@ -421,9 +389,7 @@ def parameter_locus(
 def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[float]:
     """Return speeds, which may be texts with units [m/s].
 
-    Raises
-    ------
-    InputError : one of them is no speed or out of range, or there is none.
+    Raises InputError: one of them is no speed or out of range, or there is none.
     """
     low, high = SPEED_RANGE
     values = [speed_in_si(speed) for speed in speeds]

@@ -47,12 +47,7 @@ BOGIE_NAMES = ("longitudinal", "lateral", "bounce", "roll", "pitch", "yaw")
 class Parts:
     """Which bodies are what.
 
-    Attributes
-    ----------
-    model : Model
-    coordinates : Coordinates
-    cars, frames, wheelsets : tuple of int
-        Body indices.
+    `cars`, `frames`, `wheelsets`: body indices.
     """
 
     model: Model
@@ -118,14 +113,7 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
 def mode_name(parts: Parts, shape: Complex, eigenvalue: complex, speed: float) -> str:
     """Name one mode.
 
-    Parameters
-    ----------
-    shape : complex128[n]
-        Right eigenvector.
-    eigenvalue : complex
-        [1/s].
-    speed : float
-        [m/s].
+    `shape`: right eigenvector; `eigenvalue`: [1/s]; `speed`: [m/s].
     """
     shares = parts.energy_shares(shape)
     if abs(eigenvalue) < NEAR_ZERO and shares[:, 0].sum() + shares[:, 4].sum() > 0.9:

@@ -34,12 +34,8 @@ class Grip:
 class Sliding(SteadyRolling):
     """Newton's method for steady states whose friction forces follow the displacement.
 
-    Parameters
-    ----------
-    model, system, held
-        As of `SteadyRolling`.
-    since : Grip, optional
-        Of the last known state; without it friction elements hold the forces that a state has.
+    `model`, `system`, `held`: as of `SteadyRolling`; `since`: of the last known state; without it
+    friction elements hold the forces that a state has.
     """
 
     def __init__(
@@ -97,19 +93,9 @@ Placed = Callable[[float, Floats], tuple[System, Floats]]
 class SlidingPath:
     """A way through quasi-static states, friction following it.
 
-    Parameters
-    ----------
-    model : Model
-        With preloads.
-    placed : callable
-        Share of the load and a state to the system under it and that state, with held wheelsets
-        where the load has them.
-    start : float64[n_state]
-        At the share 0, friction forces included.
-    speed : float
-        [m/s].
-    held : bool
-        Whether the wheelsets are held.
+    `model`: with preloads; `placed`: share of the load and a state to the system under it and that
+    state, with held wheelsets where the load has them; `start`: at the share 0, friction forces
+    included; `speed`: [m/s]; `held`: whether the wheelsets are held.
     """
 
     def __init__(
@@ -125,10 +111,7 @@ class SlidingPath:
     def to(self, goal: float) -> None:
         """Go to another share of the load in one step, or in halves of it.
 
-        Raises
-        ------
-        NotConverged
-            Says at which share; state and share are those reached.
+        Raises NotConverged Says at which share; state and share are those reached.
         """
         step = goal - self.share
         while self.share != goal:

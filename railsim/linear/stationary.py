@@ -37,14 +37,8 @@ CLOSED = 1e-3  # ... to this part of the load
 class Standing:
     """A vehicle that stands.
 
-    Attributes
-    ----------
-    state : float64[n_state]
-        Its state.
-    Q, Q0 : float64[wheelset, side]
-        Wheel loads, and those on straight level track [N].
-    Y : float64[wheelset, side] or None
-        Guiding forces of rolling wheelsets [N].
+    `state`: its state; `Q`, `Q0`: wheel loads, and those on straight level track [N]; `Y`: guiding
+    forces of rolling wheelsets [N].
     """
 
     state: Floats
@@ -61,16 +55,8 @@ class Standing:
 def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = False) -> Standing:
     """Return the vehicle standing on canted straight track.
 
-    Parameters
-    ----------
-    balance : Equilibrium
-        Of the vehicle at `WALKING_PACE`.
-    track : Track
-        Whose rails and friction count.
-    cant : float
-        [m].
-    held : bool
-        Hold the wheelsets across the track.
+    `balance`: of the vehicle at `WALKING_PACE`; `track`: whose rails and friction count; `cant`:
+    [m]; `held`: hold the wheelsets across the track.
     """
     model, start = balance.model, _placed(balance)
     system = model.system._replace(track=track_tables(circle(track, cant=cant)))
@@ -83,10 +69,7 @@ def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = Fal
 def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -> float:
     """Roll of a body against the track over the angle of cant (EN 15273, UIC 505).
 
-    Parameters
-    ----------
-    body : str
-        Full name of the body, such as ``carbody``.
+    `body`: full name of the body, such as ``carbody``.
     """
     roll = standing.state[model.index.coordinate(body, 3)]
     return float(roll / np.arcsin(cant / CANT_BASE))
@@ -96,14 +79,8 @@ def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -
 class TwistLoop:
     """Wheel loads while a twist grows from level track, and goes to and fro until the loop closes.
 
-    Attributes
-    ----------
-    share : float64[k]
-        Of the twist, from 1/n over 1 to -1 and back, as often as it takes [1].
-    Q : float64[k, wheelset, side]
-        Wheel loads [N].
-    Q0 : float64[wheelset, side]
-        On straight level track [N].
+    `share`: of the twist, from 1/n over 1 to -1 and back, as often as it takes [1]; `Q`: wheel
+    loads [N]; `Q0`: on straight level track [N].
     """
 
     share: Floats
@@ -138,15 +115,8 @@ def twist_loop(
 
     Without dry friction both directions give the same, and only the two twists are computed.
 
-    Parameters
-    ----------
-    balance, track, heights, held
-        As in `on_twist`.
-
-    Raises
-    ------
-    NotConverged
-        There is no steady state on the way, or the loop does not close.
+    `balance`, `track`, `heights`, `held`: as in `on_twist`. Raises NotConverged There is no steady
+    state on the way, or the loop does not close.
     """
     raised = np.asarray(heights, dtype=float)
     if not has_pads(balance.model):
@@ -184,14 +154,9 @@ def on_twist(
 
     Dry friction follows the way from straight level track.
 
-    Parameters
-    ----------
-    balance, track, held
-        As in `on_cant`.
-    heights : float64[wheelset]
-        Left rail over the right one under each wheelset, on 1.5 m [m].
-    curvature : float
-        1/radius, positive to the right, of a curve that wheelsets roll through [1/m].
+    `balance`, `track`, `held`: as in `on_cant`; `heights`: left rail over the right one under each
+    wheelset, on 1.5 m [m]; `curvature`: 1/radius, positive to the right, of a curve that wheelsets
+    roll through [1/m].
     """
     raised = np.asarray(heights, dtype=float)
     solver: SteadyRolling

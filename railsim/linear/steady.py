@@ -47,13 +47,8 @@ class NotConverged(ModelError):
 class SteadyState:
     """A state of steady rolling.
 
-    Attributes
-    ----------
-    state : float64[n_state]
-    residual : float
-        Largest remaining acceleration [m/s2, rad/s2].
-    iterations : int
-        Steps of Newton's method.
+    `residual`: largest remaining acceleration [m/s2, rad/s2]; `iterations`: steps of Newton's
+    method.
     """
 
     state: Floats
@@ -64,14 +59,8 @@ class SteadyState:
 class SteadyRolling:
     """Newton's method for one vehicle on one track of constant curvature and cant.
 
-    Parameters
-    ----------
-    model : Model
-        With preloads.
-    system : System
-        The model on that track.
-    held : bool
-        Whether the wheelsets stay where the guess has them.
+    `model`: with preloads; `system`: the model on that track; `held`: whether the wheelsets stay
+    where the guess has them.
     """
 
     def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
@@ -89,17 +78,8 @@ class SteadyRolling:
     def solve(self, guess: Floats, speed: float) -> SteadyState:
         """Return the steady state nearest to a guess.
 
-        Parameters
-        ----------
-        guess : float64[n_state]
-            Positions and spin rates count; position and time are kept.
-        speed : float
-            [m/s].
-
-        Raises
-        ------
-        NotConverged
-            Names the largest remaining accelerations.
+        `guess`: positions and spin rates count; position and time are kept; `speed`: [m/s]. Raises
+        NotConverged Names the largest remaining accelerations.
         """
         state = self.prepared(guess, speed)
         forces = self._forces(state)
@@ -118,10 +98,7 @@ class SteadyRolling:
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a state, forces into `work`.
 
-        Raises
-        ------
-        NotConverged
-            The state lies outside the range of the model.
+        Raises NotConverged The state lies outside the range of the model.
         """
         return np.asarray(self._evaluated(state[None])[0])
 
@@ -265,26 +242,10 @@ def led(
 ) -> tuple[SteadyState, SteadyRolling]:
     """Lead a steady state from where it is known to where it is sought.
 
-    Parameters
-    ----------
-    model : Model
-        With preloads.
-    along : callable
-        Share of the way, above 0 to 1, to the system and the speed there.
-    start : float64[n_state]
-        State at share 0.
-    smallest : float
-        Step at which the path ends for lack of convergence.
-
-    Returns
-    -------
-    SteadyState, SteadyRolling
-        At share 1, and the solver with the forces there in `work`.
-
-    Raises
-    ------
-    NotConverged
-        Says how far it came.
+    `model`: with preloads; `along`: share of the way, above 0 to 1, to the system and the speed
+    there; `start`: state at share 0; `smallest`: step at which the path ends for lack of
+    convergence. Returns: at share 1, and the solver with the forces there in `work`. Raises
+    NotConverged Says how far it came.
     """
     done, step = 0.0, 1.0
     before, now = start, start

@@ -17,16 +17,8 @@ Floats = NDArray[np.float64]
 class Linearisation:
     """x' = A x about an equilibrium.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the coordinates.
-    matrix : float64[n, n]
-        A = df/dx [1/s and mixed units].
-    state : float64[n]
-        Where it was formed.
-    parameter : float
-        Value of the parameter, mostly the speed [m/s].
+    `names`: names of the coordinates; `matrix`: a = df/dx [1/s and mixed units]; `state`: where it
+    was formed; `parameter`: value of the parameter, mostly the speed [m/s].
     """
 
     names: tuple[str, ...]
@@ -38,12 +30,8 @@ class Linearisation:
 def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats) -> Floats:
     """Jacobian float64[m, n] by central differences.
 
-    Parameters
-    ----------
-    function : callable
-        Of many states at once, float64[k, n] to float64[k, m].
-    state, steps : float64[n]
-        Where, and with which steps.
+    `function`: of many states at once, float64[k, n] to float64[k, m]; `state`, `steps`: where, and
+    with which steps.
 
     Examples
     --------

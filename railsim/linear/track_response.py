@@ -55,27 +55,16 @@ TOGETHER = 4096  # wave numbers that are solved at once
 class TrackResponse:
     """State space of a vehicle with track inputs at one speed.
 
-    Attributes
-    ----------
-    speed : float
-        [m/s].
-    outputs : tuple of str
-        Readings, such as ``axlebox_1_left.z``; ``roll_rate`` instead of an axis; wheel forces,
-        such as ``Q.1.left``.
-    offsets : float64[w]
-        Of the wheelsets from the reference body along the track [m].
-    A, C : float64[n, n], float64[m, n]
-        State matrix; output matrix apart from accelerations.
-    B, D : float64[n or m, wheelset, quantity, order]
-        Of the displacements of the rails, their slopes and curvatures.
-    R : float64[m, n]
-        Outputs by the derivative of the state: y = C x + D u + R x'.
-    rows : int64[wheelset, component]
-        Where the accelerations of the wheelsets in y, z, roll, yaw stand in x'.
-    own : float64[m, wheelset, component]
-        Outputs by unknown accelerations of the wheelsets, beside R.
-    steady : float64[m]
-        Outputs in steady rolling.
+    - `speed`: [m/s]
+    - `outputs`: readings, such as ``axlebox_1_left.z``; ``roll_rate`` instead of an axis; wheel
+      forces, such as ``Q.1.left``
+    - `offsets`: of the wheelsets from the reference body along the track [m]
+    - `A`, `C`: state matrix; output matrix apart from accelerations
+    - `B`, `D`: of the displacements of the rails, their slopes and curvatures
+    - `R`: outputs by the derivative of the state: y = C x + D u + R x'
+    - `rows`: where the accelerations of the wheelsets in y, z, roll, yaw stand in x'
+    - `own`: outputs by unknown accelerations of the wheelsets, beside R
+    - `steady`: outputs in steady rolling
     """
 
     speed: float
@@ -95,12 +84,7 @@ class TrackResponse:
 
         Inputs are the quantities, then the unknown accelerations of the wheelsets.
 
-        Parameters
-        ----------
-        wave_numbers : float64[k]
-            2 pi over the wavelength [rad/m].
-        chosen : sequence of int, optional
-            Outputs; all by default.
+        `wave_numbers`: 2 pi over the wavelength [rad/m]; `chosen`: outputs; all by default.
         """
         out = slice(None) if chosen is None else list(chosen)
         C, D = (self.C + self.R @ self.A)[out], self.D[out]
@@ -133,19 +117,8 @@ def track_response(
 ) -> TrackResponse:
     """Return the state space of a vehicle with track inputs.
 
-    Parameters
-    ----------
-    vehicle : LinearVehicle
-        On straight track, its wheelsets free.
-    sensors : mapping of str to Sensor
-        What reads accelerations.
-    speed : float
-        [m/s].
-
-    Raises
-    ------
-    ModelError
-        There is no steady rolling, or a derivative is not finite.
+    `vehicle`: on straight track, its wheelsets free; `sensors`: what reads accelerations; `speed`:
+    [m/s]. Raises ModelError: there is no steady rolling, or a derivative is not finite.
     """
     track = vehicle.system.track
     rail = track.rail.copy()

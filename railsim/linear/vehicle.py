@@ -73,14 +73,9 @@ def conditions(track: Track, settings: Settings) -> dict[str, str]:
 class Contact:
     """How the contact of wheel and rail is linearised.
 
-    Attributes
-    ----------
-    linearisation : "tangent" or "harmonic"
-        The derivative at the steady state, or the first harmonic for an amplitude.
-    amplitude : float
-        Of the harmonic linearisation [m].
-    conicity : float or None
-        Wheels replaced by straight cones of this slope [1].
+    `linearisation`: the derivative at the steady state, or the first harmonic for an amplitude;
+    `amplitude`: of the harmonic linearisation [m]; `conicity`: wheels replaced by straight cones of
+    this slope [1].
     """
 
     linearisation: str = "tangent"
@@ -132,35 +127,16 @@ class Contact:
 class LinearVehicle:
     """A vehicle on straight or circular track, to be linearised at any speed.
 
-    Parameters
-    ----------
-    vehicle, track : Vehicle, Track
-        Definitions; of the track rails, gauge and friction at its beginning count.
-    contact : Contact
-        How wheel and rail are linearised.
-    radius, cant : float
-        Of the track on which the vehicle rolls [m].
-    held : bool
-        Hold the wheelsets.
-    hold : sequence of str
-        Bodies that are fixed to the moving track frame where they are in steady rolling.
-    settings : Settings, optional
-    profiles : mapping of str to Profile, optional
-        Profiles that take precedence over built-in ones and files.
+    - `vehicle`, `track`: definitions; of the track rails, gauge and friction at its beginning count
+    - `contact`: how wheel and rail are linearised
+    - `radius`, `cant`: of the track on which the vehicle rolls [m]
+    - `held`: hold the wheelsets
+    - `hold`: bodies that are fixed to the moving track frame where they are in steady rolling
+    - `profiles`: profiles that take precedence over built-in ones and files
+    - `name`: of the vehicle
+    - `sticking`: number of friction elements, which a linearisation takes as sticking
 
-    Attributes
-    ----------
-    name : str
-        Of the vehicle.
-    sticking : int
-        Number of friction elements, which a linearisation takes as sticking.
-
-    Raises
-    ------
-    InputError
-        Something is out of range.
-    ModelError
-        The vehicle has no equilibrium.
+    Raises InputError: something is out of range. ModelError The vehicle has no equilibrium.
     """
 
     def __init__(
@@ -238,10 +214,7 @@ class LinearVehicle:
     def steady(self, speed: float) -> SteadyState:
         """Return the state of steady rolling at a speed [m/s].
 
-        Raises
-        ------
-        ModelError
-            There is none.
+        Raises ModelError: there is none.
         """
         if speed not in self._known:
             near = min(self._known, key=lambda v: abs(v - speed), default=None)

@@ -62,14 +62,9 @@ _KINDS = {"body": RIGID, "wheelset": WHEELSET, "axlebox": AXLEBOX}
 class Index:
     """Names of the model's parts in the order of the arrays.
 
-    Attributes
-    ----------
-    bodies : tuple of str
-        All bodies: rigid ones, wheelsets from the leading end, axleboxes.
-    wheelsets : tuple of str
-        Names of the wheelsets.
-    links, mounts, actuators, signals, controllers : tuple of str
-        Names of the rows of these parts of the system.
+    `bodies`: all bodies: rigid ones, wheelsets from the leading end, axleboxes; `wheelsets`: names
+    of the wheelsets; `links`, `mounts`, `actuators`, `signals`, `controllers`: names of the rows of
+    these parts of the system.
     """
 
     bodies: tuple[str, ...]
@@ -105,24 +100,16 @@ class Index:
 class Model:
     """A vehicle on a track, ready for the kernels.
 
-    Attributes
-    ----------
-    system, index : System, Index
-        Arrays and names.
-    flat : FlatVehicle
-        The vehicle's parts with names and positions.
-    tables : tuple of ContactTable
-        Contact tables in the order of `System.contact.values`.
-    profiles : dict
-        Profiles used, by name.
-    design : Model or None
-        The vehicle in its design load, whose preloads these are, where a load case is in force.
-    wheels : UnevenWheels
-        Wheels that are not round, which `system` leaves out: see `railsim.model.uneven_wheels`.
-    check : CheckRails
-        Check rails, likewise.
-    rails : RailRanges
-        Rails whose section changes, likewise.
+    - `system`, `index`: arrays and names
+    - `flat`: the vehicle's parts with names and positions
+    - `tables`: contact tables in the order of `System.contact.values`
+    - `profiles`: profiles used, by name
+    - `design`: the vehicle in its design load, whose preloads these are, where a load case is in
+      force
+    - `wheels`: wheels that are not round, which `system` leaves out: see
+      `railsim.model.uneven_wheels`
+    - `check`: check rails, likewise
+    - `rails`: rails whose section changes, likewise
     """
 
     system: System
@@ -157,25 +144,12 @@ def assemble(
 ) -> Model:
     """Build the arrays of one vehicle on one track.
 
-    Parameters
-    ----------
-    vehicle, track, settings : Vehicle, Track, Settings
-        Valid definitions.
-    profiles : mapping of str to Profile, optional
-        Profiles by name that take precedence over built-in ones and files (a result carries those
-        that it used).
-    shared : SharedTables, optional
-        Tables of other models with the same track, settings and profiles; takes those made now.
-
-    Returns
-    -------
-    Model
-
-    Raises
-    ------
-    InputError : a profile cannot be read, a law is not permitted or cannot be compiled.
-    TypeError : something else than a vehicle, a track, profiles by name.
-    ModelError : the wheels do not fit on the rails.
+    `vehicle`, `track`, `settings`: valid definitions; `profiles`: profiles by name that take
+    precedence over built-in ones and files (a result carries those that it used); `shared`: tables
+    of other models with the same track, settings and profiles; takes those made now. Raises
+    InputError: a profile cannot be read, a law is not permitted or cannot be compiled. TypeError:
+    something else than a vehicle, a track, profiles by name. ModelError: the wheels do not fit on
+    the rails.
     """
     check_types([vehicle], track)
     flat = flatten(vehicle)
@@ -376,12 +350,8 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
 class SharedTables:
     """Tables of the track and of the contacts that several models on one track share.
 
-    Attributes
-    ----------
-    track : TrackTables or None
-        Once the first model is there.
-    contact : dict
-        Contact tables by what they depend on beside track and settings.
+    `track`: once the first model is there; `contact`: contact tables by what they depend on beside
+    track and settings.
     """
 
     def __init__(self) -> None:

@@ -36,10 +36,7 @@ def settings_creep_law(settings: Settings, track: Track) -> CreepLaw:
 def with_own_laws(contact: Contact, settings: Settings) -> Contact:
     """Return the contact with the laws of one's own that the settings name.
 
-    Raises
-    ------
-    InputError
-        A name that means nothing; a law that is not permitted or cannot be compiled.
+    Raises InputError: A name that means nothing; a law that is not permitted or cannot be compiled.
     """
     if settings.own_creep_law is not None:
         bound, values = _bound(settings, settings.own_creep_law, "own_creep_law", CREEP_LAW)

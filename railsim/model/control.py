@@ -60,11 +60,8 @@ def periods(vehicle: Vehicle) -> list[float]:
 def with_control(model: Model, vehicle: Vehicle, settings: Settings) -> Model:
     """Return the model with the vehicle's signals and controllers.
 
-    Raises
-    ------
-    InputError
-        Names that mean nothing; a law that is not permitted or cannot be compiled; a step of the
-        settings that is longer than a controller's period.
+    Raises InputError: names that mean nothing; a law that is not permitted or cannot be compiled; a
+    step of the settings that is longer than a controller's period.
     """
     if not vehicle.signals and not vehicle.controllers:
         return model

@@ -80,15 +80,7 @@ def rotation_potential(stiffness: Sequence[float]) -> Triple:
 
     The moment about axis i is (sum(K_d) - K_d,i) theta_i, hence K_d,i = sum(k)/2 - k_i.
 
-    Parameters
-    ----------
-    stiffness : sequence of 3 floats
-        k_x, k_y, k_z [N m/rad].
-
-    Returns
-    -------
-    tuple of 3 floats
-        K_d [N m]; entries may be negative.
+    `stiffness`: k_x, k_y, k_z [N m/rad]. Returns: K_d [N m]; entries may be negative.
 
     Examples
     --------
@@ -102,10 +94,7 @@ def rotation_potential(stiffness: Sequence[float]) -> Triple:
 class LawBlocks:
     """Numbers of commands, signals and laws of one's own, as `Work.memory` begins with them.
 
-    Parameters
-    ----------
-    laws : mapping of str to Law, optional
-        Laws by name, compiled where an element has one; None leaves these elements out.
+    `laws`: laws by name, compiled where an element has one; None leaves these elements out.
     """
 
     def __init__(self, laws: Mapping[str, Law] | None = None) -> None:
@@ -153,10 +142,7 @@ class LawBlocks:
 class ElementArrays:
     """Collects elements row by row until the arrays are made.
 
-    Attributes
-    ----------
-    bodies : mapping of str to FlatBody
-        All bodies by name, in the order of their indices.
+    `bodies`: all bodies by name, in the order of their indices.
     """
 
     bodies: Mapping[str, FlatBody]

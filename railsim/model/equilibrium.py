@@ -57,18 +57,9 @@ _STEPS = 60
 class Equilibrium:
     """The vehicle at rest and in steady rolling on straight level track.
 
-    Attributes
-    ----------
-    model : Model
-        The model with all preloads filled in.
-    state : float64[n_state]
-        Steady rolling at s = 0.
-    Q0 : float64[wheelset, side]
-        Static wheel loads [N].
-    residual : float
-        Largest remaining acceleration [m/s2, rad/s2].
-    remarks : tuple of str
-        Remarks for the reader of results.
+    `model`: the model with all preloads filled in; `state`: steady rolling at s = 0; `Q0`: static
+    wheel loads [N]; `residual`: largest remaining acceleration [m/s2, rad/s2]; `remarks`: remarks
+    for the reader of results.
     """
 
     model: Model
@@ -81,10 +72,8 @@ class Equilibrium:
 def equilibrium(model: Model, speed: float) -> Equilibrium:
     """Find preloads, static wheel loads and the state of steady rolling at `speed` [m/s].
 
-    Raises
-    ------
-    ModelError
-        The preloads cannot carry a body, or no equilibrium is found; names what is unbalanced.
+    Raises ModelError: the preloads cannot carry a body, or no equilibrium is found; names what is
+    unbalanced.
     """
     model, guess, remarks = _let_down(model)
     level = level_track(model.system)
@@ -100,10 +89,7 @@ def equilibrium(model: Model, speed: float) -> Equilibrium:
 def stored_equilibrium(model: Model, speed: float, inputs: str) -> Equilibrium:
     """As `equilibrium`, from the disk where it was found before.
 
-    Parameters
-    ----------
-    inputs : str
-        Hash of all that the model was made of, but for the friction of its track.
+    `inputs`: hash of all that the model was made of, but for the friction of its track.
     """
     friction = model.system.track.rail[:, MU_LEFT : MU_LEFT + 2, 0]
     digest = hashlib.sha256(f"{inputs} {speed!r} {model.system.contact.values.shape}".encode())
@@ -134,10 +120,7 @@ def stored_equilibrium(model: Model, speed: float, inputs: str) -> Equilibrium:
 def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:
     """Return the model with preloads, a guess of its position with fixed bodies in place, remarks.
 
-    Raises
-    ------
-    ModelError
-        The preloads cannot carry a body.
+    Raises ModelError: the preloads cannot carry a body.
     """
     fixed = model.system.bodies.fixed
     if not len(fixed):
@@ -420,10 +403,7 @@ class _Balance:
 def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) -> Floats:
     """Steady rolling transferred to arc length `s`: at rest relative to the moving track frames.
 
-    Parameters
-    ----------
-    frames : float64[n_frames, FRAME_SIZE]
-        Track frames at the bodies' positions for this `s`.
+    `frames`: track frames at the bodies' positions for this `s`.
     """
     state = balance.state.copy()
     state[ARC_LENGTH] = s

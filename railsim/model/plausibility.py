@@ -41,13 +41,8 @@ def vehicle_remarks(
 ) -> list[Remark]:
     """Return what is unlike all experience in a vehicle, equal findings as one line.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    balanced : Model, optional
-        Its model with preloads, where there is one.
-    supports : bool
-        Whether the weight on each support is computed too; it needs the compiler's import.
+    `balanced`: its model with preloads, where there is one; `supports`: whether the weight on each
+    support is computed too; it needs the compiler's import.
 
     Examples
     --------

@@ -33,10 +33,7 @@ def with_preloads(model: Model) -> Model:
     pitches themselves.  So does a vehicle with springs of known free length: their preloads are
     given, and what they leave unbalanced moves the bodies.
 
-    Raises
-    ------
-    ModelError
-        The springs cannot carry the vehicle.
+    Raises ModelError: the springs cannot carry the vehicle.
     """
     key = _key(model)
     if key not in _KEPT:
@@ -98,10 +95,7 @@ def _solved(model: Model) -> Model:
 def _with_pressing_wedges(model: Model) -> Model:
     """Return the model; a wedge that would have to pull stands the wrong way round.
 
-    Raises
-    ------
-    ModelError
-        Names the wedges.
+    Raises ModelError: names the wedges.
     """
     force = dict(zip(model.index.mounts, model.system.mounts.preload[:, 2], strict=True))
     wrong = [
@@ -126,10 +120,7 @@ def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
     their preloads were to be found; a given preload counts as it is.  Positive where the spring
     pushes its bodies apart.  With `solved` the model's preloads are taken as they are.
 
-    Raises
-    ------
-    ModelError
-        The springs cannot carry the vehicle.
+    Raises ModelError: the springs cannot carry the vehicle.
     """
     support = _auto_preloads(model, known_lengths=True)
     filled = model

@@ -28,14 +28,8 @@ Floats = NDArray[np.float64]
 class RailRanges:
     """Ranges of a track over which the section of a rail changes.
 
-    Attributes
-    ----------
-    tables : tuple of ContactTable
-        One for each range and kind of wheel, see `railsim.contact.section_tables`.
-    which : int64[k, w, 2]
-        Which of them serves each wheel on each range, else -1.
-    ends : float64[k, 2]
-        Begin and end of the ranges [m].
+    `tables`: one for each range and kind of wheel, see `railsim.contact.section_tables`; `which`:
+    which of them serves each wheel on each range, else -1; `ends`: begin and end of the ranges [m].
     """
 
     tables: tuple[ContactTable, ...]

@@ -30,14 +30,8 @@ _new: list[Path] = []
 def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """Return what was found for these inputs before, or what is found now.
 
-    Parameters
-    ----------
-    kind : str
-        What is sought.
-    inputs : str
-        All that it depends on, the program apart.
-    solve : callable
-        Finds it: numbers, texts and lists of them by name.  What it raises is not stored.
+    `kind`: what is sought; `inputs`: all that it depends on, the program apart; `solve`: finds it:
+    numbers, texts and lists of them by name. What it raises is not stored.
     """
     folder = solutions_folder(os.environ.get("RAILSIM_CACHE_DIR"))
     if folder is None:

@@ -67,12 +67,8 @@ def empty_recorder(
 ) -> Recorder:
     """Recorder with room for `rows` outputs.
 
-    Parameters
-    ----------
-    chosen : int64[e, 2], optional
-        Elements to record, see `railsim.kernels.element_outputs`.
-    patches : bool
-        Whether the contact patches are recorded.
+    `chosen`: elements to record, see `railsim.kernels.element_outputs`; `patches`: whether the
+    contact patches are recorded.
     """
     n = model.index.n_bodies
     wheelsets = len(model.index.wheelsets)
@@ -92,14 +88,8 @@ def empty_recorder(
 def divide_strikes(work: Work, scheme: int, step: float, longest: float = math.inf) -> None:
     """Have the time loop divide the steps over which a wheel lifts or strikes.
 
-    Parameters
-    ----------
-    work : Work
-        With which the loop is called.
-    scheme, step : int, float
-        FAST or RK4; time step [s].
-    longest : float
-        Longest part that follows what the wheels pass over [s].
+    `work`: with which the loop is called; `scheme`, `step`: FAST or RK4; time step [s]; `longest`:
+    longest part that follows what the wheels pass over [s].
     """
     elastic = len(work.support) > 0
     part = min(longest, PART_ELASTIC if elastic and scheme == FAST else PART[scheme])
@@ -118,16 +108,9 @@ SLIGHT = 0.01
 class Stability:
     """Judges steps of a model on straight track and in flange contact.
 
-    Parameters
-    ----------
-    model : Model
-    system, state : System, float64[n_state]
-        The model on straight and level track; steady rolling there.
-    scheme : str
-        Key of `SCHEMES`.
-    curving : callable
-        Takes a step that is stable on straight track; returns system and settled state in the
-        tightest curve, or None where there is no flange contact.
+    `system`, `state`: the model on straight and level track; steady rolling there; `scheme`: key of
+    `SCHEMES`; `curving`: takes a step that is stable on straight track; returns system and settled
+    state in the tightest curve, or None where there is no flange contact.
     """
 
     def __init__(
@@ -161,10 +144,7 @@ class Stability:
     def choose(self, interval: float) -> float:
         """Longest stable step that divides the output interval, with the margin.
 
-        Raises
-        ------
-        ModelError
-            No step longer than `SHORTEST_STEP` is stable.
+        Raises ModelError: no step longer than `SHORTEST_STEP` is stable.
         """
         n = max(1, int(np.ceil(interval / self.longest * (1.0 - 1e-9))))
         while interval / n >= SHORTEST_STEP:

@@ -75,9 +75,7 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
 def save_profile(profile: Profile, path: Path) -> Path:
     """Write a profile as a CSV file that can stand in a vehicle or track file; return its path.
 
-    Raises
-    ------
-    InputError : the file cannot be written.
+    Raises InputError: the file cannot be written.
     """
     lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
     lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]

@@ -128,10 +128,7 @@ def cone(taper: float) -> Profile:
     The tread is a cone of the given taper; flank, tip and back are those of S1002, the fillet of
     13 mm between them is tangent to both, as S1002's own.
 
-    Parameters
-    ----------
-    taper : float
-        Taper, 0.05 for 1:20 [1].
+    `taper`: taper, 0.05 for 1:20 [1].
     """
     radius, (level, slope) = 13.0, S1002_FLANK
     # centre of the fillet: its radius away from cone and flank, on the rail's side
@@ -166,21 +163,10 @@ def arc_chain_rail(
 ) -> tuple[Floats, Floats]:
     """Rail head of tangent arcs and a straight flank, symmetric about its axis.
 
-    Parameters
-    ----------
-    half_widths : tuple of float
-        Distances from the axis at which each arc but the last meets the next one [mm].
-    radii : tuple of float
-        Radii from the crown to the gauge corner [mm].
-    flank_slope : float
-        Flank's inclination to the vertical [1].
-    depth : float
-        Depth below the crown to which the flank is drawn [mm].
-
-    Returns
-    -------
-    y, z : ndarray, shape (n,)
-        Contour from the left flank to the right one, z down from the crown [mm].
+    `half_widths`: distances from the axis at which each arc but the last meets the next one [mm];
+    `radii`: radii from the crown to the gauge corner [mm]; `flank_slope`: flank's inclination to
+    the vertical [1]; `depth`: depth below the crown to which the flank is drawn [mm]. Returns: `y,
+    z` (shape (n,)): contour from the left flank to the right one, z down from the crown [mm].
     """
     angles, centre = [0.0], [(0.0, radii[0])]
     for i, half_width in enumerate(half_widths):

@@ -34,20 +34,10 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 class RawProfile:
     """What a file holds.
 
-    Attributes
-    ----------
-    y, z : ndarray, shape (n,)
-        Points in the file's order and axes [m, or the file's unit if `unit` is None].
-    line : ndarray of int, shape (n,)
-        Line of each point in the file, from 1.
-    unit : float or None
-        Metres per unit of the file; None if the file does not say.
-    kind : "wheel", "rail" or None
-        What the file says that it is.
-    name : str
-        Title.
-    notes : list of str
-        What was done on the file's own request.
+    `y`, `z`, shape (n,): points in the file's order and axes [m, or the file's unit if `unit` is
+    None]; `line`, shape (n,): line of each point in the file, from 1; `unit`: metres per unit of
+    the file; None if the file does not say; `kind`: what the file says that it is; `name`: title;
+    `notes`: what was done on the file's own request.
     """
 
     y: Floats
@@ -102,19 +92,8 @@ def _number(text: str) -> float | None:
 def read_profile_file(path: str | Path) -> RawProfile:
     """Read a profile file.
 
-    Parameters
-    ----------
-    path : str or Path
-        File; its suffix decides about the format.
-
-    Returns
-    -------
-    RawProfile
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or a line is not what its format wants.
+    `path`: file; its suffix decides about the format. Raises InputError: if the file cannot be read
+    or a line is not what its format wants.
     """
     path = Path(path)
     file = str(path)

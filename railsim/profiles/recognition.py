@@ -38,24 +38,9 @@ UPRIGHT = 4e-3
 def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> Profile:
     """Turn a file's points into a profile.
 
-    Parameters
-    ----------
-    raw : RawProfile
-        What the file holds.
-    file : str
-        Its name, for messages.
-    kind : "wheel", "rail" or None
-        What it is used as; None goes by the file.
-
-    Returns
-    -------
-    Profile
-        With a note on every correction.
-
-    Raises
-    ------
-    InputError
-        If it is not a usable profile of that kind.
+    `raw`: what the file holds; `file`: its name, for messages; `kind`: what it is used as; None
+    goes by the file. Returns: with a note on every correction. Raises InputError: if it is not a
+    usable profile of that kind.
     """
     kind = kind or raw.kind
     if kind is None:

@@ -28,16 +28,9 @@ COLUMNS = ("speed", "amplitude", "frequency", "sum_Y_rms", "stable")
 class Point:
     """One motion of a branch.
 
-    Attributes
-    ----------
-    speed, amplitude, frequency : float
-        [m/s], lateral of the wheelset that moves most [m], [Hz].
-    sum_Y_rms : float
-        Largest rms of a wheelset's lateral force [N].
-    stable : bool
-        Whether a run stays at it.
-    state : float64[n]
-        At the end of the run that found it; empty of other methods.
+    `speed`, `amplitude`, `frequency`: [m/s], lateral of the wheelset that moves most [m], [Hz];
+    `sum_Y_rms`: largest rms of a wheelset's lateral force [N]; `stable`: whether a run stays at it;
+    `state`: at the end of the run that found it; empty of other methods.
     """
 
     speed: float
@@ -66,12 +59,7 @@ def seen_at(speed: float, seen: Stretch, *, stable: bool = True) -> Point:
 class Branch:
     """One branch of a bifurcation diagram.
 
-    Attributes
-    ----------
-    direction : "up", "down", "further", "threshold", "ramp" or "continuation"
-        How it was found.
-    points : list of Point
-        In the order in which they were found.
+    `direction`: how it was found; `points`: in the order in which they were found.
     """
 
     direction: str
@@ -116,14 +104,8 @@ class Branch:
 class Jump:
     """Where a branch ends and the motion changes to another, or to rest.
 
-    Attributes
-    ----------
-    direction : "up" or "down"
-        Of the change of speed.
-    speed, amplitude : float
-        Of the last motion before [m/s], [m].
-    to : float
-        Amplitude of the motion after [m].
+    `direction`: of the change of speed; `speed`, `amplitude`: of the last motion before [m/s], [m];
+    `to`: amplitude of the motion after [m].
     """
 
     direction: str
@@ -136,15 +118,8 @@ class Jump:
 class Limit:
     """The lowest speed of stable hunting beyond a limit.
 
-    Attributes
-    ----------
-    speed : float or None
-        [m/s]; None where the limit is not reached.
-    limit : float
-        [m] or [N].
-    reached : bool
-    searched_to : float
-        Highest speed of the search [m/s].
+    `speed`: [m/s]; None where the limit is not reached; `limit`: [m] or [N]; `searched_to`: highest
+    speed of the search [m/s].
     """
 
     speed: float | None

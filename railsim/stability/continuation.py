@@ -35,15 +35,9 @@ APART = 0.01  # relative difference of frequencies with which two bogies hunt ea
 class Continued:
     """What continuation found.
 
-    Attributes
-    ----------
-    branches : list of Branch
-    begins : Point or None
-        First motion of the branch that begins where rest loses its stability.
-    folds : list of Point
-        Where the branches turn back in speed.
-    remarks : list of str
-        Which branches were not followed, or not to their end, and why.
+    `begins`: first motion of the branch that begins where rest loses its stability; `folds`: where
+    the branches turn back in speed; `remarks`: which branches were not followed, or not to their
+    end, and why.
     """
 
     branches: list[Branch] = field(default_factory=list)
@@ -61,16 +55,7 @@ def followed_branches(
 ) -> Continued:
     """Follow the branch that begins at the loss of stability, and those that runs have found.
 
-    Parameters
-    ----------
-    motion : VehicleMotion
-    lost : LossOfStability
-        Of rest, with the runs' own creep law.
-    known : sequence of Branch
-        Branches of runs.
-    speeds : tuple of 2 floats
-        Range [m/s].
-    progress : callable
+    `lost`: of rest, with the runs' own creep law; `known`: branches of runs; `speeds`: range [m/s].
     """
     found = Continued()
     if lost.parameter is None:

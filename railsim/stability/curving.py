@@ -69,36 +69,23 @@ STILL = 1e-4  # share of the wheel loads by which forces still change after a se
 class Curving(Plottable):
     """Steady curving on a grid.
 
-    Attributes
-    ----------
-    radius, cant_deficiency, friction : float64[r], float64[i], float64[m]
-        The grid [m], [m], [1].
-    cant : float
-        [m].
-    speed : float64[r, i]
-        [m/s].
-    converged : int64[r, i, m]
-        1 by Newton's method, 2 by time integration, 0 where there is no steady state; values are
-        NaN there.
-    Q, Y, Y_over_Q, dQ_over_Q0, T_gamma, contact_y : float64[r, i, m, wheelset, side]
-        See `railsim.notation`; `contact_y` is the lateral position of the most loaded patch
-        [m].
-    lateral, attack : float64[r, i, m, wheelset]
-        Lateral displacement [m] and angle of attack, the yaw against the radial direction [rad].
-    sum_Y : float64[r, i, m, wheelset]
-        [N].
-    steering : float64[r, i, m, bogie]
-        Yaw of the bogie frames against the track at their own positions [rad].
-    car_roll : float64[r, i, m]
-        Roll of the (first) car body against the track [rad].
-    wheelsets, bogies : tuple of str
-        Names.
-    wheelset_position : tuple of float
-        Positions of the wheelsets along the vehicle, against its reference body [m].
-    vehicle, place : str
-        Name of the vehicle; rails of the track.
-    remarks : tuple of str
-        Remarks for the reader.
+    - `radius`, `cant_deficiency`, `friction`: the grid [m], [m], [1]
+    - `cant`: [m]
+    - `speed`: [m/s]
+    - `converged`: 1 by Newton's method, 2 by time integration, 0 where there is no steady state;
+      values are NaN there
+    - `Q`, `Y`, `Y_over_Q`, `dQ_over_Q0`, `T_gamma`, `contact_y`: see `railsim.notation`;
+      `contact_y` is the lateral position of the most loaded patch [m]
+    - `lateral`, `attack`: lateral displacement [m] and angle of attack, the yaw against the radial
+      direction [rad]
+    - `sum_Y`: [N]
+    - `steering`: yaw of the bogie frames against the track at their own positions [rad]
+    - `car_roll`: roll of the (first) car body against the track [rad]
+    - `wheelsets`, `bogies`: names
+    - `wheelset_position`: positions of the wheelsets along the vehicle, against its reference body
+      [m]
+    - `vehicle`, `place`: name of the vehicle; rails of the track
+    - `remarks`: remarks for the reader
     """
 
     radius: Floats

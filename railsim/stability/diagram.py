@@ -53,19 +53,9 @@ def diagram(
     Further motions are sought from all disturbances at all speeds; speeds are added to the branches
     where they end or jump, to `RESOLUTION`.
 
-    Parameters
-    ----------
-    motion : Motion
-    speeds : sequence of float
-        Rising [m/s].
-    excitations : sequence of float
-        Sizes of the disturbances [m].
-
-    Returns
-    -------
-    list of Branch
-        Branches up and down, then the others, at last the unstable motions between two branches.
-        A branch upwards ends where the vehicle derails.
+    `speeds`: rising [m/s]; `excitations`: sizes of the disturbances [m]. Returns: branches up and
+    down, then the others, at last the unstable motions between two branches. A branch upwards ends
+    where the vehicle derails.
     """
     tell = progress or (lambda _: None)
     up, down = Branch("up"), Branch("down")
@@ -102,10 +92,8 @@ def settled(
 ) -> Stretch:
     """Go from one speed to another, and there until the amplitude changes no more, or has died.
 
-    Parameters
-    ----------
-    known : sequence of float
-        Amplitudes of motions at that speed, with 0 for rest: near these it need not settle [m].
+    `known`: amplitudes of motions at that speed, with 0 for rest: near these it need not settle
+    [m].
     """
     state, before = moved(motion, state, begin, speed), np.inf
     dead = THRESHOLD if 0.0 in known else 0.02 * THRESHOLD

@@ -39,16 +39,9 @@ class LeftRange(ModelError):
 class Stretch:
     """What a system did for a while.
 
-    Attributes
-    ----------
-    state : float64[n]
-        At the end.
-    time : float64[k]
-        From the beginning of the stretch [s].
-    lateral : float64[k, wheelset]
-        Lateral displacements of the wheelsets from the middle of their rails [m].
-    sum_Y : float64[k, wheelset]
-        Lateral forces of the wheelsets on the track [N]; zero where a system has none.
+    `state`: at the end; `time`: from the beginning of the stretch [s]; `lateral`: lateral
+    displacements of the wheelsets from the middle of their rails [m]; `sum_Y`: lateral forces of
+    the wheelsets on the track [N]; zero where a system has none.
     """
 
     state: Floats
@@ -101,15 +94,9 @@ class VehicleMotion:
     Steps in which a flange strikes are not divided as in runs: that takes twice the time and moves
     no end of a branch by 0.1 m/s.
 
-    Parameters
-    ----------
-    prepared : LinearVehicle
-        On straight track.
-    scheme : str
-        Integration scheme, ``fast`` or ``rk4``.
-    mode : Eigenmodes
-        One mode, in the shape of which the vehicle is disturbed: where all wheelsets are displaced
-        alike, far less of a disturbance becomes hunting.
+    `prepared`: on straight track; `scheme`: integration scheme, ``fast`` or ``rk4``; `mode`: one
+    mode, in the shape of which the vehicle is disturbed: where all wheelsets are displaced alike,
+    far less of a disturbance becomes hunting.
     """
 
     def __init__(self, prepared: LinearVehicle, scheme: str, mode: Eigenmodes) -> None:
@@ -180,10 +167,7 @@ class VehicleMotion:
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
         """Move a state of the time loop by a chunk of steps; number of records.
 
-        Raises
-        ------
-        LeftRange
-            The motion leaves the range of the model.
+        Raises LeftRange The motion leaves the range of the model.
         """
         status, where, _, rows = time_loop(
             system,

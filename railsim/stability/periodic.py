@@ -57,22 +57,13 @@ class Flow(Protocol):
 class PeriodicMotion:
     """One periodic motion.
 
-    Attributes
-    ----------
-    state : float64[n]
-        A state that it passes through.
-    period, speed : float
-        [s], [m/s].
-    amplitude : float
-        Half the largest lateral travel of a wheelset [m].
-    multipliers : complex128[n - 1]
-        Floquet multipliers without the trivial one.
-    tangent : float64[n + 2]
-        Direction of the branch in the scaled u.
-    along : float64[n]
-        Direction of the motion itself at `state`, scaled.
-    matrix : float64[n, n + 2] or None
-        Jacobian of the residual there, with which the search for the next one begins.
+    - `state`: a state that it passes through
+    - `period`, `speed`: [s], [m/s]
+    - `amplitude`: half the largest lateral travel of a wheelset [m]
+    - `multipliers`: Floquet multipliers without the trivial one
+    - `tangent`: direction of the branch in the scaled u
+    - `along`: direction of the motion itself at `state`, scaled
+    - `matrix`: Jacobian of the residual there, with which the search for the next one begins
     """
 
     state: Floats
@@ -98,13 +89,8 @@ class PeriodicMotion:
 class Shooting:
     """Newton's method for the periodic motions of a system.
 
-    Parameters
-    ----------
-    flow : Flow
-    scale : float64[n]
-        Size of each component of the state in a motion of about a millimetre.
-    period_scale, speed_scale : float
-        Changes of period [s] and speed [m/s] that count as much in the arc length.
+    `scale`: size of each component of the state in a motion of about a millimetre; `period_scale`,
+    `speed_scale`: changes of period [s] and speed [m/s] that count as much in the arc length.
     """
 
     def __init__(self, flow: Flow, scale: Floats, period_scale: float, speed_scale: float) -> None:
@@ -118,14 +104,8 @@ class Shooting:
     ) -> PeriodicMotion:
         """Return the motion of no amplitude at the bifurcation.
 
-        Parameters
-        ----------
-        state : float64[n]
-            Equilibrium at the critical speed.
-        shape : complex128[n]
-            Critical mode, of any size.
-        frequency, speed : float
-            Of the critical mode [Hz], [m/s].
+        `state`: equilibrium at the critical speed; `shape`: critical mode, of any size;
+        `frequency`, `speed`: of the critical mode [Hz], [m/s].
         """
         scaled = shape / self._scale[:-2]
         tangent = np.concatenate([scaled.real, [0.0, 0.0]])
@@ -144,19 +124,9 @@ class Shooting:
     ) -> Iterator[PeriodicMotion]:
         """Yield the motions of the branch while they are `within`, the first beyond it too.
 
-        Parameters
-        ----------
-        start : PeriodicMotion
-            Not yielded.
-        step : float
-            Arc length in scaled units; steps that fail are halved and grow again.
-        within : callable
-            Whether to go on from a motion.
-
-        Raises
-        ------
-        ModelError
-            The branch cannot be followed any further.
+        `start`: not yielded; `step`: arc length in scaled units; steps that fail are halved and
+        grow again; `within`: whether to go on from a motion. Raises ModelError: the branch cannot
+        be followed any further.
         """
         now, length = start, step
         while True:
@@ -177,20 +147,14 @@ class Shooting:
     def ahead(self, now: PeriodicMotion, length: float) -> tuple[PeriodicMotion, int]:
         """Return the motion one arc length further, and the number of iterations.
 
-        Raises
-        ------
-        ModelError
-            Newton's method does not converge.
+        Raises ModelError: Newton's method does not converge.
         """
         return self._solved(now, now.tangent, length)
 
     def nearest(self, state: Floats, period: float, speed: float) -> PeriodicMotion:
         """Return the motion at a speed nearest to a state of a run, with a branch that slows down.
 
-        Raises
-        ------
-        ModelError
-            Newton's method does not converge.
+        Raises ModelError: Newton's method does not converge.
         """
         n = len(state)
         begin = np.array([state, state])
@@ -206,10 +170,8 @@ class Shooting:
     def at_speed(self, near: PeriodicMotion, speed: float) -> PeriodicMotion:
         """Return the motion at a given speed [m/s] near to a known one.
 
-        Raises
-        ------
-        ModelError
-            Newton's method does not converge: there is none, or the known one is too far.
+        Raises ModelError: Newton's method does not converge: there is none, or the known one is too
+        far.
         """
         change = (speed - near.speed) / self._scale[-1]
         direction = np.zeros(len(near.tangent))
@@ -255,10 +217,7 @@ class Shooting:
     def fold(self, before: PeriodicMotion, after: PeriodicMotion, length: float) -> PeriodicMotion:
         """Return the motion where the branch turns back in speed between two of its motions.
 
-        Parameters
-        ----------
-        length : float
-            Arc length from `before` to `after`, or somewhat more.
+        `length`: arc length from `before` to `after`, or somewhat more.
         """
         found = {}
 

@@ -32,10 +32,7 @@ STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailmen
 def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
     """Excite hunting at a speed by a disturbance [m] and let it settle; one that derails is halved.
 
-    Raises
-    ------
-    LeftRange
-        Even a small disturbance ends in a derailment.
+    Raises LeftRange Even a small disturbance ends in a derailment.
     """
     while True:
         try:
@@ -74,19 +71,9 @@ def ramp(
 
     Braking hard shows where about it dies; the ramp begins somewhat above, on a state from there.
 
-    Parameters
-    ----------
-    motion : Motion
-    low, high : float
-        Range of speeds [m/s]; where every disturbance or the braking after it derails at `high`, a
-        lower one is taken.
-    excitations : sequence of float
-        Sizes of the disturbances at the highest speed [m].
-
-    Returns
-    -------
-    Point or None, Branch
-        The slowest motion that sustains itself, and the amplitude on the ramp.
+    `low`, `high`: range of speeds [m/s]; where every disturbance or the braking after it derails at
+    `high`, a lower one is taken; `excitations`: sizes of the disturbances at the highest speed [m].
+    Returns: the slowest motion that sustains itself, and the amplitude on the ramp.
     """
     tell = progress or (lambda _: None)
     speed = high

@@ -25,16 +25,9 @@ TABLE = (
 class LinearLoss:
     """Where steady rolling loses its stability.
 
-    Attributes
-    ----------
-    speed, frequency : float
-        [m/s], [Hz].
-    mode : str
-        Name of the mode that is undamped there.
-    speed_of_runs : float or None
-        The speed with the creep law of runs as it is, cells included [m/s].
-    speed_on_rigid_rails : float or None
-        The speed on rigid rails, where those of the track are elastic [m/s].
+    `speed`, `frequency`: [m/s], [Hz]; `mode`: name of the mode that is undamped there;
+    `speed_of_runs`: the speed with the creep law of runs as it is, cells included [m/s];
+    `speed_on_rigid_rails`: the speed on rigid rails, where those of the track are elastic [m/s].
     """
 
     speed: float
@@ -48,12 +41,8 @@ class LinearLoss:
 class OverAmplitude:
     """Linear critical speed over the amplitude for which the contact is linearised.
 
-    Attributes
-    ----------
-    amplitude : list of float
-        [m].
-    speed, frequency : list of float or None
-        [m/s], [Hz]; None where the vehicle is stable throughout the range.
+    `amplitude`: [m]; `speed`, `frequency`: [m/s], [Hz]; None where the vehicle is stable throughout
+    the range.
     """
 
     amplitude: list[float] = field(default_factory=list)
@@ -76,11 +65,7 @@ class OverAmplitude:
 class Conicity:
     """Equivalent conicity over amplitude on rigid rails (EN 15302).
 
-    Attributes
-    ----------
-    wheelset : str
-    amplitude, conicity : list of float
-        [m], [1].
+    `amplitude`, `conicity`: [m], [1].
     """
 
     wheelset: str
@@ -92,34 +77,21 @@ class Conicity:
 class CriticalSpeed(Plottable):
     """Critical speeds of a vehicle.
 
-    Attributes
-    ----------
-    contact : Contact
-        How the contact was linearised.
-    vehicle : str
-        Name of the vehicle.
-    conditions : dict of str to str
-        ``rails``, creep ``law`` of the runs, ``linear_law`` of the linearisation, ``friction``.
-    low, high : float
-        Range of the search [m/s].
-    linear : LinearLoss or None
-    linear_over_amplitude : OverAmplitude or None
-    nonlinear : dict of str to Point or None
-        Slowest motion of sustained hunting by method, None where there is none.
-    branches : list of Branch
-        Amplitude over speed.
-    jumps : list of Jump
-    type : "subcritical", "supercritical", "none" or ""
-        Whether anything hunts below the speed at which rest loses its stability, in the runs' own
-        law; empty where it was not looked for.
-    onset : "subcritical", "supercritical" or ""
-        How the small motions begin there, whatever else is possible.
-    amplitude_limit, instability_limit : Limit or None
-        Amplitude of 3 mm, and half the limit of the track-shifting force as rms.
-    conicity_over_amplitude : Conicity or None
-        Of the leading wheelset; None where it does not fit between the rails.
-    remarks : list of str
-        Remarks for the reader.
+    - `contact`: how the contact was linearised
+    - `vehicle`: name of the vehicle
+    - `conditions`: ``rails``, creep ``law`` of the runs, ``linear_law`` of the linearisation,
+      ``friction``
+    - `low`, `high`: range of the search [m/s]
+    - `nonlinear`: slowest motion of sustained hunting by method, None where there is none
+    - `branches`: amplitude over speed
+    - `type`: whether anything hunts below the speed at which rest loses its stability, in the runs'
+      own law; empty where it was not looked for
+    - `onset`: how the small motions begin there, whatever else is possible
+    - `amplitude_limit`, `instability_limit`: amplitude of 3 mm, and half the limit of the
+      track-shifting force as rms
+    - `conicity_over_amplitude`: of the leading wheelset; None where it does not fit between the
+      rails
+    - `remarks`: remarks for the reader
     """
 
     contact: Contact

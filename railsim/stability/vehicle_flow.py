@@ -26,12 +26,8 @@ OBSERVED = 40  # records within a period
 class VehicleFlow:
     """Flow of a vehicle for `railsim.stability.periodic`.
 
-    Parameters
-    ----------
-    motion : VehicleMotion
-        Vehicle, scheme and step.
-    speed : float
-        Near which motions are sought: it decides the step [m/s].
+    `motion`: vehicle, scheme and step; `speed`: near which motions are sought: it decides the step
+    [m/s].
     """
 
     mirror = None

@@ -27,15 +27,8 @@ LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 def analysed(case: Case, result: Result | None) -> Numbers:
     """Return the numbers of all analyses of a case.
 
-    Parameters
-    ----------
-    case : Case
-    result : Result or None
-        Result of its run, if one of its analyses needs one.
-
-    Raises
-    ------
-    InputError, ModelError : an analysis fails; the message names it.
+    `result`: result of its run, if one of its analyses needs one. Raises InputError, ModelError: an
+    analysis fails; the message names it.
     """
     found: Numbers = {}
     for name, analysis in case.analyses.items():

@@ -55,21 +55,8 @@ UNCHECKED = "The limits of EN 13848-5 are from memory, not compared with the pri
 class Place:
     """A place at which a vehicle exceeds the share of a limit.
 
-    Attributes
-    ----------
-    vehicle : str
-    speed : float
-        [m/s].
-    quantity : str
-        Of `QUANTITIES`.
-    where : str
-        Wheel, wheelset or point.
-    s : float
-        Of that wheelset or point [m].
-    value, limit : float
-        [SI].
-    shape : str
-        The defect there in words.
+    `speed`: [m/s]; `quantity`: of `QUANTITIES`; `where`: wheel, wheelset or point; `s`: of that
+    wheelset or point [m]; `value`, `limit`: [SI]; `shape`: the defect there in words.
     """
 
     vehicle: str
@@ -86,25 +73,15 @@ class Place:
 class TrackAssessment:
     """A track judged by vehicles, and by its geometry.
 
-    Attributes
-    ----------
-    folder : Path
-    share : float
-        Of the limits, from which on a place is listed [1].
-    places : tuple of Place
-        By falling share of the limit.
-    cells : float64[c]
-        Begins of the cells [m].
-    shares : dict of (str, float, str) to float64[c]
-        Largest share of the limit per cell, by vehicle, speed and quantity; NaN where no run came.
-    sections : Table
-        What vehicles and geometry say of each section of 200 m.
-    flagged : int64[5]
-        Number of sections that both, only vehicles (misses), only the geometry (false alarms) and
-        none complain of, and of those that some vehicle did not run over.
-    computed : int
-        Runs that were computed by this call.
-    remarks : tuple of str
+    - `share`: of the limits, from which on a place is listed [1]
+    - `places`: by falling share of the limit
+    - `cells`: begins of the cells [m]
+    - `shares`: largest share of the limit per cell, by vehicle, speed and quantity; NaN where no
+      run came
+    - `sections`: what vehicles and geometry say of each section of 200 m
+    - `flagged`: number of sections that both, only vehicles (misses), only the geometry (false
+      alarms) and none complain of, and of those that some vehicle did not run over
+    - `computed`: runs that were computed by this call
     """
 
     folder: Path
@@ -176,25 +153,10 @@ def assess_track(
 ) -> TrackAssessment:
     """Run vehicles over a recorded track and list where they exceed a share of a limit.
 
-    Parameters
-    ----------
-    recording : str or Path
-        Track file with a measured irregularity, or the CSV of one: then straight track.
-    vehicles : sequence of str or Path
-        Files or names; each needs a service table.
-    speeds : sequence of float
-        [m/s].
-    out : str or Path
-        Folder of the runs.
-    share : float
-        Of the limits of EN 14363.
-
-    Others as in `railsim.study`.
-
-    Raises
-    ------
-    InputError
-        All faults of the inputs; no recording in the track.
+    `recording`: track file with a measured irregularity, or the CSV of one: then straight track;
+    `vehicles`: files or names; each needs a service table; `speeds`: [m/s]; `out`: folder of the
+    runs; `share`: of the limits of EN 14363. Raises InputError: all faults of the inputs; no
+    recording in the track.
     """
     if not 0.0 < share <= 10.0:
         raise argument_error("share", f"found {share:g}", "above 0, up to 10")
@@ -263,9 +225,7 @@ class _Cases:
 def recorded(recording: str | Path) -> Track:
     """Return a track with a recording; of a CSV, on straight track as long as it is.
 
-    Raises
-    ------
-    InputError : no measured irregularity.
+    Raises InputError: no measured irregularity.
     """
     if str(recording).lower().endswith(".csv"):
         irregular = [{"type": "measured", "file": str(Path(recording).resolve())}]

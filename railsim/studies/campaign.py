@@ -33,15 +33,8 @@ from railsim.studies.spec import Execution, RunSpec, StudySpec
 class Campaign:
     """Results of a campaign in its folder.
 
-    Attributes
-    ----------
-    folder : Path
-    assessments : tuple of Assessment
-        One for each vehicle.
-    results : dict
-        Results by the names of their runs.
-    computed : int
-        Number of runs that were computed by this call; the others existed.
+    `assessments`: one for each vehicle; `results`: results by the names of their runs; `computed`:
+    number of runs that were computed by this call; the others existed.
     """
 
     folder: Path
@@ -66,35 +59,22 @@ def campaign(
 ) -> Campaign:
     """Run a scenario for vehicles and assess it.
 
-    Parameters
-    ----------
-    scenario : str or Path
-        File, or name of a shipped one.
-    vehicles : sequence of str or Path, or a single one
-        Files, or names of shipped ones; each needs a service table.
-    out : str or Path
-        Folder, created if it does not exist.  Results with the same inputs are not computed again.
-    assignments : sequence of str
-        ``key.path=value`` for all runs, after those of the scenario.
-    workers : int, optional
-        Processes; by default one for each core.
-    scheduler : str, optional
-        Address of a dask scheduler whose workers carry out the runs instead.
-    resume : bool
-        Continue the campaign in the folder: runs whose inputs have changed are computed again.
-    overwrite : bool
-        Compute everything again.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
-    on_record : callable, optional
-        Called with the record of every finished run.
-    on_remark : callable, optional
-        Called with every remark on files found in the folder.
+    - `scenario`: file, or name of a shipped one
+    - `vehicles`: files, or names of shipped ones; each needs a service table
+    - `out`: folder, created if it does not exist.  Results with the same inputs are not computed
+      again
+    - `assignments`: ``key.path=value`` for all runs, after those of the scenario
+    - `workers`: processes; by default one for each core
+    - `scheduler`: address of a dask scheduler whose workers carry out the runs instead
+    - `resume`: continue the campaign in the folder: runs whose inputs have changed are computed
+      again
+    - `overwrite`: compute everything again
+    - `progress`: called repeatedly with the finished fraction
+    - `on_record`: called with the record of every finished run
+    - `on_remark`: called with every remark on files found in the folder
 
-    Raises
-    ------
-    InputError : all faults of the inputs; files in the folder that belong to other inputs.
-    RailsimError : a run failed; the others are kept.
+    Raises InputError: all faults of the inputs; files in the folder that belong to other inputs.
+    RailsimError: a run failed; the others are kept.
     """
     names = [vehicles] if isinstance(vehicles, str | Path) else list(vehicles)
     folder = Path(out)
@@ -157,9 +137,7 @@ def scenario_cases(
 ) -> list[Case]:
     """Return all runs of a scenario: vehicles, then parts, then the grid.
 
-    Raises
-    ------
-    InputError : all faults of all runs.
+    Raises InputError: all faults of all runs.
     """
     faults: list[Fault] = []
     cases: list[Case] = []

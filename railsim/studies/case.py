@@ -98,12 +98,7 @@ LOADERS: dict[str, Callable[..., Any]] = {
 class Loader:
     """Loads the definitions of runs, each once, and gathers everything that is wrong with them.
 
-    Parameters
-    ----------
-    grid : collection of str
-        Keys whose assignments a user knows by ``--grid``.
-    analyses : mapping of str to Analysis
-        Analyses of all cases.
+    `grid`: keys whose assignments a user knows by ``--grid``; `analyses`: analyses of all cases.
     """
 
     def __init__(
@@ -189,9 +184,7 @@ class Loader:
 def load_case(run: RunSpec) -> Case:
     """Load the inputs of one run.
 
-    Raises
-    ------
-    InputError : everything that is wrong in any of them.
+    Raises InputError: everything that is wrong in any of them.
     """
     loader = Loader()
     loader.overrides(run.assignments)  # its faults come first

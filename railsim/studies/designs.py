@@ -57,12 +57,8 @@ class Design:
 class Evaluation:
     """Evaluation of designs by a study, as called by a search.
 
-    Attributes
-    ----------
-    rows : list of tuple of str
-        Values of the variables of all designs, as written.
-    asked : list of int
-        For each point that the search has requested, the number of its row.
+    `rows`: values of the variables of all designs, as written; `asked`: for each point that the
+    search has requested, the number of its row.
     """
 
     def __init__(

@@ -49,14 +49,9 @@ Progress = Callable[[float], None]
 class Job:
     """A case and the paths of its files.
 
-    Attributes
-    ----------
-    path, picture : Path
-        Files of result and figure; existing ones are replaced.
-    function : str or None
-        Function for user-defined quantities, see `railsim.studies.user_function`.
-    exists : bool
-        Whether the run exists, and only its analyses are to be computed.
+    `path`, `picture`: files of result and figure; existing ones are replaced; `function`: function
+    for user-defined quantities, see `railsim.studies.user_function`; `exists`: whether the run
+    exists, and only its analyses are to be computed.
     """
 
     case: Case
@@ -211,10 +206,7 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
 class _Pool:
     """One pool of processes, until all batches are done or a process dies.
 
-    Attributes
-    ----------
-    lost : set of int
-        Batches that were running in a process that died.
+    `lost`: batches that were running in a process that died.
     """
 
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
@@ -307,9 +299,7 @@ def is_compiled() -> bool:
 def cluster(address: str) -> Any:
     """Return a client of the dask scheduler at an address.
 
-    Raises
-    ------
-    InputError : dask is not installed, or no scheduler answers.
+    Raises InputError: dask is not installed, or no scheduler answers.
     """
     try:
         from distributed import Client
@@ -365,11 +355,7 @@ def _marks(folders: set[Path]) -> Iterator[str]:
 def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, bytes]]:
     """Carry out the jobs of a batch on a machine that may lack access to the folder of the study.
 
-    Returns
-    -------
-    records : list of Record
-    files : dict of str to bytes
-        Files written by the jobs, if the folder is not accessible.
+    Returns: `records`; `files`: files written by the jobs, if the folder is not accessible.
     """
     if all((job.path.parent / mark).is_file() for job in batch):
         return perform(batch), {}

@@ -35,12 +35,7 @@ class Flags:
 class RecordedGeometry:
     """Alignment, level and cross level in D1 along a recording, and what their limits say.
 
-    Parameters
-    ----------
-    track : Track
-        With a recording.
-    begin, end : float
-        Part of it [m].
+    `track`: with a recording; `begin`, `end`: part of it [m].
     """
 
     def __init__(self, track: Track, begin: float, end: float) -> None:

@@ -35,9 +35,7 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
 
     Load and assignments have been made when it was loaded.
 
-    Raises
-    ------
-    InputError : what is removed does not exist; a wrong vehicle without it.
+    Raises InputError: what is removed does not exist; a wrong vehicle without it.
     """
     data = vehicle.model_dump(mode="json", exclude_none=True)
     if condition.wheels and not _exchange(data, condition.wheels):
@@ -96,12 +94,8 @@ def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
 def repeated(case: Case, limits: RunningLimits, service: Service, condition: int) -> list[Case]:
     """Return a run with as many seeds as its zone needs sections, each to the target quality.
 
-    Parameters
-    ----------
-    case : Case
-        Run on track with one random irregularity; others are returned as they are.
-    condition : int
-        Number of the condition, which has its own seeds.
+    `case`: run on track with one random irregularity; others are returned as they are; `condition`:
+    number of the condition, which has its own seeds.
     """
     parts = case.track.irregularities
     if len(parts) != 1 or not isinstance(parts[0], Random):

@@ -33,16 +33,10 @@ NOT_DONE = ("failed", "waiting")  # status of runs that are computed again
 class Entry(NamedTuple):
     """Data of a run that are available without reading its record.
 
-    Attributes
-    ----------
-    name, status : str
-        Name of the run, and how it ended: as in its result, or ``failed``.
-    key : str
-        Hash of the inputs of the run, see `railsim.studies.points`.
-    size, changed : int
-        Size of its result file [bytes] and time of its last change [ns]; 0 without a file.
-    offset, length : int
-        Position and length of its record in the journal [bytes].
+    `name`, `status`: name of the run, and how it ended: as in its result, or ``failed``; `key`:
+    hash of the inputs of the run, see `railsim.studies.points`; `size`, `changed`: size of its
+    result file [bytes] and time of its last change [ns]; 0 without a file; `offset`, `length`:
+    position and length of its record in the journal [bytes].
     """
 
     name: str
@@ -67,24 +61,10 @@ class Entry(NamedTuple):
 class Journal:
     """The journal of a folder, open for reading and appending; locked for other processes.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the study; it must exist.
-
-    Attributes
-    ----------
-    entries : dict of str to Entry
-        The last entry of every run, by its name.
-    inputs : mapping or None
-        Inputs of the study at its last start; None in a new journal.
-    damaged : int
-        Number of lines that could not be read.
-
-    Raises
-    ------
-    InputError : another study is writing into the folder.
-    OSError : the journal cannot be written.
+    `folder`: folder of the study; it must exist; `entries`: the last entry of every run, by its
+    name; `inputs`: inputs of the study at its last start; None in a new journal; `damaged`: number
+    of lines that could not be read. Raises InputError: another study is writing into the folder.
+    OSError: the journal cannot be written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -192,12 +172,8 @@ class Journal:
 class Records(Sequence[Record]):
     """Records of runs, each read from the journal on access.
 
-    Parameters
-    ----------
-    path : Path
-        The journal.
-    entries : sequence of Entry or Record
-        Entry of each record, or the record itself of a run that has not been done.
+    `path`: the journal; `entries`: entry of each record, or the record itself of a run that has not
+    been done.
     """
 
     def __init__(self, path: Path, entries: Sequence[Entry | Record]) -> None:

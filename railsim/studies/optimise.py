@@ -49,27 +49,16 @@ INPUT_BYTES = 1_000_000
 class Optimisation:
     """Result of an optimisation.
 
-    Attributes
-    ----------
-    folder : Path
-        Holds ``designs.csv``, ``optimise.json``, pictures, the chosen vehicles, and the study of
-        all runs.
-    definition : Optimise
-        Variables, objectives and constraints.
-    designs : tuple of Design
-        All computed designs.
-    front : tuple of Design
-        Feasible non-dominated designs, in the order of the first objective.
-    chosen : Design or None
-        A design of the front; None if no design is feasible.
-    active : tuple of str
-        Limits and bounds that the chosen design reaches, one phrase each.
-    sensitivities : tuple of Sensitivity
-        Sensitivities of all objectives and constraints.
-    vehicles : tuple of Path
-        Files of the chosen design.
-    computed : int
-        Number of runs that were computed by this call.
+    - `folder`: holds ``designs.csv``, ``optimise.json``, pictures, the chosen vehicles, and the
+      study of all runs
+    - `definition`: variables, objectives and constraints
+    - `designs`: all computed designs
+    - `front`: feasible non-dominated designs, in the order of the first objective
+    - `chosen`: a design of the front; None if no design is feasible
+    - `active`: limits and bounds that the chosen design reaches, one phrase each
+    - `sensitivities`: sensitivities of all objectives and constraints
+    - `vehicles`: files of the chosen design
+    - `computed`: number of runs that were computed by this call
     """
 
     folder: Path

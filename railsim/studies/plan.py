@@ -25,22 +25,10 @@ LONGEST_NAME = 250  # bytes of a file name with its ending; file systems allow 2
 class Plan:
     """All points of a study, vehicles outermost; loads the case of a point.
 
-    Parameters
-    ----------
-    spec : StudySpec
-        Inputs to combine.  The speed `PERMITTED` is the lower of the admissible speed of the
-        vehicle and the speed of the track.
-    workers : int
-        Processes for the runs, to estimate the time that a refused study would take.
-
-    Attributes
-    ----------
-    points : list of Point
-        In the order of the combinations.
-
-    Raises
-    ------
-    InputError : there is no combination, or there are too many combinations.
+    `spec`: inputs to combine. The speed `PERMITTED` is the lower of the admissible speed of the
+    vehicle and the speed of the track; `workers`: processes for the runs, to estimate the time that
+    a refused study would take; `points`: in the order of the combinations. Raises InputError: there
+    is no combination, or there are too many combinations.
     """
 
     def __init__(self, spec: StudySpec, workers: int = 1) -> None:
@@ -107,9 +95,7 @@ class Plan:
     def cases(self, points: Sequence[Point] | None = None) -> list[Case]:
         """Load the inputs of the runs of some points, by default of all.
 
-        Raises
-        ------
-        InputError : everything that is wrong in any of them.
+        Raises InputError: everything that is wrong in any of them.
         """
         wanted = self.points if points is None else points
         found = [self._loader.case(point.name, point.run, point.labels) for point in wanted]
@@ -166,16 +152,14 @@ def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
 
     Commas within brackets do not separate values.
 
+    Raises InputError: the text has neither form.
+
     Examples
     --------
     >>> parse_grid("settings.fastsim_grid=[10,10],[20,20]")
     ('settings.fastsim_grid', ('[10,10]', '[20,20]'))
     >>> parse_grid("track.friction=0.1,0.2:0.4:3")
     ('track.friction', ('0.1', '0.2', '0.3', '0.4'))
-
-    Raises
-    ------
-    InputError : the text has neither form.
     """
     key, equals, written = text.partition("=")
     values = [value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written)]

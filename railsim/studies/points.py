@@ -34,18 +34,9 @@ REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
 class Point:
     """Inputs of one run.
 
-    Attributes
-    ----------
-    name : str
-        Name of the run.
-    run : RunSpec
-        The run, with its speed at the start.
-    labels : mapping
-        Labels of the run.
-    key : str
-        Hash of all inputs; empty if a file cannot be read.
-    has_run : bool
-        Whether a run in the time domain belongs to it, with a result file.
+    `name`: name of the run; `run`: the run, with its speed at the start; `labels`: labels of the
+    run; `key`: hash of all inputs; empty if a file cannot be read; `has_run`: whether a run in the
+    time domain belongs to it, with a result file.
     """
 
     name: str
@@ -131,18 +122,9 @@ def check_number(
 ) -> None:
     """Refuse a study whose number of runs must be a mistake.
 
-    Parameters
-    ----------
-    lists : sequence of sequences
-        Lists that are combined.
-    cores : int
-        Number of processes.
-    seconds : callable
-        Returns an estimate of the simulated time of a run [s]; called if there are too many runs.
-
-    Raises
-    ------
-    InputError : the number of combinations is above `MOST_RUNS`; the message gives the time needed.
+    `lists`: lists that are combined; `cores`: number of processes; `seconds`: returns an estimate
+    of the simulated time of a run [s]; called if there are too many runs. Raises InputError: the
+    number of combinations is above `MOST_RUNS`; the message gives the time needed.
     """
     number = math.prod(len(values) for values in lists)
     if number <= MOST_RUNS:

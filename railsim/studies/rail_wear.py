@@ -33,17 +33,8 @@ def rail_wear(
 
     The mean over the track is worn off: let it be of one curvature.  The wheels remain as they are.
 
-    Parameters
-    ----------
-    track : Track
-    traffic : sequence of Traffic or (Vehicle, float, float)
-        Vehicles with their speeds [m/s] and shares of the tonnage.
-    how
-        `Loop`: ``step`` [kg] and ``steps`` are required.
-
-    Raises
-    ------
-    InputError, ModelError : as of `wear_loop`.
+    `traffic`: vehicles with their speeds [m/s] and shares of the tonnage; `how`: `Loop`: ``step``
+    [kg] and ``steps`` are required. Raises InputError, ModelError: as of `wear_loop`.
     """
     sides = {side: f"{rail}, {side}" for side, rail in zip(SIDES, track.rail, strict=True)}
     new = {

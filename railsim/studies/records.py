@@ -23,9 +23,7 @@ def write_record(path: Path, record: Record) -> None:
 def read_record(path: Path) -> Record:
     """Return a stored record.
 
-    Raises
-    ------
-    InputError : the record cannot be read, or is damaged.
+    Raises InputError: the record cannot be read, or is damaged.
     """
     text = read_text(path, TABLE_BYTES)
     try:

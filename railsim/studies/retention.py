@@ -18,14 +18,8 @@ ALWAYS = ("time", "distance", "Q0")
 class Retention:
     """Parts of a result that are kept.
 
-    Attributes
-    ----------
-    quantities : tuple of str or None
-        Names of quantities, with ``*`` for any characters; None for all.
-    summary : bool
-        Keep no file at all.
-    storage : Storage
-        Compression and precision of the file.
+    `quantities`: names of quantities, with ``*`` for any characters; None for all; `summary`: keep
+    no file at all; `storage`: compression and precision of the file.
     """
 
     quantities: tuple[str, ...] | None = None
@@ -56,9 +50,7 @@ EVERYTHING = Retention()
 def retention(spec: StudySpec) -> Retention:
     """Return what a study keeps: ``all``, ``summary`` or a list of quantities.
 
-    Raises
-    ------
-    InputError : an unknown quantity.
+    Raises InputError: an unknown quantity.
     """
     storage = Storage(compress=spec.compress, single=spec.single)
     if spec.keep in (ALL, SUMMARY):

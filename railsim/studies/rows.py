@@ -19,14 +19,8 @@ PERMITTED = "permitted"  # as a speed: the lower of the speeds of vehicle and tr
 class Row:
     """Values of the varied keys of one run.
 
-    Attributes
-    ----------
-    values : mapping of str to str
-        Texts as in `key=value`, by the paths of the keys.
-    suffix : str
-        Suffix to the name of the run.
-    speed : float or None
-        Speed of the run if the row varies it [m/s].
+    `values`: texts as in `key=value`, by the paths of the keys; `suffix`: suffix to the name of the
+    run; `speed`: speed of the run if the row varies it [m/s].
     """
 
     values: Mapping[str, str]
@@ -68,9 +62,7 @@ SPEEDS = "such as 20 or 72km/h"
 def speed_of(text: str, option: str = "speeds") -> float:
     """Return the speed of a text, which may have a unit [m/s].
 
-    Raises
-    ------
-    InputError : the text is not a number.
+    Raises InputError: the text is not a number.
     """
     found = speed_in_si(text)
     if isinstance(found, str):

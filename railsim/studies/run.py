@@ -22,18 +22,10 @@ def run_case(
 ) -> Result:
     """Run a case to its file, which carries name and key of the case.
 
-    Parameters
-    ----------
-    path : str or Path or None
-        Result file; None to keep the result in memory.
-    resume : Result, optional
-        Result whose final state is the initial state of this run; the file then carries no key.
-    only : collection of str, optional
-        Names of the quantities in a result in memory; by default all.
-
-    Raises
-    ------
-    InputError, ModelError : as `railsim.simulate`; the file cannot be written.
+    `path`: result file; None to keep the result in memory; `resume`: result whose final state is
+    the initial state of this run; the file then carries no key; `only`: names of the quantities in
+    a result in memory; by default all. Raises InputError, ModelError: as `railsim.simulate`; the
+    file cannot be written.
     """
     facts = {"run": case.name}
     if resume is None:
@@ -85,10 +77,7 @@ def run_cases(
 ) -> list[Result | Exception]:
     """Run cases that differ only in the vehicle in one call, to their files or to memory.
 
-    Returns
-    -------
-    list of Result or Exception
-        One for each case; the failure of one case does not affect the others.
+    Returns: one for each case; the failure of one case does not affect the others.
     """
     found: dict[int, Result | Exception] = {}
     sinks: dict[int, Hdf5Sink | MemorySink] = {}

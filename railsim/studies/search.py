@@ -28,13 +28,7 @@ MARGIN = 0.1  # distance of the reference point beyond the front, as a share of 
 
 @dataclass(frozen=True)
 class Values:
-    """Values of designs.
-
-    Attributes
-    ----------
-    objectives : float64[design, objective]
-    constraints : float64[design, constraint]
-    """
+    """Values of designs."""
 
     objectives: Floats
     constraints: Floats
@@ -54,16 +48,9 @@ Evaluate = Callable[[Floats], Values]
 class Task:
     """Task of a search.
 
-    Attributes
-    ----------
-    evaluate : callable
-        Takes designs, float64[design, variable] between 0 and 1; returns the values of all designs
-        so far.
-    variables, objectives, constraints : int
-        Numbers of variables, objectives and constraints.
-    number, batch : int
-        Number of designs in total, and at a time.
-    seed : int
+    `evaluate`: takes designs, float64[design, variable] between 0 and 1; returns the values of all
+    designs so far; `variables`, `objectives`, `constraints`: numbers of variables, objectives and
+    constraints; `number`, `batch`: number of designs in total, and at a time.
     """
 
     evaluate: Evaluate
@@ -157,12 +144,7 @@ def _at_bounds(points: Floats, rng: np.random.Generator) -> Floats:
 class _Gain:
     """Dominated volume that candidates would add, estimated with random points.
 
-    Parameters
-    ----------
-    front : float64[design, objective]
-        Known feasible designs.
-    predicted : float64[candidate, objective]
-        Predicted objectives.
+    `front`: known feasible designs; `predicted`: predicted objectives.
     """
 
     def __init__(self, front: Floats, predicted: Floats, rng: np.random.Generator) -> None:
@@ -196,11 +178,6 @@ class Surrogate:
     """Radial basis functions through the values of designs, thin-plate splines with a linear part.
 
     Designs without values get the worst known value, so that a search avoids them.
-
-    Parameters
-    ----------
-    designs : float64[design, variable]
-    values : float64[design, column]
     """
 
     def __init__(self, designs: Floats, values: Floats) -> None:

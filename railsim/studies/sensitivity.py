@@ -50,14 +50,8 @@ def sensitivities(
 ) -> list[Sensitivity]:
     """Return the sensitivities of each quantity, by names.
 
-    Parameters
-    ----------
-    designs : float64[design, variable]
-        Between 0 and 1.
-    values : float64[design, quantity]
-        NaN where a design has no value.
-    chosen : float64[variable]
-        Design about which single variables are varied.
+    `designs`: between 0 and 1; `values`: NaN where a design has no value; `chosen`: design about
+    which single variables are varied.
     """
     from scipy.stats import sobol_indices, uniform
 

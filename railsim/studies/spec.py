@@ -27,20 +27,10 @@ MOST_FAULTS = 20
 class RunSpec:
     """One run.
 
-    Attributes
-    ----------
-    vehicle, track : str or Path
-        File, or name of a shipped one.
-    speed : float or None
-        Speed [m/s]; not needed where the settings have a speed table.
-    settings : str or Path, optional
-        Settings file.
-    start : float
-        Distance at which the reference body starts [m].
-    duration, until : float, optional
-        End of the run: time [s] or distance [m].
-    assignments : tuple of str
-        ``key.path=value``, the paths beginning with ``vehicle.``, ``track.`` or ``settings.``.
+    `vehicle`, `track`: file, or name of a shipped one; `speed`: speed [m/s]; not needed where the
+    settings have a speed table; `settings`: settings file; `start`: distance at which the reference
+    body starts [m]; `duration`, `until`: end of the run: time [s] or distance [m]; `assignments`:
+    ``key.path=value``, the paths beginning with ``vehicle.``, ``track.`` or ``settings.``.
     """
 
     vehicle: str | Path
@@ -113,21 +103,11 @@ class StudySpec(BaseModel):
 
     Single values, ranges and numbers are taken too, and held as lists of texts.
 
-    Attributes
-    ----------
-    railsim_version : str
-    name, purpose : str or None
-        What a study file or a scenario calls it, and what it is for; no number depends on them.
-    folder : str
-        Folder that relative file names refer to, from the folder of the study.
-    scenario : str or None
-        Scenario of a campaign, which has tracks and speeds of its own.
-    quantities : str or None
-        ``FILE.py:FUNCTION``, see `railsim.studies.user_function`.
-    keep, compress, single
-        Parts of each result that are kept, see `railsim.studies.retention`.
-
-    Others as in a study file (`railsim.definitions.study.definition`).
+    `name`, `purpose`: what a study file or a scenario calls it, and what it is for; no number
+    depends on them; `folder`: folder that relative file names refer to, from the folder of the
+    study; `scenario`: scenario of a campaign, which has tracks and speeds of its own; `quantities`:
+    ``FILE.py:FUNCTION``, see `railsim.studies.user_function`; `keep`, `compress`, `single`: parts
+    of each result that are kept, see `railsim.studies.retention`.
     """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
@@ -194,9 +174,7 @@ class Execution:
 def checked(model: type[M], data: Any, file: str) -> M:
     """Return data as a model.
 
-    Raises
-    ------
-    InputError : all faults of the data.
+    Raises InputError: all faults of the data.
     """
     try:
         return model.model_validate(data)

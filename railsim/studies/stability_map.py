@@ -37,12 +37,8 @@ _LOG = logging.getLogger(__name__)
 class MapPoint:
     """One point of a map: the inputs that differ between points.
 
-    Attributes
-    ----------
-    at : dict of str to float
-        The parameters by name, ``conicity``, ``friction`` or the path of a key.
-    vehicle, track, settings : Vehicle, Track, Settings
-        Definitions with the values of the point, except its conicity.
+    `at`: the parameters by name, ``conicity``, ``friction`` or the path of a key; `vehicle`,
+    `track`, `settings`: definitions with the values of the point, except its conicity.
     """
 
     at: dict[str, float]
@@ -63,24 +59,10 @@ def stability_map(
 ) -> list[Record]:
     """Return the record of `critical_speed` at each point, in their order.
 
-    Parameters
-    ----------
-    points : sequence of MapPoint
-    options : dict
-        Further arguments of `critical_speed`.
-    folder : Path, optional
-        Folder for finished points.
-    workers : int, optional
-        Processes; by default one for each core.
-    overwrite : bool
-        Compute everything again.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
-    on_remark : callable, optional
-        Called with a sentence on every stored point that is damaged and computed again; by default
-        these sentences are logged.
-
-    The record of a point that fails has the reason among its remarks.
+    `options`: further arguments of `critical_speed`; `folder`: folder for finished points;
+    `workers`: processes; by default one for each core; `overwrite`: compute everything again;
+    `progress`: called repeatedly with the finished fraction; `on_remark`: called with a sentence on
+    every stored point that is damaged and computed again; by default these sentences are logged.
     """
     jobs = [(point, options) for point in points]
     paths = [_stored_path(folder, job) for job in jobs]
@@ -160,12 +142,7 @@ def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
 def map_table(records: Sequence[Record], parameters: Sequence[str]) -> Table:
     """Return the critical speeds of a map over its parameters.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        See `stability_map`.
-    parameters : sequence of str
-        Keys that have several values.
+    `records`: see `stability_map`; `parameters`: keys that have several values.
     """
     speeds = map_speeds(records)
     columns = [Column(name, format="g") for name in parameters]

@@ -25,10 +25,7 @@ CHANGED = "`resume` computes what has changed, `overwrite` everything; or anothe
 class Runs(Protocol):
     """Points of a study, such as `Plan`.
 
-    Attributes
-    ----------
-    points : list of Point
-        Inputs of each run.
+    `points`: inputs of each run.
     """
 
     points: list[Point]
@@ -40,22 +37,10 @@ class Runs(Protocol):
 class State:
     """Which runs of a study are done, and which are to be computed.
 
-    Attributes
-    ----------
-    cases : list of Case
-        Cases to compute.
-    keys : dict of str to str
-        Keys of all points by their names.
-    found : list of (Point, Record)
-        Existing results that are not in the journal.
-    to_be_analysed : set of str
-        Names of the cases whose run exists, but not their analyses.
-
-    Raises
-    ------
-    InputError
-        All faults of the cases to compute; without `resume` also results that would have to be
-        replaced.
+    `cases`: cases to compute; `keys`: keys of all points by their names; `found`: existing results
+    that are not in the journal; `to_be_analysed`: names of the cases whose run exists, but not
+    their analyses. Raises InputError: all faults of the cases to compute; without `resume` also
+    results that would have to be replaced.
     """
 
     def __init__(

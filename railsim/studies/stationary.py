@@ -56,20 +56,10 @@ UNLOADING = "unloading (Q0 - Q)/Q0"
 class StationaryValue:
     """One quantity of one case, and its limit.
 
-    Attributes
-    ----------
-    case, quantity : str
-        Track under the vehicle; quantity.
-    value : float
-        nan where no steady state was found [1 or rad].
-    limit : float or None
-        None where a value is only reported.
-    place : str
-        Wheel, or body.
-    source : str
-        Source of the limit.
-    checked : bool
-        Whether the limit has been compared with the printed standard.
+    `case`, `quantity`: track under the vehicle; quantity; `value`: nan where no steady state was
+    found [1 or rad]; `limit`: none where a value is only reported; `place`: wheel, or body;
+    `source`: source of the limit; `checked`: whether the limit has been compared with the printed
+    standard.
     """
 
     case: str
@@ -90,16 +80,9 @@ class StationaryValue:
 class Stationary:
     """Stationary tests of a vehicle.
 
-    Attributes
-    ----------
-    vehicle, edition : str
-    held : bool
-        Whether the wheelsets were held across the track.
-    values : tuple of StationaryValue
-    reasons : tuple of str
-        Cases without a steady state, a sentence each.
-    loops : dict of str to TwistLoop
-        Wheel loads on the way to each twist, to the opposite one and back, by its name.
+    `held`: whether the wheelsets were held across the track; `reasons`: cases without a steady
+    state, a sentence each; `loops`: wheel loads on the way to each twist, to the opposite one and
+    back, by its name.
     """
 
     vehicle: str
@@ -171,22 +154,10 @@ def stationary(
 ) -> Stationary:
     """Stationary tests of a vehicle on twisted track and on cant.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle on two bogies, or on two axles.
-    track : Track
-        Gives rail profiles and friction.
-    limits : StationaryLimits
-    cant : float, optional
-        [m]; by default the admissible cant deficiency of the service table.
-    held : bool
-        Hold the wheelsets across the track, as the closed formulas do.
-    settings : Settings, optional
-
-    Raises
-    ------
-    InputError : no cant; neither two bogies nor two axles; a cant above 0.5 m.
+    `vehicle`: vehicle on two bogies, or on two axles; `track`: gives rail profiles and friction;
+    `cant`: [m]; by default the admissible cant deficiency of the service table; `held`: hold the
+    wheelsets across the track, as the closed formulas do. Raises InputError: no cant; neither two
+    bogies nor two axles; a cant above 0.5 m.
     """
     flat = flatten(vehicle)
     if cant is None:
@@ -240,9 +211,7 @@ def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floa
     For a vehicle on two bogies: twist over the wheelbase of the bogies, over their spacing, and
     both; for a vehicle on two axles: twist over their spacing.
 
-    Raises
-    ------
-    InputError : neither two bogies nor two axles.
+    Raises InputError: neither two bogies nor two axles.
     """
     wheelsets = flat.of_kind("wheelset")
     x = np.array([wheelset.position[0] for wheelset in wheelsets])

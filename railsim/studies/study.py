@@ -189,10 +189,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
 def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
     """Return the study in a folder, and the folder of its relative file names.
 
-    Raises
-    ------
-    InputError
-        There is no study, or its inputs cannot be read.
+    Raises InputError: there is no study, or its inputs cannot be read.
     """
     data: Any = None
     if is_file(folder / JOURNAL):

@@ -56,9 +56,7 @@ def waiting_record(case: Case) -> Record:
 def finished_record(case: Case, result: Result, function: str | None = None) -> Record:
     """Return the record of a run with a result, with user-defined quantities and analyses.
 
-    Raises
-    ------
-    RailsimError : one of these fails.
+    Raises RailsimError: one of these fails.
     """
     found = user_quantities(function, result) | analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
@@ -122,9 +120,7 @@ class Index(BaseModel):
 def read_index(path: Path) -> Index:
     """Return the content of a ``study.json``.
 
-    Raises
-    ------
-    InputError : the file cannot be read, or is not the index of a study.
+    Raises InputError: the file cannot be read, or is not the index of a study.
     """
     text = read_text(path, INDEX_BYTES)
     # each takes some hundred bytes of memory when it is read
@@ -145,9 +141,7 @@ def read_index(path: Path) -> Index:
 def refuse_too_many(inputs: Any, file: str) -> None:
     """Refuse stored inputs with more values than a study can have: each may become a fault.
 
-    Raises
-    ------
-    InputError : there are more.
+    Raises InputError: there are more.
     """
     nodes, number = [inputs], 0
     while nodes and number <= MOST_INPUTS:
@@ -162,9 +156,7 @@ def refuse_too_many(inputs: Any, file: str) -> None:
 def check_index(path: Path) -> Index:
     """Return the content of a ``study.json``; every finished run must have its result.
 
-    Raises
-    ------
-    InputError : as `read_index`, or results are missing.
+    Raises InputError: as `read_index`, or results are missing.
     """
     index = read_index(path)
     allowed = "the same study with `resume` computes it again"

@@ -26,9 +26,7 @@ Function = Callable[[Result], Mapping[str, float]]
 def full_name(function: "str | Function | None") -> str | None:
     """Return the name ``FILE.py:FUNCTION`` of a function with the full path of the file.
 
-    Raises
-    ------
-    InputError : there is no such file or function, or the function is not defined in a file.
+    Raises InputError: there is no such file or function, or the function is not defined in a file.
     """
     if function is None:
         return None
@@ -56,9 +54,7 @@ def given_again(stored: str | None, option: str | None) -> str | None:
     The folder of a study may come from somebody else, and a function is code: the one that the
     folder names is never loaded because of that.
 
-    Raises
-    ------
-    InputError : the study has a function, and none is given; as `full_name`.
+    Raises InputError: the study has a function, and none is given; as `full_name`.
     """
     if stored and not option:
         found = f"the study in this folder calls the function {stored}"
@@ -79,9 +75,7 @@ def fingerprint(name: str | None) -> str:
 def user_quantities(name: str | None, result: Result) -> dict[str, float]:
     """Return the values of the function for a result; none if there is no function.
 
-    Raises
-    ------
-    RailsimError : the function fails, or does not return numbers by name.
+    Raises RailsimError: the function fails, or does not return numbers by name.
     """
     if name is None:
         return {}

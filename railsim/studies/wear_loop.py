@@ -65,15 +65,10 @@ class Run(NamedTuple):
 class WearStep:
     """One step of the wear loop.
 
-    Attributes
-    ----------
-    distance, length : float
-        Distance run before the step, and in the step [m]; of rails the tonnage [kg].
-    profiles, worn_profiles : dict
-        By side of the rail, or ``wheel``: in this step, and after it.
-    depths : dict
-        Depth of wear per distance or tonnage, mean of all wheels, tracks or vehicles and over the
-        step, on `wear_depth.grid` [m/m] or [m/kg].
+    `distance`, `length`: distance run before the step, and in the step [m]; of rails the tonnage
+    [kg]; `profiles`, `worn_profiles`: by side of the rail, or ``wheel``: in this step, and after
+    it; `depths`: depth of wear per distance or tonnage, mean of all wheels, tracks or vehicles and
+    over the step, on `wear_depth.grid` [m/m] or [m/kg].
     """
 
     distance: float
@@ -109,27 +104,19 @@ class _Wear(NamedTuple):
 class Loop:
     """How a loop is carried out.
 
-    Attributes
-    ----------
-    step : float
-        Distance [m] or tonnage [kg] between two reported profiles.  Within a step the profiles are
-        updated as often as one has worn by 0.1 mm.
-    steps : int
-        Number of steps.
-    law : str
-        Name of a law of `railsim.assessment.wear.LAWS`, or the path of a file of one.
-    settings : Settings, optional
-        `outputs.contact_patches` is switched on.
-    folder : Path, optional
-        Folder for finished steps: the same call, or one with more steps, continues after them.
-    on_step : callable, optional
-        Called after each step; before an error also with the part of the step that was finished.
-    on_remark : callable, optional
-        Called with a sentence on every stored step that is damaged and computed again, on every
-        route on which the vehicle hunts (it wears as no service does), and on the limit at which
-        the loop ends.  By default these sentences are logged.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
+    - `step`: distance [m] or tonnage [kg] between two reported profiles.  Within a step the
+      profiles are updated as often as one has worn by 0.1 mm
+    - `steps`: number of steps
+    - `law`: name of a law of `railsim.assessment.wear.LAWS`, or the path of a file of one
+    - `settings`: `outputs.contact_patches` is switched on
+    - `folder`: folder for finished steps: the same call, or one with more steps, continues after
+      them
+    - `on_step`: called after each step; before an error also with the part of the step that was
+      finished
+    - `on_remark`: called with a sentence on every stored step that is damaged and computed again,
+      on every route on which the vehicle hunts (it wears as no service does), and on the limit at
+      which the loop ends.  By default these sentences are logged
+    - `progress`: called repeatedly with the finished fraction
     """
 
     step: float
@@ -151,22 +138,11 @@ def wear_loop(
 ) -> list[WearStep]:
     """Wear of the wheels of a vehicle over distance, with an update of the profile at each step.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle whose wheels all have the same profile.
-    routes : sequence of Route or (Track, float, float)
-        Tracks with their speeds [m/s] and shares of the distance.
-    limits : WheelLimits, optional
-        Dimensions of the wheel at which the loop ends.
-    how
-        `Loop`: ``step`` and ``steps`` are required.
-
-    Raises
-    ------
-    InputError : different wheel profiles; no route, or a route without a share; no step; too much
-        wear in a step.
-    ModelError : a run ended early; names profile, distance and track.
+    `vehicle`: vehicle whose wheels all have the same profile; `routes`: tracks with their speeds
+    [m/s] and shares of the distance; `limits`: dimensions of the wheel at which the loop ends;
+    `how`: `Loop`: ``step`` and ``steps`` are required. Raises InputError: different wheel profiles;
+    no route, or a route without a share; no step; too much wear in a step. ModelError: a run ended
+    early; names profile, distance and track.
     """
     name = _profile_name(vehicle)
     runs = [Run(vehicle, *route) for route in routes]
@@ -187,19 +163,10 @@ def wear_loop(
 class Wearing:
     """What wears.
 
-    Attributes
-    ----------
-    runs : sequence of Run
-    new : mapping of str to Profile
-        Profiles at the beginning.
-    names : mapping of str to str
-        Names by which vehicle or track call them.
-    depths : callable
-        A result and a law to the depth of each profile per distance or tonnage.
-    ended : callable
-        Worn profiles to the sentence why the loop ends; empty while it goes on.
-    unit, scale : str, float
-        In which messages give distance or tonnage, and its factor from SI.
+    `new`: profiles at the beginning; `names`: names by which vehicle or track call them; `depths`:
+    a result and a law to the depth of each profile per distance or tonnage; `ended`: worn profiles
+    to the sentence why the loop ends; empty while it goes on; `unit`, `scale`: in which messages
+    give distance or tonnage, and its factor from SI.
     """
 
     runs: Sequence[Run]
@@ -277,20 +244,11 @@ def wear_rows(
 ) -> list[dict[str, float | None]]:
     """Wear after each step.
 
-    Parameters
-    ----------
-    found : sequence of WearStep
-        Result of `wear_loop`, from its beginning.
-    vehicle, track : Vehicle, Track
-        Wheelset and rails for the equivalent conicity.
-
-    Returns
-    -------
-    list of dict
-        The new wheel, then the wheel after each step: `distance` [m], `area` [m2], `deepest` [m]
-        and its position `deepest_y` from the nominal rolling circle [m], all since the beginning,
-        `equivalent_conicity` at 3 mm (EN 15302), None if it does not exist, and the dimensions of
-        `wear_depth.WheelDimensions` [m].
+    `found`: result of `wear_loop`, from its beginning; `vehicle`, `track`: wheelset and rails for
+    the equivalent conicity. Returns: the new wheel, then the wheel after each step: `distance` [m],
+    `area` [m2], `deepest` [m] and its position `deepest_y` from the nominal rolling circle [m], all
+    since the beginning, `equivalent_conicity` at 3 mm (EN 15302), None if it does not exist, and
+    the dimensions of `wear_depth.WheelDimensions` [m].
     """
     (wheelset, *_) = (body.wheelset for body in flatten(vehicle).bodies if body.wheelset)
     rails = load_profile(track.rail[0]), load_profile(track.rail[1])

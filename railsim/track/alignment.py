@@ -37,14 +37,8 @@ class Alignment:
 
     Every method takes arc lengths of any shape [m] and returns an array of that shape.
 
-    Parameters
-    ----------
-    track : Track
-        The track; beyond its ends the end elements continue.
-
-    Raises
-    ------
-    InputError : elements that do not fit together.
+    `track`: the track; beyond its ends the end elements continue. Raises InputError: elements that
+    do not fit together.
 
     Examples
     --------
@@ -117,9 +111,7 @@ class Alignment:
 def alignment_of(track: Track) -> Alignment:
     """Return the alignment of a track, worked out once for each track.
 
-    Raises
-    ------
-    InputError : elements that do not fit together.
+    Raises InputError: elements that do not fit together.
     """
     kept: dict[str, Alignment] = track.__dict__  # a copy of the track has it no more
     if KEPT not in kept:

@@ -16,14 +16,8 @@ USUAL_CANT_DEFICIENCY = 0.150
 class Curve:
     """One circular element.
 
-    Attributes
-    ----------
-    section : Section
-        Its section of the plan.
-    curvature : float
-        Positive to the right [1/m].
-    cant : float
-        At its middle, positive where the outer rail is higher [m].
+    `section`: its section of the plan; `curvature`: positive to the right [1/m]; `cant`: at its
+    middle, positive where the outer rail is higher [m].
     """
 
     section: Section

@@ -38,23 +38,10 @@ def track_tables(
 ) -> TrackTables:
     """Tables of a track over arc length.
 
-    Parameters
-    ----------
-    track : Track
-        The track.
-    before, after : float
-        How far the tables reach before s = 0 and behind the track's end [m].
-    cell_length : float, optional
-        Length of a cell [m]; by default `usual_cell_length`.
-
-    Returns
-    -------
-    TrackTables
-        See `railsim.kernels.track_frame`.
-
-    Raises
-    ------
-    InputError : elements that do not fit together; a track too long for its details.
+    `track`: the track; `before`, `after`: how far the tables reach before s = 0 and behind the
+    track's end [m]; `cell_length`: length of a cell [m]; by default `usual_cell_length`. Returns:
+    see `railsim.kernels.track_frame`. Raises InputError: elements that do not fit together; a track
+    too long for its details.
     """
     alignment = Alignment(track)
     ds = cell_length or usual_cell_length(track, before + after)
@@ -107,16 +94,8 @@ def usual_cell_length(track: Track, margin: float = BEFORE + AFTER) -> float:
 def hermite(value: Floats, rate: Floats, ds: float) -> Floats:
     """Cubic polynomials through values and derivatives at equally spaced nodes.
 
-    Parameters
-    ----------
-    value, rate : float64[n + 1]
-        Values and derivatives at the nodes.
-    ds : float
-        Distance of the nodes [m].
-
-    Returns
-    -------
-    float64[n, 4] : coefficients c0 + c1 u + c2 u^2 + c3 u^3, u the distance from the cell's begin.
+    `value`, `rate`: values and derivatives at the nodes; `ds`: distance of the nodes [m]. Returns:
+    `float64[n, 4]`.
     """
     step = np.diff(value) / ds
     c2 = (3.0 * step - 2.0 * rate[:-1] - rate[1:]) / ds

@@ -20,16 +20,10 @@ NOTHING: Triple = (0.0, 0.0, 0.0)
 class State:
     """Internal state of an element.
 
-    Attributes
-    ----------
-    law : str
-        ``maxwell`` damper with a spring in series; ``maxwell_curve`` the same with a table;
-        ``pad`` that sticks and slides; ``air`` of a reservoir; ``lag`` of a command; ``own`` of a
-        law of one's own.
-    parameter : tuple of 3 floats
-        As in `railsim.kernels.internal.Internal`.
-    table : rows, optional
-        Force over velocity of ``maxwell_curve``.
+    `law`: ``maxwell`` damper with a spring in series; ``maxwell_curve`` the same with a table;
+    ``pad`` that sticks and slides; ``air`` of a reservoir; ``lag`` of a command; ``own`` of a law
+    of one's own; `parameter`: as in `railsim.kernels.internal.Internal`; `table`: force over
+    velocity of ``maxwell_curve``.
     """
 
     law: Literal["maxwell", "maxwell_curve", "pad", "air", "lag", "own"]
@@ -74,24 +68,15 @@ class Link:
 class Mount:
     """Springs, dampers, tables and friction along the axes of body 1, rotation about them.
 
-    Attributes
-    ----------
-    stiffness, damping, preload : tuple of 3 floats
-        Along x, y, z [N/m], [N s/m], [N].
-    rotation, rotation_damping : tuple of 3 floats
-        Stiffness and damping about x, y, z [N m/rad], [N m s/rad].
-    tables : tuple of 3 rows
-        Force over displacement beside the springs [N], [m].
-    friction : tuple of 3 FrictionLimit
-        Limits along x, y, z; `states` are then pads.
-    states : tuple of 3 states
-        Internal states of the forces along x, y, z.
-    translates : bool
-        Whether forces act, not moments alone.
-    both_ends : bool
-        Whether the force acts in the middle between the points, in the axes of both bodies.
-    one_sided : bool
-        Whether spring and damper along z press and never pull.
+    - `stiffness`, `damping`, `preload`: along x, y, z [N/m], [N s/m], [N]
+    - `rotation`, `rotation_damping`: stiffness and damping about x, y, z [N m/rad], [N m s/rad]
+    - `tables`: force over displacement beside the springs [N], [m]
+    - `friction`: limits along x, y, z; `states` are then pads
+    - `states`: internal states of the forces along x, y, z
+    - `translates`: whether forces act, not moments alone
+    - `both_ends`: whether the force acts in the middle between the points, in the axes of both
+      bodies
+    - `one_sided`: whether spring and damper along z press and never pull
     """
 
     stiffness: Triple = NOTHING
@@ -135,21 +120,12 @@ AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 class Act:
     """A force that follows a command or a law of one's own.
 
-    Attributes
-    ----------
-    action : str
-        ``line``, one of `AXES` of body 1, or ``axle`` of body 2.
-    mode : str
-        What the command is: ``force``, ``damper``, ``position``, ``brake``; ``law``: an argument
-        of the law.
-    sense : float
-        -1 where the axis is reversed.
-    lag, delay, stiffness, damping : float
-        [s], [s], [N/m or N m/rad], [N s/m or N m s].
-    rate_limit, force_limit, power_limit, stroke : float, optional
-        Of the command per second, [N or N m], [W], [m or rad].
-    law, parameters : str, mapping
-        Name of the law and values of its further arguments.
+    `action`: ``line``, one of `AXES` of body 1, or ``axle`` of body 2; `mode`: what the command is:
+    ``force``, ``damper``, ``position``, ``brake``; ``law``: an argument of the law; `sense`: -1
+    where the axis is reversed; `lag`, `delay`, `stiffness`, `damping`: [s], [s], [N/m or N m/rad],
+    [N s/m or N m s]; `rate_limit`, `force_limit`, `power_limit`, `stroke`: of the command per
+    second, [N or N m], [W], [m or rad]; `law`, `parameters`: name of the law and values of its
+    further arguments.
     """
 
     action: str

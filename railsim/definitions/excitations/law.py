@@ -70,12 +70,8 @@ class ByLaw(Irregular):
     def displacement_by(self, function: Callable[[Floats], Floats], length: float) -> Displacement:
         """Return how it moves the rails, its rate by central differences of order 4.
 
-        Parameters
-        ----------
-        function : callable
-            What the law gives at some arc lengths [m].
-        length : float
-            Length of the track's plan [m].
+        `function`: what the law gives at some arc lengths [m]; `length`: length of the track's plan
+        [m].
         """
         h, (begin, end) = self.shortest / PER_WAVE, self.extent(length)
         shares = self.factor * np.array(SHARES[self.channel])[:, None]

@@ -169,17 +169,8 @@ def shape_preserving_slopes(positions: Floats, values: Floats) -> Floats:
     Fritsch and Butland (1984, SIAM J. Sci. Stat. Comput. 5) at both its ends.  A sine of six rows a
     wave leaves it by 0.15 at most.
 
-    Parameters
-    ----------
-    positions : ndarray, shape (n,)
-        Increasing arc lengths [m].
-    values : ndarray, shape (n,)
-        Displacements [m].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Slopes [1].
+    `positions`, shape (n,): increasing arc lengths [m]; `values`, shape (n,): displacements [m].
+    Returns: slopes [1] (shape (n,)).
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
 

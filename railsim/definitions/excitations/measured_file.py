@@ -43,15 +43,7 @@ Rows = list[tuple[float, ...]]
 def embed_measured(data: dict[str, Any]) -> list[Fault]:
     """Replace `file` by the `rows` that it holds in every measured irregularity of a track.
 
-    Parameters
-    ----------
-    data : dict
-        A track as plain tables; changed in place.
-
-    Returns
-    -------
-    list of Fault
-        What is wrong in the files.
+    `data`: a track as plain tables; changed in place. Returns: what is wrong in the files.
     """
     faults = []
     listed = data.get("irregularities")
@@ -92,15 +84,8 @@ def _definition(table: dict[str, Any]) -> Measured | None:
 def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
     """Recordings of valid irregularities: name of the file, rows as read, and rows as they act.
 
-    Parameters
-    ----------
-    tables : iterable of dict
-        Irregularities of a track as plain tables, with files.
-
-    Returns
-    -------
-    list of (str, float64[n, 5], float64[n, 5])
-        s, y_left, z_left, y_right, z_right [m]; `chord`, `band` and `scale` are in the second only.
+    `tables`: irregularities of a track as plain tables, with files. Returns: s, y_left, z_left,
+    y_right, z_right [m]; `chord`, `band` and `scale` are in the second only.
     """
     found = []
     for table in tables:

@@ -34,14 +34,8 @@ def band_passed(values: Floats, step: float, wavelengths: tuple[float, float]) -
     |H| = 1 / sqrt((1 + (l/f)^8)(1 + (f/h)^8)) with the band's limits l, h and the spatial
     frequency f (EN 13848-1: order 4 and the bands D1 to D3).
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_columns, n)
-        Rows at equal steps [m].
-    step : float
-        Distance between rows [m].
-    wavelengths : pair of float
-        Shortest and longest wavelength [m].
+    `values`, shape (n_columns, n): rows at equal steps [m]; `step`: distance between rows [m];
+    `wavelengths`: shortest and longest wavelength [m].
     """
 
     def gain(f: Floats) -> Floats:
@@ -61,14 +55,8 @@ def from_chord(values: Floats, step: float, chord: tuple[float, float]) -> Float
     b), hence V(f) = Y(f) (1 - (b exp(-i 2 pi f a) + a exp(i 2 pi f b))/(a + b)); inverted where the
     response exceeds a tenth of its largest value, zero elsewhere (EN 13848-1 on decolouring).
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_columns, n)
-        Offsets at equal steps [m].
-    step : float
-        Distance between rows [m].
-    chord : pair of float
-        Parts a behind and b ahead of the measuring point [m].
+    `values`, shape (n_columns, n): offsets at equal steps [m]; `step`: distance between rows [m];
+    `chord`: parts a behind and b ahead of the measuring point [m].
     """
     a, b = chord
 

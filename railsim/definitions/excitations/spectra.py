@@ -49,22 +49,15 @@ class Coefficients(Definition):
 class Spectrum:
     """One-sided spectra of the irregularities that a source describes.
 
-    Attributes
-    ----------
-    label : str
-        What it is called in tables and plots.
-    source : str
-        Where the coefficients come from, with their source quality.
-    densities : mapping of str to function
-        By channel (`lateral`, `vertical`, `cross_level`, `gauge`): S over the source's variable.
-    per_cycle : bool
-        Whether the variable is the spatial frequency f [1/m]; else omega [rad/m].
-    unit : float
-        Size of the source's unit of S in m2 per unit of the variable (1e-6 for mm2).
-    half_base : float
-        Half the distance between the rails to which the cross level refers [m].
-    cross_level_is_height : bool
-        Whether the source gives the cross level as a height difference; else as an angle.
+    - `label`: what it is called in tables and plots
+    - `source`: where the coefficients come from, with their source quality
+    - `densities`: by channel (`lateral`, `vertical`, `cross_level`, `gauge`): S over the source's
+      variable
+    - `per_cycle`: whether the variable is the spatial frequency f [1/m]; else omega [rad/m]
+    - `unit`: size of the source's unit of S in m2 per unit of the variable (1e-6 for mm2)
+    - `half_base`: half the distance between the rails to which the cross level refers [m]
+    - `cross_level_is_height`: whether the source gives the cross level as a height difference; else
+      as an angle
     """
 
     label: str
@@ -83,17 +76,8 @@ class Spectrum:
     def density(self, channel: str, omega: Floats) -> Floats:
         """One-sided power spectral density over the angular wave number.
 
-        Parameters
-        ----------
-        channel : str
-            One of `channels`.
-        omega : ndarray
-            Angular wave number [rad/m].
-
-        Returns
-        -------
-        ndarray
-            S(omega) [m2/(rad/m)], of the cross level [rad2/(rad/m)].
+        `channel`: one of `channels`; `omega`: angular wave number [rad/m]. Returns: S(omega)
+        [m2/(rad/m)], of the cross level [rad2/(rad/m)].
         """
         factor = 1.0 / (2.0 * np.pi) if self.per_cycle else 1.0
         variable = factor * omega

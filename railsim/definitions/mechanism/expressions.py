@@ -55,14 +55,7 @@ _KNOWN = {"__builtins__": {}} | {f"{name}()": function for name, function in FUN
 class Expression(str):
     """The text of an expression, already parsed.
 
-    Attributes
-    ----------
-    tree : ast.expr
-        What it says.
-    code : code
-        The same, compiled.
-    names : frozenset of str
-        Parameters that it uses.
+    `tree`: what it says; `code`: the same, compiled; `names`: parameters that it uses.
     """
 
     __slots__ = ("code", "names", "tree")
@@ -73,9 +66,7 @@ class Expression(str):
     def __new__(cls, text: str) -> "Expression":
         """Parse a text.
 
-        Raises
-        ------
-        ValueError : it is no arithmetic.
+        Raises ValueError: it is no arithmetic.
         """
         made = super().__new__(cls, text)
         made.tree = _parsed(text)
@@ -154,16 +145,8 @@ def _compiled(tree: ast.expr) -> CodeType:
 def evaluate(expression: Expression, values: Mapping[str, Any]) -> Any:
     """Value of an expression.
 
-    Parameters
-    ----------
-    expression : Expression
-        What to evaluate.
-    values : mapping of str to float or complex ndarray
-        Parameters by name.
-
-    Raises
-    ------
-    ValueError : a division by zero, a function outside its domain, an overflow.
+    `expression`: what to evaluate; `values`: parameters by name. Raises ValueError: a division by
+    zero, a function outside its domain, an overflow.
 
     Examples
     --------

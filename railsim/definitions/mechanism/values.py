@@ -38,16 +38,9 @@ def parameter_values(
 ) -> dict[str, Any]:
     """Values of all parameters and intermediate results.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        Whose parameters.
-    changed : mapping of str to float or complex ndarray, optional
-        Values instead of the file's, also for parameters that are expressions there.
-
-    Raises
-    ------
-    InputError : an expression without a value, or parameters that go round in a circle.
+    `mechanism`: whose parameters; `changed`: values instead of the file's, also for parameters that
+    are expressions there. Raises InputError: an expression without a value, or parameters that go
+    round in a circle.
     """
     values: dict[str, Any] = dict(changed or {})
     home = {n: f"derived.{n}" for n in mechanism.derived}
@@ -74,9 +67,7 @@ def parameter_values(
 def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> Any:
     """Value of a number or an expression.
 
-    Raises
-    ------
-    InputError : it has none.
+    Raises InputError: it has none.
     """
     if not isinstance(quantity, Expression):
         return quantity

@@ -34,14 +34,12 @@ Values = Text | Annotated[tuple[Value, ...], Field(min_length=1)]
 def value_texts(values: Values) -> list[str]:
     """Return values as `key=value` takes them: those of a range, or one for each of a list.
 
+    Raises ValueError: a range that is none.
+
     Examples
     --------
     >>> value_texts("0.2:0.4:3"), value_texts((True, 0.5, "72 km/h", (10, 20)))
     (['0.2', '0.3', '0.4'], ['true', '0.5', '72 km/h', '[10, 20]'])
-
-    Raises
-    ------
-    ValueError : a range that is none.
     """
     if isinstance(values, str):
         found = range_values(values)

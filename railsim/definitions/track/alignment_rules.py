@@ -33,12 +33,7 @@ def alignment_remarks(
 ) -> list[Remark]:
     """Return where a plan with its cant breaks the rules.
 
-    Parameters
-    ----------
-    plan, cant : sequences of Section
-        Curvature [1/m] and cant [m] over arc length.
-    speed : float
-        Permitted speed [m/s].
+    `plan`, `cant`: curvature [1/m] and cant [m] over arc length; `speed`: permitted speed [m/s].
     """
     return [
         *_cants(plan, cant, speed),

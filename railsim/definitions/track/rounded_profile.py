@@ -24,14 +24,8 @@ def _running(parts: Floats) -> Floats:
 class RoundedProfile:
     """A piecewise linear function, constant beyond its ends, averaged over a window.
 
-    Parameters
-    ----------
-    sections : sequence of Section
-        Values over arc length; none at all means zero everywhere.
-    rounding : float
-        Length of the window [m]; 0 leaves the kinks.
-    origin : float
-        Arc length from which the sections' ends count [m].
+    `sections`: values over arc length; none at all means zero everywhere; `rounding`: length of the
+    window [m]; 0 leaves the kinks; `origin`: arc length from which the sections' ends count [m].
     """
 
     def __init__(self, sections: Sequence[Section], rounding: float, origin: float = 0.0) -> None:

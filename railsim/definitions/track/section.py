@@ -7,16 +7,9 @@ from dataclasses import dataclass
 class Section:
     """One element of a list with the values at its ends.
 
-    Attributes
-    ----------
-    key : str
-        Its key in the file, e.g. ``plan.2``.
-    type : str
-        Its type as written.
-    begin, end : float
-        Arc lengths of its ends [m].
-    start_value, end_value : float
-        Curvature [1/m], cant [m] or gradient [1] at its ends.
+    `key`: its key in the file, e.g. ``plan.2``; `type`: its type as written; `begin`, `end`: arc
+    lengths of its ends [m]; `start_value`, `end_value`: curvature [1/m], cant [m] or gradient [1]
+    at its ends.
     """
 
     key: str

@@ -77,17 +77,9 @@ class SupportValues:
 def beam_on_foundation(bending_stiffness: float, foundation: float) -> tuple[float, float]:
     """A long beam on an elastic foundation under a single force (Winkler 1867, Zimmermann 1888).
 
-    Parameters
-    ----------
-    bending_stiffness : float
-        E I of the rail [N m2].
-    foundation : float
-        u, stiffness of the support over the distance of the supports [N/m2].
-
-    Returns
-    -------
-    length, stiffness : float
-        L = (4 E I/u)^(1/4) [m]; force over deflection at the force, 2 u L [N/m].
+    `bending_stiffness`: E I of the rail [N m2]; `foundation`: u, stiffness of the support over the
+    distance of the supports [N/m2]. Returns: `length, stiffness`: L = (4 E I/u)^(1/4) [m]; force
+    over deflection at the force, 2 u L [N/m].
     """
     length = (4.0 * bending_stiffness / foundation) ** 0.25
     return length, 2.0 * foundation * length

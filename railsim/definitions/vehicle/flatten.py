@@ -27,26 +27,15 @@ POSITION_TOLERANCE = 1e-3
 class FlatBody:
     """A body in its nominal position.
 
-    Attributes
-    ----------
-    name : str
-        Full name, e.g. ``front.outer.wheelset``.
-    kind : {'body', 'wheelset', 'axlebox'}
-        An axlebox has no mass of its own, only `pitch_inertia`.
-    mass : float
-        Mass [kg].
-    inertia : tuple of 3 floats
-        Principal moments of inertia about x, y, z [kg m2].
-    position : tuple of 3 floats
-        Centre of gravity in vehicle axes (an axlebox: its bearing's centre) [m].
-    wheelset : Wheelset or None
-        Definition of the wheelset with radii and profiles.
-    parent : str or None
-        Wheelset that carries the axlebox.
-    pitch_inertia : float
-        Moment of inertia of an axlebox about the axle [kg m2].
-    fixed : str or None
-        Where a body is held: ``track`` or ``ground``.
+    - `name`: full name, e.g. ``front.outer.wheelset``
+    - `kind`: an axlebox has no mass of its own, only `pitch_inertia`
+    - `mass`: mass [kg]
+    - `inertia`: principal moments of inertia about x, y, z [kg m2]
+    - `position`: centre of gravity in vehicle axes (an axlebox: its bearing's centre) [m]
+    - `wheelset`: definition of the wheelset with radii and profiles
+    - `parent`: wheelset that carries the axlebox
+    - `pitch_inertia`: moment of inertia of an axlebox about the axle [kg m2]
+    - `fixed`: where a body is held: ``track`` or ``ground``
     """
 
     name: str
@@ -64,15 +53,10 @@ class FlatBody:
 class FlatElement:
     """A force element in its nominal position.
 
-    Attributes
-    ----------
-    name, body1, body2 : str
-        Full names of the element and of the bodies it acts between; an applied force has no
-        second body (an empty name).
-    point1, point2 : tuple of 3 floats
-        Where it acts in vehicle axes; an element without points: the bodies' positions [m].
-    definition : Element
-        Its parameters, with signs as they are in this placement.
+    `name`, `body1`, `body2`: full names of the element and of the bodies it acts between; an
+    applied force has no second body (an empty name); `point1`, `point2`: where it acts in vehicle
+    axes; an element without points: the bodies' positions [m]; `definition`: its parameters, with
+    signs as they are in this placement.
     """
 
     name: str
@@ -90,17 +74,10 @@ KEPT = "_flattened"
 class FlatVehicle:
     """A vehicle without assemblies.
 
-    Attributes
-    ----------
-    name : str
-        Name of the vehicle.
-    bodies : tuple of FlatBody
-        Bodies in the order of the file, wheelsets from the leading end, axleboxes in the order of
-        their wheelsets, left before right.
-    elements : tuple of FlatElement
-        Elements in the order of the file, left before right.
-    reference : str
-        Name of the body whose arc length is the vehicle's `distance`.
+    `name`: name of the vehicle; `bodies`: bodies in the order of the file, wheelsets from the
+    leading end, axleboxes in the order of their wheelsets, left before right; `elements`: elements
+    in the order of the file, left before right; `reference`: name of the body whose arc length is
+    the vehicle's `distance`.
     """
 
     name: str
@@ -178,10 +155,8 @@ def wrong_type(kind: str, value: object) -> str:
 def flatten(vehicle: VehicleTables) -> FlatVehicle:
     """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
-    Raises
-    ------
-    InputError : names that mean nothing or are used twice, parts that do not fit together.
-    TypeError : something else than a vehicle.
+    Raises InputError: names that mean nothing or are used twice, parts that do not fit together.
+    TypeError: something else than a vehicle.
     """
     if not isinstance(vehicle, VehicleTables):
         raise TypeError(wrong_type("vehicle", vehicle))

@@ -28,14 +28,8 @@ DEEPEST_ASSEMBLY = 10
 class Group:
     """One standing assembly, or the vehicle itself.
 
-    Attributes
-    ----------
-    parts : Mapping
-        Its table: bodies, wheelsets, axleboxes, elements.
-    scope : tuple of str
-        Names of the placements that lead to it.
-    path : tuple of str
-        Keys that lead to its table in the file.
+    `parts`: its table: bodies, wheelsets, axleboxes, elements; `scope`: names of the placements
+    that lead to it; `path`: keys that lead to its table in the file.
     """
 
     parts: Mapping[str, Any]
@@ -148,16 +142,9 @@ def body_names(parts: Mapping[str, Any]) -> tuple[dict[str, str], list[Fault]]:
 def resolve(name: str, scope: Scope, side: str | None, known: Mapping[str, Any]) -> str | None:
     """Return the full name of the body that `name` means in an assembly, or None.
 
-    Parameters
-    ----------
-    name : str
-        Name as written, perhaps dotted.
-    scope : tuple of str
-        Where it is written.
-    side : {'left', 'right'} or None
-        Side of the element that names it: an axlebox on both sides is then the one on that side.
-    known : mapping
-        Full names of all bodies.
+    `name`: name as written, perhaps dotted; `scope`: where it is written; `side`: side of the
+    element that names it: an axlebox on both sides is then the one on that side; `known`: full
+    names of all bodies.
     """
     for depth in range(len(scope), -1, -1):
         full = ".".join((*scope[:depth], name))
