@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from railsim.cli.common import option
 from railsim.cli.output import Output, output_options
 from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import TABLE_BYTES, read_text
@@ -17,25 +18,17 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 
 @click.command()
 @click.argument("file", metavar="R.h5|modes.json")
-@click.option("--out", metavar="F", help="Page (.html), .gif or .mp4; default: next to the input.")
-@click.option("--vehicle", metavar="F", help="Vehicle of the modes: a file or a name.")
-@click.option("--mode", metavar="NAME", help="Mode by name or number; default the first.")
-@click.option(
-    "--between",
-    nargs=2,
-    type=float,
-    metavar="S1 S2",
-    help="Section of the run to show, distance in m.",
-)
-@click.option(
-    "--frames", type=click.IntRange(2, 20_000), metavar="N", help="Maximum number of frames."
-)
-@click.option("--fps", type=click.IntRange(1, 100), default=20, help="Frames per second of a film.")
-@click.option(
+@option("--out", "Page (.html), .gif or .mp4; default: next to the input.", "F")
+@option("--vehicle", "Vehicle of the modes: a file or a name.", "F")
+@option("--mode", "Mode by name or number; default the first.", "NAME")
+@option("--between", "Section of the run to show, distance in m.", "S1 S2", float, nargs=2)
+@option("--frames", "Maximum number of frames.", "N", click.IntRange(2, 20_000))
+@option("--fps", "Frames per second of a film.", kind=click.IntRange(1, 100), default=20)
+@option(
     "--gain",
-    type=click.FloatRange(0.0, 1000.0),
+    "Magnification of the motion of the bodies in a film.",
+    kind=click.FloatRange(0.0, 1000.0),
     default=1.0,
-    help="Magnification of the motion of the bodies in a film.",
 )
 @output_options()
 def command(file: str, fps: int, gain: float, output: Output, **how: Any) -> None:

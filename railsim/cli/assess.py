@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Speed, allow_code_option, fail_option
+from railsim.cli.common import Speed, allow_code_option, fail_option, flag, option
 from railsim.cli.output import Output, output_options
 from railsim.errors import Fault, Faults, InputError
 
@@ -28,34 +28,25 @@ FILES = (
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="R.h5|DIR ...")
-@click.option("--standard", type=click.Choice(STANDARDS), default="en14363", help="What to assess.")
-@click.option("--limits", metavar="F", help="Limits file, or the name of a shipped one.")
-@click.option(
-    "--law", metavar="NAME_OR_FILE", help="Law of wear; by default all that need no constants."
-)
-@click.option(
+@option("--standard", "What to assess.", kind=click.Choice(STANDARDS), default="en14363")
+@option("--limits", "Limits file, or the name of a shipped one.", "F")
+@option("--law", "Law of wear; by default all that need no constants.", "NAME_OR_FILE")
+@option(
     "--method",
-    type=click.Choice(["normal", "simplified"]),
+    "With wheel forces, or with accelerations only.",
+    kind=click.Choice(["normal", "simplified"]),
     default="normal",
-    help="With wheel forces, or with accelerations only.",
 )
-@click.option(
-    "--admissible-speed",
-    type=Speed(),
-    metavar="V",
-    help="Admissible speed in m/s, instead of the vehicle's.",
-)
-@click.option("--cant-deficiency", type=float, metavar="I", help="Admissible cant deficiency in m.")
-@click.option(
+@option("--admissible-speed", "Admissible speed in m/s, instead of the vehicle's.", "V", Speed())
+@option("--cant-deficiency", "Admissible cant deficiency in m.", "I", float)
+@option(
     "--category",
-    type=click.Choice(["passenger", "freight", "locomotive", "multiple_unit"]),
-    help="Category, instead of the vehicle's.",
+    "Category, instead of the vehicle's.",
+    kind=click.Choice(["passenger", "freight", "locomotive", "multiple_unit"]),
 )
-@click.option(
-    "--causal", is_flag=True, help="Causal filters, with phase, as in measuring amplifiers."
-)
-@click.option("--coarse", is_flag=True, help="Also accept results below 1000 samples per second.")
-@click.option("--all-sections", is_flag=True, help="Also use sections outside a zone's conditions.")
+@flag("--causal", "Causal filters, with phase, as in measuring amplifiers.")
+@flag("--coarse", "Also accept results below 1000 samples per second.")
+@flag("--all-sections", "Also use sections outside a zone's conditions.")
 @fail_option
 @output_options("Folder for assessment.json, .csv and .png.")
 @allow_code_option

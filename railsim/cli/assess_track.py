@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import code_options, names_of, workers_option
+from railsim.cli.common import code_options, flag, names_of, option, workers_option
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.cli.study import ManyValues
@@ -14,26 +14,14 @@ SHOWN = 40
 
 @click.command(cls=ManyValues)
 @click.argument("recording", shell_complete=names_of("track"))
-@click.option(
-    "--vehicles",
-    multiple=True,
-    required=True,
-    metavar="F [F ...]",
-    help="Vehicles: files or names.",
+@option("--vehicles", "Vehicles: files or names.", "F [F ...]", multiple=True, required=True)
+@option(
+    "--speeds", "Speeds in m/s, or with a unit: 160km/h.", "V [V ...]", multiple=True, required=True
 )
-@click.option(
-    "--speeds",
-    multiple=True,
-    required=True,
-    metavar="V [V ...]",
-    help="Speeds in m/s, or with a unit: 160km/h.",
-)
-@click.option(
-    "--share", type=float, default=0.8, help="Share of a limit from which on a place is listed."
-)
-@click.option("--out", required=True, metavar="DIR", help="Folder of the runs and tables.")
+@option("--share", "Share of a limit from which on a place is listed.", kind=float, default=0.8)
+@option("--out", "Folder of the runs and tables.", "DIR", required=True)
 @workers_option
-@click.option("--resume", is_flag=True, help="Go on where this folder was left.")
+@flag("--resume", "Go on where this folder was left.")
 @output_options()
 @code_options
 def command(

@@ -2,12 +2,13 @@
 
 import click
 
+from railsim.cli.common import flag
 from railsim.cli.output import Output, answer_options
 from railsim.cli.progress import progress_bar
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="No errors, which take most of the time.")
+@flag("--quick", "No errors, which take most of the time.")
 @answer_options
 def command(quick: bool, output: Output) -> None:
     """Measure the speed of railsim on this machine, and the error at that speed.

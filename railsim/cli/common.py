@@ -24,6 +24,21 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+COUNT = click.IntRange(min=1)
+
+
+def option(
+    names: str, words: str, metavar: str | None = None, kind: Any = None, **more: Any
+) -> Callable[[F], F]:
+    """Return an option of a command by its name, and its parameter's where that is another."""
+    return click.option(*names.split(), help=words, metavar=metavar, type=kind, **more)
+
+
+def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
+    """Return an option without a value."""
+    return click.option(*name.split(), is_flag=True, help=words, **more)
+
+
 class Speed(click.ParamType):  # type: ignore[type-arg]
     """A speed in m/s, or with a unit: ``72km/h``."""
 
@@ -107,34 +122,20 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
     return found
 
 
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Machine-readable results on stdout."
-)
-quiet_option = click.option("--quiet", is_flag=True, help="No progress bars and remarks.")
-overwrite_option = click.option("--overwrite", is_flag=True, help="Replace output that exists.")
-set_option = click.option(
-    "--set",
-    "assignments",
+json_option = flag("--json as_json", "Machine-readable results on stdout.")
+quiet_option = flag("--quiet", "No progress bars and remarks.")
+overwrite_option = flag("--overwrite", "Replace output that exists.")
+set_option = option(
+    "--set assignments",
+    "Replace one value of the input; may be given several times.",
+    "KEY.PATH=VALUE",
     multiple=True,
-    metavar="KEY.PATH=VALUE",
-    help="Replace one value of the input; may be given several times.",
 )
-load_option = click.option(
-    "--load", metavar="NAME", help="Load case of the vehicle; by default its design load."
-)
-workers_option = click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Number of processes; default: all cores.",
-)
-scheduler_option = click.option(
-    "--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on."
-)
-fail_option = click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
-rails_option = click.option(
-    "--track", metavar="F", help="Rails, gauge, friction, support; default straight."
-)
+load_option = option("--load", "Load case of the vehicle; by default its design load.", "NAME")
+workers_option = option("--workers", "Number of processes; default: all cores.", "N", COUNT)
+scheduler_option = option("--scheduler", "Address of a dask scheduler to run on.", "ADDRESS")
+fail_option = flag("--fail", "Exit status 4 where a limit is exceeded.")
+rails_option = option("--track", "Rails, gauge, friction, support; default straight.", "F")
 vehicle_argument = click.argument("vehicle", shell_complete=names_of("vehicle"))
 track_argument = click.argument("track", shell_complete=names_of("track"))
 optional_track = click.argument(
@@ -165,24 +166,23 @@ def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
         allow(*(read_text(path, DEFINITION_BYTES) for path in paths))
 
 
-allow_code_option = click.option(
+allow_code_option = flag(
     "--allow-code",
-    is_flag=True,
+    "Execute the Python code of laws that the files name.",
     expose_value=False,
     callback=_allow,
-    help="Execute the Python code of laws that the files name.",
 )
 
 
 def code_options(function: F) -> F:
     """Add ``--allow-code`` and ``--law``, which permit laws of one's own."""
-    files = click.option(
+    files = option(
         "--law",
+        "Execute the laws of this file, or of this name; may be given several times.",
+        "FILE",
         multiple=True,
-        metavar="FILE",
         expose_value=False,
         callback=_allow,
-        help="Execute the laws of this file, or of this name; may be given several times.",
     )
     return allow_code_option(files(function))
 
@@ -210,18 +210,18 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
 
 def linearisation_options(function: F) -> F:
     """Add ``--linearisation`` and ``--amplitude``."""
-    linearisation = click.option(
+    linearisation = option(
         "--linearisation",
+        "Contact: its derivative, or its first harmonic for --amplitude.",
+        kind=click.Choice(["tangent", "harmonic"]),
         default="tangent",
-        type=click.Choice(["tangent", "harmonic"]),
-        help="Contact: its derivative, or its first harmonic for --amplitude.",
     )
-    amplitude = click.option(
+    amplitude = option(
         "--amplitude",
-        type=float,
+        "Lateral amplitude of the wheelsets in m, for harmonic.",
+        "A",
+        float,
         default=3e-3,
-        metavar="A",
-        help="Lateral amplitude of the wheelsets in m, for harmonic.",
     )
     return linearisation(amplitude(function))
 

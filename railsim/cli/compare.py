@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import print_json, show
+from railsim.cli.common import option, print_json, show
 from railsim.cli.gathered import gather, opened
 from railsim.cli.output import Output, output_options
 from railsim.errors import InputError, input_error
@@ -23,11 +23,11 @@ Group = dict[str, "Result"]
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="R.h5|STUDY...")
-@click.option(
+@option(
     "--over",
-    type=click.Choice(["distance", "time"]),
+    "Horizontal axis of the picture.",
+    kind=click.Choice(["distance", "time"]),
     default="distance",
-    help="Horizontal axis of the picture.",
 )
 @output_options(
     "Folder for compare.csv, compare.json, compare.png, differences.png; of several groups a set "

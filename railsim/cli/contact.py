@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import collected, echo
+from railsim.cli.common import COUNT, collected, echo, flag, option
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, Faults
@@ -66,62 +66,51 @@ class Geometry:
 @collected(
     "geometry",
     Geometry,
-    click.option(
+    option(
         "--wheel",
+        "Wheel profile, name or file; give it twice for different left and right wheels.",
+        "W",
         multiple=True,
         default=("S1002",),
-        metavar="W",
-        help="Wheel profile, name or file; give it twice for different left and right wheels.",
     ),
-    click.option(
+    option(
         "--rail",
+        "Rail profile, name or file; twice for left and right.",
+        "R",
         multiple=True,
         default=("60E1",),
-        metavar="R",
-        help="Rail profile, name or file; twice for left and right.",
     ),
-    click.option("--gauge", default=1.435, help="Track gauge (m)."),
-    click.option("--inclination", default=0.025, help="Rail inclination (1)."),
-    click.option("--back-to-back", default=1.360, help="Distance between the flange backs (m)."),
-    click.option(
+    option("--gauge", "Track gauge (m).", default=1.435),
+    option("--inclination", "Rail inclination (1).", default=0.025),
+    option("--back-to-back", "Distance between the flange backs (m).", default=1.360),
+    option(
         "--radius",
+        "Rolling radius (m); twice for left and right.",
+        kind=float,
         multiple=True,
-        type=float,
         default=(0.46,),
-        help="Rolling radius (m); twice for left and right.",
     ),
-    click.option("--load", default=60e3, help="Vertical wheel load (N)."),
-    click.option("--max-shift", default=0.010, help="Largest lateral displacement (m)."),
+    option("--load", "Vertical wheel load (N).", default=60e3),
+    option("--max-shift", "Largest lateral displacement (m).", default=0.010),
 )
-@click.option("--gauges", metavar="A:B:N", help="Also the conicity over N gauges from A to B (m).")
-@click.option(
-    "--overlay",
-    metavar="P",
-    help="With --out: also a wheel or rail profile drawn over the right one.",
-)
-@click.option(
-    "--exact", is_flag=True, help="Check the patches by boundary elements (about ten seconds)."
-)
-@click.option(
+@option("--gauges", "Also the conicity over N gauges from A to B (m).", "A:B:N")
+@option("--overlay", "With --out: also a wheel or rail profile drawn over the right one.", "P")
+@flag("--exact", "Check the patches by boundary elements (about ten seconds).")
+@option(
     "--normal",
-    type=click.Choice(NORMAL),
+    "Normal contact of the table; with --exact both are compared.",
+    kind=click.Choice(NORMAL),
     default="hertz",
-    help="Normal contact of the table; with --exact both are compared.",
 )
-@click.option(
-    "--creep",
-    is_flag=True,
-    help="Creep forces of the centred wheel's patch by every creep law, and traction fields.",
+@flag(
+    "--creep", "Creep forces of the centred wheel's patch by every creep law, and traction fields."
 )
-@click.option("--friction", default=0.4, help="Friction coefficient, for --creep.")
-@click.option(
+@option("--friction", "Friction coefficient, for --creep.", default=0.4)
+@flag(
     "--build-creep-table",
-    is_flag=True,
-    help="Only recompute the table of the creep law `table` (half an hour; can be interrupted).",
+    "Only recompute the table of the creep law `table` (half an hour; can be interrupted).",
 )
-@click.option(
-    "--workers", type=click.IntRange(min=1), default=2, help="Processes, for --build-creep-table."
-)
+@option("--workers", "Processes, for --build-creep-table.", kind=COUNT, default=2)
 @output_options("Folder for pictures and tables; created if it does not exist.")
 def command(
     profiles: tuple[str, ...],

@@ -11,6 +11,7 @@ from railsim.cli.common import (
     Speed,
     code_options,
     linearisation_options,
+    option,
     optional_track,
     vehicle_argument,
     workers_option,
@@ -31,44 +32,28 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @click.command(name="critical-speed")
 @vehicle_argument
 @optional_track
-@click.option(
+@option(
     "--method",
+    "The linear critical speed is always found.",
+    kind=click.Choice(METHODS),
     default="ramp",
-    type=click.Choice(METHODS),
-    help="The linear critical speed is always found.",
 )
-@click.option(
-    "--from",
-    "low",
-    type=Speed(),
-    default=5.0,
-    metavar="V",
-    help="Lowest speed in m/s, or with a unit.",
-)
-@click.option(
-    "--to",
-    "high",
-    type=Speed(),
-    default=120.0,
-    metavar="V",
-    help="Highest speed in m/s, or with a unit.",
-)
-@click.option(
-    "--points", type=int, default=16, metavar="N", help="Speeds of a bifurcation diagram."
-)
-@click.option(
+@option("--from low", "Lowest speed in m/s, or with a unit.", "V", Speed(), default=5.0)
+@option("--to high", "Highest speed in m/s, or with a unit.", "V", Speed(), default=120.0)
+@option("--points", "Speeds of a bifurcation diagram.", "N", int, default=16)
+@option(
     "--excitation",
-    metavar="A,B,...",
-    help="Disturbances from which hunting is sought, in m; default: 1 to 8 mm.",
+    "Disturbances from which hunting is sought, in m; default: 1 to 8 mm.",
+    "A,B,...",
 )
 @linearisation_options
-@click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")
-@click.option("--friction", metavar="MU or A:B:N", help="Friction; several values: a map.")
-@click.option(
+@option("--conicity", "Straight cones as wheels; several: a map.", "G or A:B:N")
+@option("--friction", "Friction; several values: a map.", "MU or A:B:N")
+@option(
     "--over",
+    "A map over a key of the vehicle, track or settings; at most two parameters.",
+    "KEY.PATH=A:B:N",
     multiple=True,
-    metavar="KEY.PATH=A:B:N",
-    help="A map over a key of the vehicle, track or settings; at most two parameters.",
 )
 @workers_option
 @given_options("scheme, creep law, contact")

@@ -2,7 +2,7 @@
 
 import click
 
-from railsim.cli.common import code_options, rails_option, vehicle_argument
+from railsim.cli.common import code_options, option, rails_option, vehicle_argument
 from railsim.cli.inputs import Given, given_options, values_of
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
@@ -12,14 +12,10 @@ FILES = ("curving.json", "curving.png")
 
 @click.command()
 @vehicle_argument
-@click.option(
-    "--radius", required=True, metavar="R,R,... or A:B:N", help="Radii in m, positive to the right."
-)
-@click.option("--cant", type=float, default=0.15, metavar="H", help="Cant in m.")
-@click.option(
-    "--cant-deficiency", default="0", metavar="I,I,... or A:B:N", help="Cant deficiencies in m."
-)
-@click.option("--friction", metavar="MU,MU,... or A:B:N", help="Default: the track's.")
+@option("--radius", "Radii in m, positive to the right.", "R,R,... or A:B:N", required=True)
+@option("--cant", "Cant in m.", "H", float, default=0.15)
+@option("--cant-deficiency", "Cant deficiencies in m.", "I,I,... or A:B:N", default="0")
+@option("--friction", "Default: the track's.", "MU,MU,... or A:B:N")
 @rails_option
 @given_options("creep law and contact")
 @output_options("Folder for curving.json and curving.png.")

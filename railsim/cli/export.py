@@ -2,20 +2,21 @@
 
 import click
 
+from railsim.cli.common import option
 from railsim.cli.output import Output, output_options
 
 
 @click.command()
 @click.argument("file", metavar="R.h5")
 @click.argument("quantities", nargs=-1, metavar="[QUANTITY]...")
-@click.option("--out", required=True, metavar="F", help="File: .csv, .mat or .parquet.")
-@click.option("--between", type=float, nargs=2, metavar="A B", help="Section of the track, m.")
-@click.option("--rate", type=float, metavar="N", help="Values per second, low-pass filtered.")
-@click.option(
+@option("--out", "File: .csv, .mat or .parquet.", "F", required=True)
+@option("--between", "Section of the track, m.", "A B", float, nargs=2)
+@option("--rate", "Values per second, low-pass filtered.", "N", float)
+@option(
     "--units",
-    type=click.Choice(["si", "shown"]),
+    "SI, or those of tables and plots: kN, mm.",
+    kind=click.Choice(["si", "shown"]),
     default="si",
-    help="SI, or those of tables and plots: kN, mm.",
 )
 @output_options()
 def command(

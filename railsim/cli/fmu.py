@@ -4,7 +4,14 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import Speed, code_options, extent_options, track_argument, vehicle_argument
+from railsim.cli.common import (
+    Speed,
+    code_options,
+    extent_options,
+    option,
+    track_argument,
+    vehicle_argument,
+)
 from railsim.cli.inputs import Given, given_options
 from railsim.cli.output import Output, output_options
 
@@ -12,10 +19,10 @@ from railsim.cli.output import Output, output_options
 @click.command()
 @vehicle_argument
 @track_argument
-@click.option("--speed", type=Speed(), metavar="V", help="Speed in m/s, or with a unit: 72km/h.")
-@click.option("--inputs", metavar="A,B", help="Actuators that are commanded; default all.")
-@click.option("--outputs", metavar="X,Y", help="Quantities and signals; default Q, Y, lateral.")
-@click.option("--out", required=True, metavar="F.fmu", help="The unit.")
+@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", Speed())
+@option("--inputs", "Actuators that are commanded; default all.", "A,B")
+@option("--outputs", "Quantities and signals; default Q, Y, lateral.", "X,Y")
+@option("--out", "The unit.", "F.fmu", required=True)
 @extent_options
 @given_options()
 @output_options()

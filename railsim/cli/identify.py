@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import code_options, vehicle_argument
+from railsim.cli.common import code_options, flag, option, vehicle_argument
 from railsim.cli.output import Output, output_options
 from railsim.errors import input_error
 from railsim.files.access import make_folder
@@ -18,37 +18,29 @@ KEPT = "evaluations"
 @click.command()
 @vehicle_argument
 @click.argument("measured", nargs=-1, required=True, metavar="MEASURED.toml ...")
-@click.option(
-    "--parameters",
-    "-p",
+@option(
+    "--parameters -p",
+    "Keys of the vehicle or of `track.`; KEY+KEY: one factor for both; "
+    "KEY:LOW:HIGH[:SPREAD]: bounds and standard deviation known before, as factors.",
+    "KEY[,KEY...]",
     multiple=True,
     required=True,
-    metavar="KEY[,KEY...]",
-    help="Keys of the vehicle or of `track.`; KEY+KEY: one factor for both; "
-    "KEY:LOW:HIGH[:SPREAD]: bounds and standard deviation known before, as factors.",
 )
-@click.option(
-    "--band", default="0.5:30", metavar="LOW:HIGH", help="Frequencies that are compared, in Hz."
-)
-@click.option(
+@option("--band", "Frequencies that are compared, in Hz.", "LOW:HIGH", default="0.5:30")
+@option(
     "--form",
-    type=click.Choice(["history", "spectra", "sections"]),
+    "What is compared.",
+    kind=click.Choice(["history", "spectra", "sections"]),
     default="history",
-    help="What is compared.",
 )
-@click.option(
+@option(
     "--loss",
-    type=click.Choice(["linear", "soft_l1", "huber", "cauchy"]),
+    "Robust ones weigh outliers less.",
+    kind=click.Choice(["linear", "soft_l1", "huber", "cauchy"]),
     default="linear",
-    help="Robust ones weigh outliers less.",
 )
-@click.option("--fixed-place", is_flag=True, help="Do not seek the place of the runs on the track.")
-@click.option(
-    "--workers",
-    type=click.IntRange(1, 256),
-    metavar="N",
-    help="Processes; by default one for each core.",
-)
+@flag("--fixed-place", "Do not seek the place of the runs on the track.")
+@option("--workers", "Processes; by default one for each core.", "N", click.IntRange(1, 256))
 @output_options(
     "Folder for vehicle file, JSON, pictures and a page; an interrupted identification goes on "
     "from what it has kept there."

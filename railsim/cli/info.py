@@ -9,8 +9,10 @@ import click
 from railsim.cli.common import (
     Speed,
     collected,
+    flag,
     json_option,
     load_option,
+    option,
     overwrite_option,
     remarks_on,
     set_option,
@@ -27,21 +29,18 @@ DRAWN = "--draw is for vehicles and tracks"
 
 @click.command()
 @click.argument("file", metavar="F")
-@click.option(
-    "--speed",
-    "speeds",
-    type=Speed(),
-    multiple=True,
-    metavar="V",
-    help="Speed for the cant deficiency in the curves of a track, m/s or with a unit; may be "
+@option(
+    "--speed speeds",
+    "Speed for the cant deficiency in the curves of a track, m/s or with a unit; may be "
     "given several times.",
+    "V",
+    Speed(),
+    multiple=True,
 )
-@click.option(
-    "--static",
-    is_flag=True,
-    help="Also the vehicle at rest, in each load case: wheel loads, heights, springs, stops.",
+@flag(
+    "--static", "Also the vehicle at rest, in each load case: wheel loads, heights, springs, stops."
 )
-@click.option("--draw", metavar="F.png", help="Draw a vehicle in three views, or a track.")
+@option("--draw", "Draw a vehicle in three views, or a track.", "F.png")
 @load_option
 @set_option
 @collected("output", Output, overwrite_option, json_option)

@@ -4,9 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import click
-
-from railsim.cli.common import F, collected, load_option, set_option
+from railsim.cli.common import F, collected, load_option, option, set_option
 from railsim.errors import Faults, input_error
 
 if TYPE_CHECKING:
@@ -66,7 +64,7 @@ def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
     `settings`: what counts of the settings file, by default all.
     """
     words = f"Settings file: {settings}." if settings else "Settings file."
-    options: list[Any] = [click.option("--settings", metavar="F", help=words), set_option]
+    options: list[Any] = [option("--settings", words, "F"), set_option]
     return collected("given", Given, *[load_option] * load, *options)
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import code_options, names_of, rails_option, set_option
+from railsim.cli.common import code_options, names_of, option, rails_option, set_option
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.errors import input_error
@@ -14,36 +14,33 @@ FILES = ("irregularity.json", "irregularity.png")
 
 @click.command()
 @click.argument("measured", shell_complete=names_of("measurement"))
-@click.option("--vehicle", metavar="F", help="The vehicle that measured; default as MEASURED says.")
+@option("--vehicle", "The vehicle that measured; default as MEASURED says.", "F")
 @rails_option
-@click.option(
-    "--spectrum",
-    default="erri_b176_low",
-    metavar="NAME",
-    help="Spectrum that the track is assumed to have.",
+@option(
+    "--spectrum", "Spectrum that the track is assumed to have.", "NAME", default="erri_b176_low"
 )
-@click.option("--scale", type=float, default=1.0, help="Factor on it.")
-@click.option(
+@option("--scale", "Factor on it.", kind=float, default=1.0)
+@option(
     "--wavelengths",
-    type=float,
+    "Shortest and longest wavelength of the track in m.",
+    "A B",
+    float,
     nargs=2,
     default=(3.0, 100.0),
-    metavar="A B",
-    help="Shortest and longest wavelength of the track in m.",
 )
-@click.option(
+@option(
     "--noise",
-    type=float,
+    "rms noise of an accelerometer in m/s2, where MEASURED has none.",
+    "A",
+    float,
     default=0.05,
-    metavar="A",
-    help="rms noise of an accelerometer in m/s2, where MEASURED has none.",
 )
-@click.option(
+@option(
     "--simulations",
-    type=click.IntRange(min=0),
+    "Most simulated runs for 2 km of the record; 0: the linear estimate.",
+    "N",
+    click.IntRange(min=0),
     default=25,
-    metavar="N",
-    help="Most simulated runs for 2 km of the record; 0: the linear estimate.",
 )
 @set_option
 @output_options("Folder for recording, track, estimates, forces.")

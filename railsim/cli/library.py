@@ -5,13 +5,13 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import collected, json_option, overwrite_option
+from railsim.cli.common import collected, json_option, option, overwrite_option
 from railsim.cli.output import Output
 
 
 @click.command()
 @click.argument("kinds", nargs=-1, metavar="[KIND]...")
-@click.option("--draw", metavar="DIR", help="Draw every listed vehicle and track into this folder.")
+@option("--draw", "Draw every listed vehicle and track into this folder.", "DIR")
 @collected("output", Output, overwrite_option, json_option)
 def command(kinds: tuple[str, ...], draw: str | None, output: Output) -> None:
     """List everything that can be given by its bare name: vehicles, tracks, profiles, laws ...

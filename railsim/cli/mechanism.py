@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import faults_in, set_option
+from railsim.cli.common import COUNT, faults_in, flag, option, set_option
 from railsim.cli.output import Output, output_options
 
 if TYPE_CHECKING:
@@ -20,25 +20,15 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@click.option(
-    "--optimise", "searched", is_flag=True, help="Search as specified in the table [optimise]."
-)
-@click.option(
-    "--starts",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Number of starting points of the search.",
-)
-@click.option(
-    "--seed", type=click.IntRange(min=0), metavar="S", help="Seed of the starting points."
-)
-@click.option("--case", metavar="NAME", help="Case of the file instead of its base.")
-@click.option(
+@flag("--optimise searched", "Search as specified in the table [optimise].")
+@option("--starts", "Number of starting points of the search.", "N", COUNT)
+@option("--seed", "Seed of the starting points.", "S", click.IntRange(min=0))
+@option("--case", "Case of the file instead of its base.", "NAME")
+@option(
     "--at",
-    "at",
+    "Also print all results at a given value of one of them (SI), such as height=0.8955.",
+    "NAME=VALUE",
     multiple=True,
-    metavar="NAME=VALUE",
-    help="Also print all results at a given value of one of them (SI), such as height=0.8955.",
 )
 @set_option
 @output_options(f"Folder for {REPORT}, pictures, animation, positions.csv.")

@@ -12,7 +12,9 @@ import click
 from railsim.cli.common import (
     Speed,
     code_options,
+    flag,
     linearisation_options,
+    option,
     optional_track,
     vehicle_argument,
 )
@@ -33,37 +35,33 @@ CYCLE = {"frames": 40, "cycles": 1}
 @click.command()
 @vehicle_argument
 @optional_track
-@click.option(
-    "--speed", type=Speed(), default=20.0, metavar="V", help="Speed in m/s, or with a unit: 72km/h."
-)
-@click.option("--speeds", metavar="A:B:N", help="N speeds from A to B: a root locus.")
-@click.option(
+@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", Speed(), default=20.0)
+@option("--speeds", "N speeds from A to B: a root locus.", "A:B:N")
+@option(
     "--over",
-    metavar="KEY.PATH=A:B:N",
-    help="Root locus over a key of the vehicle, track or settings at --speed.",
+    "Root locus over a key of the vehicle, track or settings at --speed.",
+    "KEY.PATH=A:B:N",
 )
-@click.option("--held", is_flag=True, help="Hold the wheelsets.")
-@click.option(
+@flag("--held", "Hold the wheelsets.")
+@option(
     "--hold",
+    "Hold this body in the moving track frame; may be given several times.",
+    "BODY",
     multiple=True,
-    metavar="BODY",
-    help="Hold this body in the moving track frame; may be given several times.",
 )
 @linearisation_options
-@click.option("--conicity", type=float, metavar="G", help="Straight cones of this slope as wheels.")
-@click.option(
+@option("--conicity", "Straight cones of this slope as wheels.", "G", float)
+@option(
     "--radius",
-    type=float,
+    "Radius of the track in m, positive to the right; default straight.",
+    "R",
+    float,
     default=math.inf,
     show_default=False,
-    metavar="R",
-    help="Radius of the track in m, positive to the right; default straight.",
 )
-@click.option("--cant", type=float, default=0.0, metavar="H", help="Cant of the track in m.")
-@click.option(
-    "--animate",
-    metavar="NAME",
-    help="Begin the animated page of --out with this mode, and call it mode.html.",
+@option("--cant", "Cant of the track in m.", "H", float, default=0.0)
+@option(
+    "--animate", "Begin the animated page of --out with this mode, and call it mode.html.", "NAME"
 )
 @given_options("creep law and contact")
 @output_options(

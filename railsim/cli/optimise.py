@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import code_options, names_of, scheduler_option, workers_option
+from railsim.cli.common import (
+    COUNT,
+    code_options,
+    flag,
+    names_of,
+    option,
+    scheduler_option,
+    workers_option,
+)
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
@@ -19,26 +27,23 @@ MOST_ROWS = 15
 
 @click.command()
 @click.argument("study", shell_complete=names_of("study"))
-@click.option("--out", default="optimise", metavar="DIR", help="Folder.")
-@click.option(
+@option("--out", "Folder.", "DIR", default="optimise")
+@option(
     "--method",
-    type=click.Choice(["surrogate", "nsga2", "differential_evolution"]),
-    help="Instead of the file's. nsga2 needs pip install 'railsim[optimise]'.",
+    "Instead of the file's. nsga2 needs pip install 'railsim[optimise]'.",
+    kind=click.Choice(["surrogate", "nsga2", "differential_evolution"]),
 )
-@click.option(
-    "--evaluations", type=click.IntRange(min=1), metavar="N", help="Designs, instead of the file's."
-)
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Instead of the file's.")
-@click.option(
+@option("--evaluations", "Designs, instead of the file's.", "N", COUNT)
+@option("--seed", "Instead of the file's.", "N", click.IntRange(min=0))
+@option(
     "--choose",
-    type=int,
-    metavar="N",
-    help="Design that becomes a vehicle file; by default the one nearest to the best of each "
-    "objective.",
+    "Design that becomes a vehicle file; by default the one nearest to the best of each objective.",
+    "N",
+    int,
 )
 @workers_option
 @scheduler_option
-@click.option("--resume", is_flag=True, help="Continue in DIR although STUDY has changed.")
+@flag("--resume", "Continue in DIR although STUDY has changed.")
 @output_options()
 @code_options
 def command(study: str, output: Output, **how: Any) -> None:

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from railsim.cli.common import (
     F,
     collected,
     echo,
     json_option,
+    option,
     overwrite_option,
     plain,
     print_json,
@@ -139,7 +138,7 @@ def output_options(out: str = "") -> Callable[[F], F]:
 
     The command takes them as `output`.
     """
-    folder = [click.option("--out", metavar="DIR", help=out)] if out else []
+    folder = [option("--out", out, "DIR")] if out else []
     return collected("output", Output, *folder, overwrite_option, json_option, quiet_option)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from railsim.cli.common import option
 from railsim.cli.gathered import folder_of, gather
 from railsim.cli.output import Output, output_options
 from railsim.errors import Fault, Faults, input_error, nearest
@@ -24,30 +25,26 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 @click.command()
 @click.argument("file", metavar="R.h5|STUDY|TRACK")
 @click.argument("selections", nargs=-1, metavar="[QUANTITY]...")
-@click.option("--out", metavar="F.png", help="Picture (.png, .svg, .pdf); default FILE.png.")
-@click.option(
+@option("--out", "Picture (.png, .svg, .pdf); default FILE.png.", "F.png")
+@option(
     "--over",
-    type=click.Choice(["distance", "time"]),
+    "Horizontal axis; the distance is that of the reference body.",
+    kind=click.Choice(["distance", "time"]),
     default="distance",
-    help="Horizontal axis; the distance is that of the reference body.",
 )
-@click.option(
+@option(
     "--by",
-    type=click.Choice(["wheel", "wheelset"]),
+    "All wheels in one pair of axes, or one pair of axes for each wheelset.",
+    kind=click.Choice(["wheel", "wheelset"]),
     default="wheel",
-    help="All wheels in one pair of axes, or one pair of axes for each wheelset.",
 )
-@click.option(
-    "--between", type=float, nargs=2, metavar="A B", help="Range of the horizontal axis to show."
-)
-@click.option("--against", metavar="KEY", help="Of a study: the parameter of the horizontal axis.")
-@click.option(
-    "--family", metavar="KEY", help="Of a study: the parameter with a curve for each value."
-)
-@click.option(
+@option("--between", "Range of the horizontal axis to show.", "A B", float, nargs=2)
+@option("--against", "Of a study: the parameter of the horizontal axis.", "KEY")
+@option("--family", "Of a study: the parameter with a curve for each value.", "KEY")
+@option(
     "--kind",
-    type=click.Choice(["curves", "map", "ranking"]),
-    help="Of a study: curves; colours over two parameters; the runs by their values.",
+    "Of a study: curves; colours over two parameters; the runs by their values.",
+    kind=click.Choice(["curves", "map", "ranking"]),
 )
 @output_options()
 def command(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from railsim.cli.common import option
 from railsim.cli.output import Output, output_options
 from railsim.files.access import whole_file
 
@@ -19,14 +20,14 @@ ENDINGS = (".html", ".htm")
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="DIR_OR_FILES...")
-@click.option("--out", default="report.html", metavar="F.html", help="Page.")
-@click.option("--title", metavar="TEXT", help="Title; by default the names of what is reported.")
-@click.option(
+@option("--out", "Page.", "F.html", default="report.html")
+@option("--title", "Title; by default the names of what is reported.", "TEXT")
+@option(
     "--curves",
-    type=click.IntRange(min=1, max=16),
+    "Runs whose curves are shown; of more, those with the largest values.",
+    "N",
+    click.IntRange(min=1, max=16),
     default=8,
-    metavar="N",
-    help="Runs whose curves are shown; of more, those with the largest values.",
 )
 @output_options()
 def command(files: tuple[str, ...], title: str | None, curves: int, output: Output) -> None:

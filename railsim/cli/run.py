@@ -9,6 +9,8 @@ from railsim.cli.common import (
     Speed,
     code_options,
     extent_options,
+    flag,
+    option,
     show,
     track_argument,
     vehicle_argument,
@@ -29,19 +31,13 @@ if TYPE_CHECKING:
 @click.command()
 @vehicle_argument
 @track_argument
-@click.option("--speed", type=Speed(), metavar="V", help="Speed in m/s, or with a unit: 72km/h.")
-@click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
+@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", Speed())
+@option("--out", "Result file; default VEHICLE_TRACK_SPEED.h5.", "R.h5")
 @extent_options
-@click.option(
-    "--continue", "before", metavar="R.h5", help="Begin where this result of the same inputs ended."
-)
+@option("--continue before", "Begin where this result of the same inputs ended.", "R.h5")
 @given_options()
-@click.option(
-    "--plots",
-    is_flag=True,
-    help="Also plot the result; the picture is written next to the file (.png).",
-)
-@click.option("--check-step", is_flag=True, help="Run again at half the step and compare peaks.")
+@flag("--plots", "Also plot the result; the picture is written next to the file (.png).")
+@flag("--check-step", "Run again at half the step and compare peaks.")
 @output_options()
 @code_options
 def command(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, faults_in, set_option
+from railsim.cli.common import echo, faults_in, flag, option, set_option
 from railsim.cli.output import Output, output_options
 from railsim.files.access import TABLES, is_file, whole_file
 
@@ -42,7 +42,7 @@ def _spring_command(function: Any) -> Any:
 
 
 @_spring_command
-@click.option("--search", is_flag=True, help="Also search the nests that fit the table [search].")
+@flag("--search", "Also search the nests that fit the table [search].")
 def design(file: str, search: bool, assignments: tuple[str, ...], output: Output) -> None:
     """Find stiffnesses and numbers of coils of the springs for two required deflections.
 
@@ -144,9 +144,9 @@ def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
 
 @command.command()
 @click.argument("file")
-@click.option("--out", metavar="F.toml", help="Vehicle file to write; by default to stdout.")
-@click.option("--load", metavar="NAME", help="Load at which the stiffness of the springs is taken.")
-@click.option("--extends", metavar="VEHICLE", help="Vehicle to extend instead of vehicle.extends.")
+@option("--out", "Vehicle file to write; by default to stdout.", "F.toml")
+@option("--load", "Load at which the stiffness of the springs is taken.", "NAME")
+@option("--extends", "Vehicle to extend instead of vehicle.extends.", "VEHICLE")
 @set_option
 @output_options()
 def vehicle(

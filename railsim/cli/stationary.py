@@ -2,7 +2,7 @@
 
 import click
 
-from railsim.cli.common import code_options, fail_option, rails_option
+from railsim.cli.common import code_options, fail_option, flag, option, rails_option
 from railsim.cli.inputs import Given, given_options
 from railsim.cli.output import Output, output_options
 
@@ -11,11 +11,9 @@ FILES = ("stationary.json", "stationary.png")
 
 @click.command()
 @click.argument("vehicle")
-@click.option("--cant", type=float, metavar="H", help="Default: the admissible cant deficiency, m.")
-@click.option("--rolling", is_flag=True, help="Do not hold the wheelsets across the track.")
-@click.option(
-    "--limits", default="stationary", metavar="F", help="Limits file, or the name of a shipped one."
-)
+@option("--cant", "Default: the admissible cant deficiency, m.", "H", float)
+@flag("--rolling", "Do not hold the wheelsets across the track.")
+@option("--limits", "Limits file, or the name of a shipped one.", "F", default="stationary")
 @rails_option
 @fail_option
 @given_options("creep law and contact")

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    COUNT,
     code_options,
     collected,
     echo,
     extent_options,
+    flag,
     names_of,
+    option,
     scheduler_option,
     workers_option,
 )
@@ -107,66 +110,66 @@ class Asked:
 @collected(
     "asked",
     Asked,
-    click.option(
+    option(
         "--vehicles",
+        "Vehicles: files or names.",
+        "F...",
         multiple=True,
-        metavar="F...",
-        help="Vehicles: files or names.",
         shell_complete=names_of("vehicle"),
     ),
-    click.option(
+    option(
         "--tracks",
+        "Tracks: files or names.",
+        "F...",
         multiple=True,
-        metavar="F...",
-        help="Tracks: files or names.",
         shell_complete=names_of("track"),
     ),
-    click.option(
+    option(
         "--speeds",
-        multiple=True,
-        metavar="V...",
-        help="Speeds in m/s, or with a unit (72km/h); ranges first:last:number; permitted: the "
+        "Speeds in m/s, or with a unit (72km/h); ranges first:last:number; permitted: the "
         "lower of the vehicle's and the track's speed.",
-    ),
-    click.option(
-        "--grid",
+        "V...",
         multiple=True,
-        metavar="KEY.PATH=A,B,C...",
-        help="Values of further keys, or ranges first:last:number; paths begin with vehicle., "
+    ),
+    option(
+        "--grid",
+        "Values of further keys, or ranges first:last:number; paths begin with vehicle., "
         "track. or settings.",
+        "KEY.PATH=A,B,C...",
+        multiple=True,
     ),
     extent_options,
 )
-@click.option(
+@option(
     "--quantities",
-    metavar="FILE.py:FUNCTION",
-    help="Function called with each result; it returns further numbers by name.",
+    "Function called with each result; it returns further numbers by name.",
+    "FILE.py:FUNCTION",
 )
-@click.option("--scenario", metavar="F", help="Scenario instead of tracks and speeds.")
-@click.option("--out", default="study", metavar="DIR", help="Folder.")
+@option("--scenario", "Scenario instead of tracks and speeds.", "F")
+@option("--out", "Folder.", "DIR", default="study")
 @given_options()
 @workers_option
-@click.option(
+@option(
     "--together",
-    type=click.IntRange(min=1),
-    default=1,
-    metavar="N",
-    help="Up to N runs that differ in the vehicle only are computed in one call of the time loop: "
+    "Up to N runs that differ in the vehicle only are computed in one call of the time loop: "
     "same results, 15 to 20 % less CPU time in the loop. Runs with different time steps are "
     "computed separately.",
+    "N",
+    COUNT,
+    default=1,
 )
 @scheduler_option
-@click.option("--resume", is_flag=True, help="Continue the study in DIR; compute what has changed.")
-@click.option(
+@flag("--resume", "Continue the study in DIR; compute what has changed.")
+@option(
     "--keep",
+    "all; summary: no result files; or quantities such as Q,Y,wheelset_*.",
+    "WHAT",
     default="all",
-    metavar="WHAT",
-    help="all; summary: no result files; or quantities such as Q,Y,wheelset_*.",
 )
-@click.option("--compress", is_flag=True, help="Store arrays compressed, without loss.")
-@click.option("--single", is_flag=True, help="Store arrays with 4 bytes a number: 7 digits.")
-@click.option("--plots", is_flag=True, help="Plot every run, and the vehicles against each other.")
-@click.option("--report", is_flag=True, help="Write report.html into DIR, see `railsim report`.")
+@flag("--compress", "Store arrays compressed, without loss.")
+@flag("--single", "Store arrays with 4 bytes a number: 7 digits.")
+@flag("--plots", "Plot every run, and the vehicles against each other.")
+@flag("--report", "Write report.html into DIR, see `railsim report`.")
 @output_options()
 @code_options
 def command(

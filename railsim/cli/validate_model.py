@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import code_options, fail_option, names_of
+from railsim.cli.common import code_options, fail_option, names_of, option
 from railsim.cli.output import Output, output_options
 from railsim.files.access import RESULTS
 
@@ -19,17 +19,17 @@ FILES = ("model_validation.json", "sections.csv", "report.html", "scatter.png", 
 
 @click.command(name="validate-model")
 @click.argument("files", nargs=-1, required=True, metavar="MEASURED.toml ... [RESULT.h5|DIR ...]")
-@click.option(
+@option(
     "--vehicle",
-    metavar="F",
+    "Vehicle to simulate, where no results are given; default: the measurement's.",
+    "F",
     shell_complete=names_of("vehicle"),
-    help="Vehicle to simulate, where no results are given; default: the measurement's.",
 )
-@click.option(
+@option(
     "--limits",
-    metavar="F",
+    "Limits of the differences: a file, or the name of a shipped one.",
+    "F",
     default="validation_en14363_t",
-    help="Limits of the differences: a file, or the name of a shipped one.",
 )
 @fail_option
 @output_options("Folder for JSON, CSV, pictures and a page.")

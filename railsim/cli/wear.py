@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Speed, allow_code_option, track_argument, vehicle_argument
+from railsim.cli.common import Speed, allow_code_option, option, track_argument, vehicle_argument
 from railsim.cli.inputs import Given, given_options
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
@@ -21,41 +21,28 @@ MOST_STEPS = 1000
 Mix = tuple[tuple[str, float, float], ...]
 Rows = Mapping[str, list[dict[str, float | None]]]
 
-law_option = click.option(
-    "--law",
-    default="pearce_sherratt",
-    metavar="NAME_OR_FILE",
-    help="Law of wear; a wrong name shows all.",
+law_option = option(
+    "--law", "Law of wear; a wrong name shows all.", "NAME_OR_FILE", default="pearce_sherratt"
 )
 
 
 @click.command()
 @vehicle_argument
-@click.option(
-    "--route",
-    "routes",
+@option(
+    "--route routes",
+    "A track, its speed in m/s or with a unit, and its share of the distance in any unit; may "
+    "be repeated.",
+    "TRACK V SHARE",
+    (str, Speed(), float),
     required=True,
     multiple=True,
-    type=(str, Speed(), float),
-    metavar="TRACK V SHARE",
-    help="A track, its speed in m/s or with a unit, and its share of the distance in any unit; may "
-    "be repeated.",
 )
-@click.option("--distance", required=True, type=float, metavar="KM", help="Distance to run in km.")
-@click.option(
-    "--step",
-    required=True,
-    type=float,
-    metavar="KM",
-    help="Distance in km between two updates of the wheel profile.",
+@option("--distance", "Distance to run in km.", "KM", float, required=True)
+@option(
+    "--step", "Distance in km between two updates of the wheel profile.", "KM", float, required=True
 )
 @law_option
-@click.option(
-    "--limits",
-    default="wheel",
-    metavar="F",
-    help="Limits of flange and tread at which the loop ends.",
-)
+@option("--limits", "Limits of flange and tread at which the loop ends.", "F", default="wheel")
 @given_options("creep law and contact")
 @output_options("Folder for wear.json, wear.png and the profiles.")
 @allow_code_option
@@ -96,24 +83,18 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
 
 @click.command()
 @track_argument
-@click.option(
+@option(
     "--traffic",
+    "A vehicle, its speed in m/s or with a unit, and its share of the tonnage in any unit; "
+    "may be repeated.",
+    "VEHICLE V SHARE",
+    (str, Speed(), float),
     required=True,
     multiple=True,
-    type=(str, Speed(), float),
-    metavar="VEHICLE V SHARE",
-    help="A vehicle, its speed in m/s or with a unit, and its share of the tonnage in any unit; "
-    "may be repeated.",
 )
-@click.option(
-    "--tonnage", "distance", required=True, type=float, metavar="MT", help="Traffic in Mt."
-)
-@click.option(
-    "--step",
-    required=True,
-    type=float,
-    metavar="MT",
-    help="Tonnage in Mt between two updates of the rail profiles.",
+@option("--tonnage distance", "Traffic in Mt.", "MT", float, required=True)
+@option(
+    "--step", "Tonnage in Mt between two updates of the rail profiles.", "MT", float, required=True
 )
 @law_option
 @given_options("creep law and contact", load=False)
