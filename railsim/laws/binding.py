@@ -19,8 +19,8 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import InputError, input_error
 from railsim.laws.permission import check_laws, digest
@@ -74,7 +74,7 @@ class Bound:
     defaults: Mapping[str, float]
     kept: tuple[Any, ...]
 
-    def values(self, given: NDArray[np.float64], parameters: Sequence[float]) -> Any:
+    def values(self, given: Floats, parameters: Sequence[float]) -> Any:
         """What a law of one value gives, called beside the loop.
 
         `parameters`: as `parameters` returns them.

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -31,7 +32,6 @@ from railsim.model.control import with_control
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 
-Floats = NDArray[np.float64]
 COMMAND_STEP = 1.0  # unit of the command
 
 

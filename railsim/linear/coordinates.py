@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
@@ -23,7 +24,6 @@ from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 TRACK_PARTS = (

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq, linear_sum_assignment
 
+from railsim.arrays import Floats
 from railsim.linear.system import Linearisation
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 At = Callable[[float], Linearisation]
 

@@ -16,12 +16,10 @@ so that a motion along the path has just these forces, and the tangent is the li
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError, argument_error
 from railsim.linear.coordinates import FreeVehicle
-
-Floats = NDArray[np.float64]
 
 ANGLES = 24
 BALANCED = 1e-2  # N and N m, of a wheelset's vertical force and roll moment

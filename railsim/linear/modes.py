@@ -23,7 +23,6 @@ from railsim.profiles import Profile
 from railsim.table import Column, Table
 from railsim.units import speed_in_si
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 SPEED_RANGE = (0.5, 150.0)  # m/s

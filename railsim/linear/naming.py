@@ -25,12 +25,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 NEAR_ZERO = 0.05  # 1/s, |lambda| of rolling

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.kernels.internal import PAD
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.step_rk4 import settle_limits
 from railsim.kernels.system import System
-from railsim.linear.steady import Floats, NotConverged, SteadyRolling
+from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 
 SMALLEST = 1.0 / 256.0  # part of the way between two states at which a path ends

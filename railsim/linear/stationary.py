@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
 from railsim.definitions.track.definition import Track
 from railsim.kernels.aligned import aligned
@@ -24,8 +24,6 @@ from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.work import level_track
 from railsim.track.tables import track_tables
-
-Floats = NDArray[np.float64]
 
 WALKING_PACE = 1.0  # m/s
 PARTS = 8  # steps to a twist where friction follows

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
@@ -29,8 +30,6 @@ from railsim.linear.coordinates import track_indices
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, components_of, without_loads, work_arrays
 from railsim.notation import COMPONENTS
-
-Floats = NDArray[np.float64]
 
 RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
 GOOD_ENOUGH = 1e-5  # the same where rounding and the cells of the creep law let it be no smaller

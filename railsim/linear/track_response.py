@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import schur
 
+from railsim.arrays import Floats
 from railsim.constants import CANT_BASE, GRAVITY
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import System
@@ -34,7 +35,6 @@ from railsim.linear.coordinates import Coordinates, FreeVehicle
 from railsim.linear.vehicle import LinearVehicle
 from railsim.result.sensors import Sensor
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 

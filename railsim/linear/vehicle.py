@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.creep_law import CREEP_LAWS
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
@@ -27,8 +27,6 @@ from railsim.model.work import without_loads
 from railsim.profiles import Profile
 from railsim.profiles.builtin import cone
 from railsim.track.tables import track_tables
-
-Floats = NDArray[np.float64]
 
 WALKING_PACE = 1.0  # m/s
 AMPLITUDE = 3e-3  # m, of the wheelsets where the linearisation is harmonic (EN 14363 practice)

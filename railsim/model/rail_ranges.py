@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import gauge_face
 from railsim.contact.section_tables import Range, cached_section_table
 from railsim.contact.table import ContactTable, Normal
@@ -21,7 +22,6 @@ from railsim.kernels.contact_table import N_FIELD, N_PATCH, RailTables
 from railsim.profiles.profile import Profile
 
 Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ from html import escape
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import input_error
 from railsim.text import printable, shortened
 
@@ -54,12 +54,12 @@ class Profile:
 
     name: str
     kind: Kind
-    y: NDArray[np.float64]
-    z: NDArray[np.float64]
+    y: Floats
+    z: Floats
     source: str = ""
     inclination: float = 0.0
     notes: tuple[str, ...] = field(default=())
-    measured: NDArray[np.float64] | None = field(default=None, repr=False)
+    measured: Floats | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("y", "z"):

@@ -10,11 +10,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.stability.motion import Stretch
-
-Floats = NDArray[np.float64]
 
 THRESHOLD = 0.05e-3  # m, amplitude below which nothing hunts
 RESOLUTION = 0.1  # m/s, of ends and jumps

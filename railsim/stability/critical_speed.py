@@ -6,8 +6,8 @@ from functools import lru_cache
 from numbers import Real
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
@@ -276,7 +276,7 @@ def _conicity(prepared: LinearVehicle) -> Conicity | None:
 
 
 @lru_cache(8)  # maps and optimisations ask for the same geometry over and over
-def _conicities(geometry: ContactGeometry) -> NDArray[np.float64]:
+def _conicities(geometry: ContactGeometry) -> Floats:
     return geometry.equivalent_conicity(OF_CONICITY)
 
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.cant import curve_speed
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
@@ -41,7 +42,6 @@ from railsim.simulation.outputs import against_rails
 from railsim.table import Column, Table
 from railsim.track.tables import track_tables
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m

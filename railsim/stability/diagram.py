@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.stability.branches import (
     DROP,
     RESOLUTION,
@@ -21,16 +22,7 @@ from railsim.stability.branches import (
     seen_at,
 )
 from railsim.stability.motion import LeftRange, Motion, Stretch
-from railsim.stability.ramp import (
-    CHANGE,
-    EXCITATIONS,
-    SMALL,
-    WINDOW,
-    Floats,
-    Progress,
-    hunting,
-    moved,
-)
+from railsim.stability.ramp import CHANGE, EXCITATIONS, SMALL, WINDOW, Progress, hunting, moved
 
 ALIKE = 0.1  # relative difference of two amplitudes at a speed that count as one motion
 NEAR = 0.03  # relative difference of amplitudes that need not settle further

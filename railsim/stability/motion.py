@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.status import RUNNING, STATUS
@@ -23,8 +23,6 @@ from railsim.linear.vehicle import LinearVehicle
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
 from railsim.model.work import work_arrays
 from railsim.simulation.outputs import against_rails
-
-Floats = NDArray[np.float64]
 
 OUTPUT_RATE = 200.0  # 1/s
 LONGEST = 1.0  # s of a stretch that the table of the track holds

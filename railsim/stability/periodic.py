@@ -23,9 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
-
-Floats = NDArray[np.float64]
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
 MOST_ITERATIONS = 20

@@ -8,12 +8,11 @@ Kaiser 2012).
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.stability.branches import RESOLUTION, THRESHOLD, Branch, Point, seen_at
 from railsim.stability.motion import LeftRange, Motion, Stretch
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 WINDOW = 1.0  # s, over which an amplitude is taken

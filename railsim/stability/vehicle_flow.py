@@ -8,14 +8,13 @@ rates are counted from steady rolling at the speed at hand.
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS, SPEED
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.work import CONSTANT_SPEED
 from railsim.stability.motion import LeftRange, VehicleMotion
-
-Floats = NDArray[np.float64]
 
 # least sizes by which components are scaled, a difference quotient takes 1e-5 of them
 LENGTH, RATE, FORCE, ACCELERATION, DRIVE = 1e-4, 1e-3, 100.0, 0.1, 1e-3

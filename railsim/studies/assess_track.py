@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from railsim.arrays import Floats
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.limits import Situation
@@ -38,8 +39,6 @@ from railsim.studies.points import Point
 from railsim.studies.records import Record
 from railsim.studies.spec import Execution, RunSpec, StudySpec
 from railsim.table import Column, Table
-
-Floats = NDArray[np.float64]
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
 APART = 25.0  # m

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Constraint, Objective, Optimise, Value, Variable
 from railsim.errors import Fault, InputError, nearest
 from railsim.studies.outcome import Outcome
 from railsim.studies.records import Record
-from railsim.studies.search import Floats, Values
+from railsim.studies.search import Values
 from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.study import run_study
 from railsim.studies.summary import summary_row, unit_of
@@ -171,7 +171,7 @@ def share_of(variable: Variable, value: float) -> float:
     return (value - variable.low) / (variable.high - variable.low)
 
 
-def signs_of(wanted: Optimise) -> NDArray[np.float64]:
+def signs_of(wanted: Optimise) -> Floats:
     """Return 1 for each objective to minimise, -1 for each to maximise."""
     return np.array([1.0 if one.goal == "minimise" else -1.0 for one in wanted.objectives])
 

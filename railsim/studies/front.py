@@ -6,7 +6,7 @@ All objectives are minimised; callers change the sign of objectives to maximise.
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from railsim.arrays import Floats
 
 
 def non_dominated(values: Floats) -> NDArray[np.bool_]:

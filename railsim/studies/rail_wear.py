@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.wear import WearLaw
 from railsim.assessment.wear_depth import rail_depth
 from railsim.constants import GRAVITY
@@ -14,7 +15,6 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.notation import SIDES
 from railsim.profiles import load_profile
 from railsim.result import Result
-from railsim.result.filters import Floats
 from railsim.studies.wear_loop import Loop, Run, Wearing, WearStep, carry_out, row, since_new
 
 

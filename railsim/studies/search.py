@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import input_error
 from railsim.studies.front import non_dominated
-
-Floats = NDArray[np.float64]
 
 CANDIDATES = 512  # candidates for a batch, from Sobol's sequence
 NEAR = 256  # further candidates about members of the front, at each distance

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.studies.search import Surrogate
 
-Floats = NDArray[np.float64]
 SAMPLES = 1024  # a power of two, times the number of variables and two
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.cant import cant_deficiency
 from railsim.constants import CANT_BASE
 from railsim.definitions.limits import StationaryLimits, Value
@@ -41,7 +42,6 @@ from railsim.linear.steady import NotConverged
 from railsim.model.assembly import Model, assemble
 from railsim.model.equilibrium import Equilibrium, equilibrium
 from railsim.notation import SIDES
-from railsim.result.filters import Floats
 from railsim.stability.curving import FAILED, curving
 from railsim.table import Amount, Column, Table
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.wear import DEFAULT_LAW, WearLaw, wear_law
 from railsim.assessment.wear_depth import parts_of_step, wheel_dimensions, worn_depth, worn_profile
 from railsim.contact import contact_geometry
@@ -29,7 +30,6 @@ from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError, ModelError, RailsimError, input_error
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
-from railsim.result.filters import Floats
 from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
 from railsim.studies.records import read_record, write_record
