@@ -25,7 +25,7 @@ from railsim.assessment.model_comparison import (
 from railsim.assessment.sections import TestSection, section_length, track_sections
 from railsim.assessment.signals import OUTWARDS, Band, Signal
 from railsim.definitions.limits import RunningLimits, ValidationLimits
-from railsim.definitions.loading import load_running_limits, load_track, load_validation_limits
+from railsim.definitions.loading import load, load_running_limits, load_track
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.loads import DESIGN
@@ -86,7 +86,7 @@ def validate_model(
         words = f"{len(found)} results for {len(runs)} measured runs"
         raise InputError([argument_fault("results", "", words, "one for each")])
     if not isinstance(limits, ValidationLimits):
-        limits = load_validation_limits(limits)
+        limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))
     if unknown:
         raise InputError([Fault("limits", f"limits.{unknown[0]}", "unknown quantity",

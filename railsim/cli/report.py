@@ -9,7 +9,7 @@ import click
 
 from railsim.cli.common import option
 from railsim.cli.output import Output, output_options
-from railsim.files.access import whole_file
+from railsim.files.access import write_text
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment
@@ -68,8 +68,7 @@ def write_report(
     parts = [read_part(file) for file in files if is_measured(file)]
     files = [file for file in files if not is_measured(file)]
     if not files:
-        with whole_file(path) as partial:
-            partial.write_text(measured_page(parts, title), encoding="utf-8")
+        write_text(path, measured_page(parts, title))
         return
     found = gather(files)
     with_files = [record for record in found.records if record["name"] in found.paths]
@@ -91,8 +90,7 @@ def write_report(
         assessments,
         [as_section(part, number) for number, part in enumerate(parts, start=1)],
     )
-    with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _used(folder: Path) -> "list[Used]":

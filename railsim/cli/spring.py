@@ -10,7 +10,7 @@ import click
 
 from railsim.cli.common import echo, faults_in, flag, option, set_option
 from railsim.cli.output import Output, output_options
-from railsim.files.access import TABLES, is_file, whole_file
+from railsim.files.access import TABLES, is_file, write_text
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
@@ -173,8 +173,7 @@ def vehicle(
         base, removed = _base(suspension, extends, out)
         text = vehicle_text(suspension, part, base, removed)
         if out:
-            with whole_file(out) as partial:
-                partial.write_text(text, encoding="utf-8")
+            write_text(out, text)
             output.written.append(out)
     for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
         if not output.quiet:

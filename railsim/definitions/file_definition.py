@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from railsim.definitions.base import Definition, Remark
 from railsim.definitions.faults import validation_faults
 from railsim.errors import Fault, InputError
-from railsim.files.access import check_file, whole_file
+from railsim.files.access import check_file, write_text
 from railsim.files.overrides import apply_overrides, with_values
 from railsim.files.sources import Source, text_source
 from railsim.table import Table
@@ -90,8 +90,7 @@ class FileDefinition(Definition):
         """
         path = Path(path)
         check_file(path, overwrite=overwrite, endings=[".toml"])
-        with whole_file(path) as partial:
-            partial.write_text(self.to_toml(), encoding="utf-8")
+        write_text(path, self.to_toml())
         return path
 
     def replace(self, **changes: Any) -> Self:

@@ -25,11 +25,9 @@ if TYPE_CHECKING:
         ComfortLimits,
         RunningLimits,
         StationaryLimits,
-        ValidationLimits,
         WheelLimits,
     )
     from railsim.definitions.mechanism.definition import Mechanism
-    from railsim.definitions.published import Published
     from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.study.definition import Study
     from railsim.definitions.study.scenario import Scenario
@@ -77,7 +75,8 @@ FORMATS = _Formats()
 """Every definition of a file by its `format` key."""
 
 
-def _load(model: type[D], path: str | Path, overrides: Overrides = ()) -> D:
+def load(model: type[D], path: str | Path, overrides: Overrides = ()) -> D:
+    """Load a file of a kind, or a shipped one by its name."""
     return loaded(model, _file_source(path, model.KIND), overrides)
 
 
@@ -105,26 +104,26 @@ def load_vehicle(path: str | Path, overrides: Overrides = ()) -> Vehicle:
     >>> load_vehicle("coach_manchester", ["bodies.carbody.mass=40e3"]).bodies["carbody"].mass
     40000.0
     """
-    return _load(Vehicle, path, overrides)
+    return load(Vehicle, path, overrides)
 
 
 def load_track(path: str | Path, overrides: Overrides = ()) -> Track:
     """Load a track from a file, or a shipped one by its name; as `load_vehicle`."""
-    return _load(Track, path, overrides)
+    return load(Track, path, overrides)
 
 
 def load_settings(path: str | Path | None = None, overrides: Overrides = ()) -> Settings:
     """Load settings from a file, or the default ones; as `load_vehicle`."""
     if path is None:
         return loaded(Settings, Source("settings", {"format": Settings.format_name()}), overrides)
-    return _load(Settings, path, overrides)
+    return load(Settings, path, overrides)
 
 
 def load_spring(path: str | Path, overrides: Overrides = ()) -> "TrailingArmSuspension":
     """Load a spring file, or a shipped one by its name; as `load_vehicle`."""
     from railsim.definitions.spring import TrailingArmSuspension
 
-    return _load(TrailingArmSuspension, path, overrides)
+    return load(TrailingArmSuspension, path, overrides)
 
 
 def load_mechanism(path: str | Path, overrides: Overrides = ()) -> "Mechanism":
@@ -153,42 +152,35 @@ def load_scenario(path: str | Path, overrides: Overrides = ()) -> "Scenario":
     """Load a scenario, or a shipped one by its name; as `load_vehicle`."""
     from railsim.definitions.study.scenario import Scenario
 
-    return _load(Scenario, path, overrides)
+    return load(Scenario, path, overrides)
 
 
 def load_running_limits(path: str | Path, overrides: Overrides = ()) -> "RunningLimits":
     """Load the limits of running tests, or shipped ones by their name; as `load_vehicle`."""
     from railsim.definitions.limits import RunningLimits
 
-    return _load(RunningLimits, path, overrides)
+    return load(RunningLimits, path, overrides)
 
 
 def load_comfort_limits(path: str | Path, overrides: Overrides = ()) -> "ComfortLimits":
     """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
     from railsim.definitions.limits import ComfortLimits
 
-    return _load(ComfortLimits, path, overrides)
+    return load(ComfortLimits, path, overrides)
 
 
 def load_stationary_limits(path: str | Path, overrides: Overrides = ()) -> "StationaryLimits":
     """Load the limits of stationary tests, or shipped ones by their name; as `load_vehicle`."""
     from railsim.definitions.limits import StationaryLimits
 
-    return _load(StationaryLimits, path, overrides)
+    return load(StationaryLimits, path, overrides)
 
 
 def load_wheel_limits(path: str | Path, overrides: Overrides = ()) -> "WheelLimits":
     """Load the limits of worn wheels, or shipped ones by their name; as `load_vehicle`."""
     from railsim.definitions.limits import WheelLimits
 
-    return _load(WheelLimits, path, overrides)
-
-
-def load_validation_limits(path: str | Path, overrides: Overrides = ()) -> "ValidationLimits":
-    """Load the limits of a model's validation, or shipped ones by their name; as `load_vehicle`."""
-    from railsim.definitions.limits import ValidationLimits
-
-    return _load(ValidationLimits, path, overrides)
+    return load(WheelLimits, path, overrides)
 
 
 def load_wear_law(path: str | Path) -> "WearLawFile":
@@ -220,13 +212,6 @@ def _beside(folder: Path, name: Any) -> Any:
     if isinstance(name, str) and name and (folder / name).is_file():
         return str((folder / name).resolve())
     return name
-
-
-def load_published(path: str | Path, overrides: Overrides = ()) -> "Published":
-    """Load published values, or shipped ones by their name; as `load_vehicle`."""
-    from railsim.definitions.published import Published
-
-    return _load(Published, path, overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

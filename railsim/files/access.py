@@ -218,7 +218,7 @@ class PartialFile:
     def __init__(self, target: Path, *, alone: bool = False, option: str = "--out") -> None:
         self.target = target
         self._create()
-        if _sweep(target.parent, _prefix(target.name), self.path) and alone:
+        if sweep(target.parent, _prefix(target.name), self.path) and alone:
             self.remove()
             words = f"{target} is being written by another process"
             _refuse(words, "wait for it, or choose another name", option)
@@ -294,6 +294,12 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8, see `whole_file`."""
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
 def locked(handle: int) -> bool:
     """Lock an open file for as long as it stays open; return False where another process has.
 
@@ -311,13 +317,11 @@ def remove_partial_files() -> None:
             path.unlink()
 
 
-def sweep(folder: Path) -> None:
-    """Remove the hidden files that dead processes have left in a folder."""
-    _sweep(folder)
+def sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
+    """Remove the hidden files that dead processes have left in a folder; count those in use.
 
-
-def _sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
-    """Remove what dead processes have left, of all targets or one; count what is being written."""
+    Of all targets, or of the one whose hidden files begin with `prefix`; `own` is not looked at.
+    """
     partial = re.compile((re.escape(prefix[:-1]) if prefix else r"\..+") + _RANDOM, re.DOTALL)
     alive = 0
     try:

@@ -16,7 +16,7 @@ import json
 from pathlib import Path
 
 from railsim.errors import input_error, nearest
-from railsim.files.access import is_file, whole_file
+from railsim.files.access import is_file, write_text
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
 from railsim.text import LONGEST_FILE, shortened
@@ -79,6 +79,5 @@ def save_profile(profile: Profile, path: Path) -> Path:
     """
     lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
     lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]
-    with whole_file(path) as partial:
-        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")
     return path

@@ -6,7 +6,7 @@ from math import isclose
 
 import numpy as np
 
-from railsim.definitions.loading import load_published, load_track, load_vehicle
+from railsim.definitions.loading import load, load_track, load_vehicle
 from railsim.definitions.published import Published, PublishedValue
 from railsim.files.sources import shipped_names
 from railsim.notation import SIDES
@@ -50,7 +50,7 @@ def beside_published(results: Mapping[str, Result]) -> list[Beside]:
     A run is compared if vehicle and speed are those of the publication and its track differs at
     most in the support of the rails, which publications rarely specify.
     """
-    studies = [load_published(name) for name in shipped_names("published")]
+    studies = [load(Published, name) for name in shipped_names("published")]
     return [row for study in studies for row in _of_study(study, results)]
 
 

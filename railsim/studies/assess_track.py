@@ -10,7 +10,7 @@ alignment in D1 over 200 m, and isolated defects.  A section of 200 m that only 
 complain of is a miss of the geometry, one that only the geometry complains of a false alarm.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -29,15 +29,13 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, argument_error, input_error
-from railsim.files.access import check_folder, whole_file
+from railsim.files.access import check_folder, write_text
 from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out
 from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, Flags, RecordedGeometry
-from railsim.studies.plan import name_faults
-from railsim.studies.points import Point
-from railsim.studies.records import Record
-from railsim.studies.spec import Execution, RunSpec, StudySpec
+from railsim.studies.plan import Cases
+from railsim.studies.spec import Execution, StudySpec
 from railsim.table import Column, Table
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
@@ -131,8 +129,7 @@ class TrackAssessment:
         """Write places and sections as CSV into the folder of the runs."""
         written = []
         for name, table in (("places.csv", self.table()), ("sections.csv", self.sections)):
-            with whole_file(self.folder / name) as partial:
-                partial.write_text(table.csv(), encoding="utf-8")
+            write_text(self.folder / name, table.csv())
             written.append(self.folder / name)
         return written
 
@@ -144,18 +141,14 @@ def assess_track(
     *,
     out: str | Path,
     share: float = 0.8,
-    workers: int | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Callable[[float], None] | None = None,
-    on_record: Callable[[Record], None] | None = None,
+    **how: Any,
 ) -> TrackAssessment:
     """Run vehicles over a recorded track and list where they exceed a share of a limit.
 
     `recording`: track file with a measured irregularity, or the CSV of one: then straight track;
     `vehicles`: files or names; each needs a service table; `speeds`: [m/s]; `out`: folder of the
-    runs; `share`: of the limits of EN 14363. Raises InputError: all faults of the inputs; no
-    recording in the track.
+    runs; `share`: of the limits of EN 14363; `how`: fields of `railsim.studies.spec.Execution`.
+    Raises InputError: all faults of the inputs; no recording in the track.
     """
     if not 0.0 < share <= 10.0:
         raise argument_error("share", f"found {share:g}", "above 0, up to 10")
@@ -194,31 +187,13 @@ def assess_track(
         vehicles=[str(v) for v in vehicles], tracks=[str(recording)], speeds=list(speeds),
         single=True, keep="Q,Y,Y_over_Q,sum_Y,wheelset_distance,sensor_acceleration",
     )  # fmt: skip
-    execution = Execution(workers=workers, resume=resume, overwrite=overwrite, longest_first=True,
-                          progress=progress, on_record=on_record)  # fmt: skip
-    outcome = carry_out(_Cases(cases), spec, folder, execution)
+    outcome = carry_out(Cases(cases), spec, folder, Execution(longest_first=True, **how))
     remarks = [
         f"{record['name']}: {record['status']}, {record['status_reason']}"
         for record in outcome.records
         if record["status"] != "complete"
     ]
     return _judged(track, cases, pieces, folder, share, outcome.computed, remarks)
-
-
-class _Cases:
-    """Loaded cases in the form that `carry_out` takes."""
-
-    def __init__(self, cases: Sequence[Case]) -> None:
-        self._cases = {case.name: case for case in cases}
-        self.points = [
-            Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
-            for c in cases
-        ]
-        if faults := name_faults(self.points):
-            raise InputError(faults)
-
-    def cases(self, points: Sequence[Point]) -> list[Case]:
-        return [self._cases[point.name] for point in points]
 
 
 def recorded(recording: str | Path) -> Track:

@@ -5,10 +5,11 @@ same inputs is not computed again.
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 from railsim.assessment import Assessment, assess
 from railsim.cant import curve_speed
@@ -22,9 +23,8 @@ from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out
 from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.in_conditions import in_condition, repeated, scaled_radii
-from railsim.studies.plan import name_faults
-from railsim.studies.points import ROUGH_DURATION, Point, check_number
-from railsim.studies.records import Record
+from railsim.studies.plan import Cases
+from railsim.studies.points import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import Execution, RunSpec, StudySpec
 
@@ -49,13 +49,7 @@ def campaign(
     *,
     out: str | Path,
     assignments: Sequence[str] = (),
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Callable[[float], None] | None = None,
-    on_record: Callable[[Record], None] | None = None,
-    on_remark: Callable[[str], None] | None = None,
+    **how: Any,
 ) -> Campaign:
     """Run a scenario for vehicles and assess it.
 
@@ -64,14 +58,7 @@ def campaign(
     - `out`: folder, created if it does not exist.  Results with the same inputs are not computed
       again
     - `assignments`: ``key.path=value`` for all runs, after those of the scenario
-    - `workers`: processes; by default one for each core
-    - `scheduler`: address of a dask scheduler whose workers carry out the runs instead
-    - `resume`: continue the campaign in the folder: runs whose inputs have changed are computed
-      again
-    - `overwrite`: compute everything again
-    - `progress`: called repeatedly with the finished fraction
-    - `on_record`: called with the record of every finished run
-    - `on_remark`: called with every remark on files found in the folder
+    - `how`: fields of `railsim.studies.spec.Execution`
 
     Raises InputError: all faults of the inputs; files in the folder that belong to other inputs.
     RailsimError: a run failed; the others are kept.
@@ -92,44 +79,13 @@ def campaign(
         single=plan.single,
         assignments=list(assignments),
     )
-    execution = Execution(
-        workers=workers,
-        scheduler=scheduler,
-        resume=resume,
-        overwrite=overwrite,
-        longest_first=True,
-        progress=progress,
-        on_record=on_record,
-        on_remark=on_remark,
-    )
-    outcome = carry_out(_Cases(cases), spec, folder, execution)
+    outcome = carry_out(Cases(cases), spec, folder, Execution(longest_first=True, **how))
     if outcome.failed:
         words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in outcome.failed)
         raise RailsimError(f"{len(outcome.failed)} of {len(cases)} runs failed: {words}")
     results = {case.name: open_result(folder / case.file_name) for case in cases}
     assessments = assess(results, plan.standard, method=plan.method)
     return Campaign(folder, tuple(assessments), results, outcome.computed)
-
-
-class _Cases:
-    """Loaded cases in the form that `carry_out` takes."""
-
-    def __init__(self, cases: Sequence[Case]) -> None:
-        self._cases = {case.name: case for case in cases}
-        self.points = [
-            Point(
-                case.name,
-                RunSpec(case.vehicle.name, case.track.name, case.speed),
-                case.labels,
-                case.key,
-            )
-            for case in cases
-        ]
-        if faults := name_faults(self.points):
-            raise InputError(faults)
-
-    def cases(self, points: Sequence[Point]) -> list[Case]:
-        return [self._cases[point.name] for point in points]
 
 
 def scenario_cases(

@@ -8,7 +8,7 @@ from typing import Any
 import tomli_w
 
 from railsim.files import sources
-from railsim.files.access import is_file, whole_file
+from railsim.files.access import is_file, write_text
 from railsim.files.overrides import apply_overrides, split_overrides
 from railsim.studies.designs import Design, Evaluation, name_of
 from railsim.studies.summary import unit_of
@@ -35,8 +35,7 @@ def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
         file = evaluation.folder / f"{Path(vehicle).stem}_chosen.toml"
         lead = f"# Design {chosen.number} of {len(evaluation.designs)}, by `railsim optimise`."
         text = "\n".join([lead, *values, vehicle_text(vehicle, overrides, file.parent)])
-        with whole_file(file) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(file, text)
         found.append(file)
     return found
 

@@ -18,7 +18,7 @@ from railsim.definitions.loading import load_study
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
 from railsim.errors import Fault, InputError, argument_error, argument_fault
-from railsim.files.access import check_folder, is_file, make_folder, read_text, whole_file
+from railsim.files.access import check_folder, is_file, make_folder, read_text, write_text
 from railsim.processes import available_cores
 from railsim.studies.designs import (
     INPUTS,
@@ -230,8 +230,7 @@ def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: b
         found = "holds another optimisation"
         raise argument_error("out", found, allowed, key=str(folder))
     make_folder(folder)
-    with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
@@ -302,11 +301,9 @@ def _write(found: Optimisation) -> None:
     from railsim.plot.design import front_figure, sensitivity_figure
     from railsim.plot.style import save
 
-    with whole_file(found.folder / "optimise.json") as partial:
-        text = json.dumps(finite(found.record()), indent=1, allow_nan=False)
-        partial.write_text(text + "\n", encoding="utf-8")
-    with whole_file(found.folder / "designs.csv") as partial:
-        partial.write_text(found.table().csv(), encoding="utf-8")
+    text = json.dumps(finite(found.record()), indent=1, allow_nan=False)
+    write_text(found.folder / "optimise.json", text + "\n")
+    write_text(found.folder / "designs.csv", found.table().csv())
     labels = [with_unit(one) for one in found.definition.objectives]
     values = np.array([design.objectives for design in found.designs])
     feasible = np.array([design.feasible for design in found.designs])

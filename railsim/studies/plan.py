@@ -132,6 +132,23 @@ class Plan:
         return max(0.0, length - spec.start) / max(first, 0.5)
 
 
+class Cases:
+    """Loaded cases in the form that `carry_out` takes."""
+
+    def __init__(self, cases: Sequence[Case]) -> None:
+        self._cases = {case.name: case for case in cases}
+        self.points = [
+            Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
+            for c in cases
+        ]
+        if faults := name_faults(self.points):
+            raise InputError(faults)
+
+    def cases(self, points: Sequence[Point]) -> list[Case]:
+        """Return the cases of some points."""
+        return [self._cases[point.name] for point in points]
+
+
 def name_faults(points: Sequence[Point]) -> list[Fault]:
     """Return the faults of the names of runs: equal names, or names too long for a file."""
     counts = Counter(point.name for point in points)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import input_error
-from railsim.files.access import TABLE_BYTES, make_folder, read_text, whole_file
+from railsim.files.access import TABLE_BYTES, make_folder, read_text, write_text
 
 Record = dict[str, Any]
 
@@ -15,9 +15,7 @@ Record = dict[str, Any]
 def write_record(path: Path, record: Record) -> None:
     """Write a record; its folder is created if it does not exist."""
     make_folder(path.parent)
-    with whole_file(path) as partial:
-        text = json.dumps({"crc32": _crc(record), "record": record})
-        partial.write_text(text, encoding="utf-8")
+    write_text(path, json.dumps({"crc32": _crc(record), "record": record}))
 
 
 def read_record(path: Path) -> Record:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.definitions.file_definition import FileDefinition
-from railsim.files.access import make_folder, whole_file
+from railsim.files.access import make_folder, write_text
 
 INPUTS = "inputs"
 
@@ -32,8 +32,7 @@ def as_files(inputs: Any, folder: Path) -> list[str]:
         path = (folder / INPUTS / f"{name}.toml").absolute()
         if not _holds(path, text.encode()):
             make_folder(path.parent)
-            with whole_file(path) as partial:
-                partial.write_text(text, encoding="utf-8")
+            write_text(path, text)
         found.append(str(path))
     return found
 

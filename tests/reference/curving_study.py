@@ -5,7 +5,8 @@ Source: Grossi (2025), section 6.1.1, see published/curving_study_r250.toml.
 
 import numpy as np
 
-from railsim.definitions.loading import load_published
+from railsim.definitions.loading import load
+from railsim.definitions.published import Published
 
 STUDY = "curving_study_r250"
 RIGID = {"preset": "rigid"}  # the study's rails, as far as known
@@ -26,7 +27,7 @@ TOLERANCE = {
 
 def published(coach):
     """Published values by quantity, with the signs of railsim [SI]."""
-    found = load_published(STUDY).values
+    found = load(Published, STUDY).values
     return {value.quantity: value.values[f"coach_{coach}"] for value in found}
 
 
