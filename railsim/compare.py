@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
-from railsim.result.data import Array
 from railsim.table import Amount, Column, Table
 
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
@@ -119,8 +119,8 @@ class Difference:
     quantity: Quantity
     labels: Mapping[str, str]
     result: str
-    distance: Array
-    values: Array
+    distance: Floats
+    values: Floats
 
     @property
     def largest(self) -> tuple[float, float]:
@@ -178,7 +178,7 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
     return found_ones
 
 
-def _leading(result: Result, name: str) -> dict[str, Array]:
+def _leading(result: Result, name: str) -> dict[str, Floats]:
     """Return a quantity of the leading wheelset over time, by side where it has sides."""
     values = result[name][:, 0]
     if values.ndim == 1:

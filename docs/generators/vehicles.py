@@ -369,7 +369,7 @@ def curve_figure(result: railsim.Result, track: Track) -> Picture:
     s = result.distance
     shown = s > 200.0
     with styled():
-        figure = Picture(figsize=(8.0, 3.0), layout="constrained")
+        figure = Picture(8.0, 3.0)
         force, moved = figure.subplots(1, 2)
         for k, (index, words) in enumerate(((0, "first"), (-1, "last"))):
             for side, (which, line) in enumerate(SIDE_LINES.items()):

@@ -12,9 +12,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from railsim.animation.scene import Drawn, Scene
+from railsim.arrays import Floats
 from railsim.errors import InputError, argument_fault
 from railsim.files.access import check_file, whole_file
-from railsim.result.data import Array
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
@@ -103,9 +103,9 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
         _draw_section(axes, scene, frame, side)
 
 
-def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Array, Any, Any]]:
+def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats, Any, Any]]:
     s0 = float(scene.distance[frame])
-    found: list[tuple[float, Array, Any, Any]] = []
+    found: list[tuple[float, Floats, Any, Any]] = []
     at = _track(scene, s0)
     for side in (-0.75, 0.75):
         for s in np.arange(s0 - 22.0, s0 + 22.0, 2.0):
@@ -126,7 +126,7 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Array,
     return found
 
 
-def _shape(body: Drawn) -> list[Array]:
+def _shape(body: Drawn) -> list[Floats]:
     """Polygons of a body in its own axes."""
     a, b, c, *middle = body.box
     if body.kind == "wheelset":
@@ -145,7 +145,7 @@ def _track(scene: Scene, s: float) -> tuple[float, float, float, float]:
     return x, y, heading, cant
 
 
-def _space(at: tuple[float, float, float, float], points: Array) -> Array:
+def _space(at: tuple[float, float, float, float], points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = at
     across = np.cos(cant) * points[:, 1] - np.sin(cant) * points[:, 2]
@@ -157,7 +157,7 @@ def _space(at: tuple[float, float, float, float], points: Array) -> Array:
     ])  # fmt: skip
 
 
-def _turned(points: Array, roll: float, pitch: float, yaw: float) -> Array:
+def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:
     """Rz(yaw) Rx(roll) Ry(pitch)."""
     x, y, z = points.T
     x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
@@ -166,7 +166,7 @@ def _turned(points: Array, roll: float, pitch: float, yaw: float) -> Array:
     return np.column_stack([x, y, z])
 
 
-def _seen(points: Array, at: tuple[float, float, float, float]) -> tuple[Array, float]:
+def _seen(points: Floats, at: tuple[float, float, float, float]) -> tuple[Floats, float]:
     """Points on the screen, right and down [m], and their mean depth."""
     turn = at[2] + AZIMUTH
     x, y, z = points[:, 0] - at[0], points[:, 1] - at[1], points[:, 2] + 1.4

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from railsim.animation.wheels import contact_points, seats, sections
+from railsim.arrays import Floats
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.result import Result
-from railsim.result.data import Array
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
 
@@ -82,16 +82,16 @@ class Scene:
 
     title: str
     bodies: tuple[Drawn, ...]
-    time: Array
-    distance: Array
-    pose: Array
-    track: Mapping[str, Array]
-    Q: Array | None
-    Y: Array | None
-    contact: Array | None
-    sections: tuple[tuple[Mapping[str, Array], ...], ...]
-    seats: Array | None
-    patches: Mapping[str, Array] | None
+    time: Floats
+    distance: Floats
+    pose: Floats
+    track: Mapping[str, Floats]
+    Q: Floats | None
+    Y: Floats | None
+    contact: Floats | None
+    sections: tuple[tuple[Mapping[str, Floats], ...], ...]
+    seats: Floats | None
+    patches: Mapping[str, Floats] | None
 
 
 def result_scene(
@@ -154,7 +154,7 @@ def result_scene(
     )
 
 
-def _poses(result: Result, rows: Array) -> Array:
+def _poses(result: Result, rows: Floats) -> Floats:
     """Poses of all bodies; of wheelsets where they are on their rails."""
     pose = np.array(result["body_position"][rows])
     wheelsets = [result.bodies.index(name) for name in result.wheelsets]
@@ -248,7 +248,7 @@ def _drawn(flat: FlatVehicle) -> tuple[Drawn, ...]:
     return tuple(found)
 
 
-def _track(alignment: Alignment, distance: Array) -> dict[str, Array]:
+def _track(alignment: Alignment, distance: Floats) -> dict[str, Floats]:
     """Centre line in plan and cant angle around the way of a run; gradients are left out."""
     s = np.arange(distance[0] - AROUND, distance[-1] + AROUND + TRACK_STEP, TRACK_STEP)
     heading = alignment.heading(s)

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.contact.curves import rail_curve, tape_circle_position
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.result import Result
-from railsim.result.data import Array
 from railsim.track.irregularity import shown_displacement
 
-Section = Mapping[str, Array]
+Section = Mapping[str, Floats]
 POINTS = 150  # of a profile
 MEETS = 2e-4  # m, to which both wheels of a wheelset touch
 WIDEST = 0.012  # m, by which rails are moved apart
@@ -46,11 +46,13 @@ def sections(result: Result, flat: FlatVehicle) -> tuple[tuple[Section, ...], ..
     return tuple(found)
 
 
-def _thinned(length: int) -> Array:
+def _thinned(length: int) -> Floats:
     return np.unique(np.linspace(0, length - 1, min(POINTS, length)).astype(int))
 
 
-def contact_points(result: Result, rows: Array, profiles: tuple[tuple[Section, ...], ...]) -> Array:
+def contact_points(
+    result: Result, rows: Floats, profiles: tuple[tuple[Section, ...], ...]
+) -> Floats:
     """Points at which the wheel forces act, from the wheelsets' centres in track axes.
 
     A wheel that yaws touches ahead of its axle or behind it by -z dz/dy psi, with the slope of its
@@ -83,8 +85,8 @@ def contact_points(result: Result, rows: Array, profiles: tuple[tuple[Section, .
 
 
 def seats(
-    result: Result, rows: Array, profiles: tuple[tuple[Section, ...], ...], pose: Array
-) -> Array:
+    result: Result, rows: Floats, profiles: tuple[tuple[Section, ...], ...], pose: Floats
+) -> Floats:
     """How wheelsets sit so that the drawn sections of wheels and rails meet.
 
     A result gives the wheelset against the middle of its rails and the line over their tops.  The
@@ -124,14 +126,14 @@ def seats(
     return found
 
 
-def _unevenness(pair: tuple[Section, ...], wider: Array, y: Array, roll: Array) -> Array:
+def _unevenness(pair: tuple[Section, ...], wider: Floats, y: Floats, roll: Floats) -> Floats:
     """By how much the left wheel would stand lower than the right one [m]."""
     left, right = _heights(pair, wider, y, roll)
     both = np.isfinite(left) & np.isfinite(right)
     return np.where(both, left, 0.0) - np.where(both, right, 0.0)
 
 
-def _heights(pair: tuple[Section, ...], wider: Array, y: Array, roll: Array) -> Array:
+def _heights(pair: tuple[Section, ...], wider: Floats, y: Floats, roll: Floats) -> Floats:
     """Height of the wheelset's centre at which each wheel touches, float64[side, frame] [m]."""
     found = np.empty((2, len(y)))
     for side, section in enumerate(pair):

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.weighting import WB, WC, WD, WF, WK
-from railsim.result.filters import Floats, integral, low_passed
+from railsim.result.filters import integral, low_passed
 
 BLOCK = 5.0  # s
 BLOCKS = 60

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.comfort import (
     BLOCKS,
     MeanComfort,
@@ -20,7 +21,7 @@ from railsim.assessment.weighting import WK
 from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError
-from railsim.result.filters import Floats, band_passed
+from railsim.result.filters import band_passed
 
 NEAR = (0.85, 1.15)  # band around the frequency of hunting, over this frequency
 MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz of the weightings

@@ -16,13 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment import signals as of
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Band, Signal, Signals, between
 from railsim.constants import CANT_BASE
 from railsim.contact.geometry import ContactGeometry
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.result.filters import Floats, band_passed, distance_means, window_centres
+from railsim.result.filters import band_passed, distance_means, window_centres
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"
 VERDICTS = (SAFETY, LOADING, RIDE)

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.criteria import CRITERIA, FORCES, HUNTING_ZONES
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Signals, wheel_load
-from railsim.result.filters import Floats
 
 FREQUENCIES = np.arange(0.4, 20.0, 0.01)  # Hz, among which that of the instability is sought
 LONGEST = 60.0  # s, duration of the sections that are evaluated together

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.assessment.criteria import FORCES, RIDE_BAND, ends, middle
 from railsim.assessment.signals import Band
 from railsim.table import Amount, Column, Table
 
-Floats = NDArray[np.float64]
 PASS, FAIL, INCOMPLETE = "pass", "fail", "incomplete"
 
 

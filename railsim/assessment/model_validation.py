@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.assessment.criteria import FORCES
 from railsim.assessment.model_comparison import (
     QUANTITIES,
@@ -40,7 +40,6 @@ from railsim.result import Result
 from railsim.result.filters import band_passed, low_passed
 from railsim.result.sensors import all_sensors
 
-Floats = NDArray[np.float64]
 LIKE = 50.0  # 1/s, at which signs and clocks are compared
 START = 3.0  # s after the start of a run that are not compared
 UNKNOWN = 0.01  # share of a section that a gap may take
@@ -197,7 +196,7 @@ class _Run:
     result: Result
     measured: dict[str, Floats]
     simulated: dict[str, Floats]
-    unknown: dict[str, NDArray[np.bool_]]
+    unknown: dict[str, Flags]
     s: Floats
     remarks: list[str]
 

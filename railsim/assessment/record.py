@@ -10,11 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError
 from railsim.result import Result
-from railsim.result.filters import Floats
 from railsim.result.hunting import HUNTS
 from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment

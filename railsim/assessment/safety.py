@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.profiles import Profile
-from railsim.result.filters import Floats
 
 
 def nadal(flange_angle: float, mu: float) -> float:

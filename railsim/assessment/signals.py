@@ -6,10 +6,11 @@ from functools import cache
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.record import Record
 from railsim.assessment.safety import overturning
 from railsim.assessment.sections import TestSection
-from railsim.result.filters import Floats, band_passed, distance_means, low_passed, window_centres
+from railsim.result.filters import band_passed, distance_means, low_passed, window_centres
 
 Band = tuple[float | None, float]
 """Lower and upper corner of a filter [Hz]; without the lower one a low pass."""

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from railsim.result.filters import Floats
+from railsim.arrays import Floats
 
 FACTOR = {"vertical": 0.588, "lateral": 0.735}
 BAND = (0.5, 30.0)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from railsim.result.filters import Floats
+from railsim.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ import math
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
-from railsim.result.filters import Floats, butterworth, filtered
+from railsim.result.filters import butterworth, filtered
 from railsim.track.irregularity import displacement
 
 RANGES = {"D1": (3.0, 25.0), "D2": (25.0, 70.0), "D3": (70.0, 150.0)}

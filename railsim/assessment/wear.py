@@ -11,10 +11,10 @@ from functools import partial
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.loading import load_wear_law
 from railsim.definitions.wear_law import ArchardMap, FrictionWork
 from railsim.errors import Fault, InputError
-from railsim.result.filters import Floats
 
 YIELD_IN_SHEAR = 300e6
 """Yield stress in shear k of rail steel, default value [Pa]."""

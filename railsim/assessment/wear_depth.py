@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import inclined_to_track, tape_circle_position
 from railsim.definitions.vehicle.flatten import flatten
@@ -20,7 +21,6 @@ from railsim.errors import Fault, InputError
 from railsim.profiles import Profile
 from railsim.profiles.profile import FLANGE_BACK
 from railsim.result import Result
-from railsim.result.filters import Floats
 
 SPACING = 0.25e-3  # m
 RANGE = (-0.070, 0.070)  # m from the nominal rolling circle

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.record import START, Record
 from railsim.assessment.wear import (
     DEFAULT_LAW,
@@ -16,7 +17,7 @@ from railsim.assessment.wear import (
 )
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
-from railsim.result.filters import Floats, StreamingPercentiles
+from railsim.result.filters import StreamingPercentiles
 
 CELL = 0.5  # N, initial bin width for the percentiles of the wear number
 PATCHES = ("patch_N", "patch_a", "patch_b", "patch_T_x", "patch_T_y")

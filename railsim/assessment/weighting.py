@@ -18,9 +18,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.result.filters import Floats, filtered
+from railsim.arrays import Complexes, Floats
+from railsim.result.filters import filtered
 
 Q1 = 1.0 / math.sqrt(2.0)
 
@@ -55,11 +55,11 @@ class Weighting:
     Q4: float = 1.0
     K: float = 1.0
 
-    def response(self, f: Floats) -> NDArray[np.complex128]:
+    def response(self, f: Floats) -> Complexes:
         """Complex response at the frequencies `f` >= 0 [Hz]."""
         s = np.asarray(2j * np.pi * np.asarray(f), dtype=np.complex128)
         w1, w2, w3, w4 = (2.0 * np.pi * x for x in (self.f1, self.f2, self.f3, self.f4))
-        found: NDArray[np.complex128]
+        found: Complexes
         found = s**2 / (s**2 + s * w1 / Q1 + w1**2) * w2**2 / (s**2 + s * w2 / Q1 + w2**2)
         found = found * (w4**2 / w3) * (s + w3) / (s**2 + s * w4 / self.Q2 + w4**2)
         if self.f5 < math.inf:

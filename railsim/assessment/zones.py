@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.assessment.criteria import CRITERIA, INFORMATION, SAFETY, Criterion
 from railsim.assessment.en14363 import SectionValues
 from railsim.assessment.sections import TestSection, reasons
@@ -19,7 +20,6 @@ from railsim.assessment.statistics import Estimate, extreme, one_dimensional, tw
 from railsim.definitions.limits import RunningLimits, Situation
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.tables import Service
-from railsim.result.filters import Floats
 
 WELL_SPREAD = 0.1
 """Range of the cant deficiency, as a share of the admissible one, from which the two-dimensional

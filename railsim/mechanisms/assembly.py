@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.definitions.mechanism.parts import Link, Prismatic, Revolute
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.model import Model
@@ -45,7 +44,7 @@ class OpenLoop:
         return f"loop {loop}: '{self.blamed}' {found}"
 
 
-def assembled(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> Floats | None:
+def assembled(model: Model, s: float, pose: Floats, arcs: Integers) -> Floats | None:
     """The assembly at a value of the driver near a pose (n_bodies + 1, 3); None where none is.
 
     `arcs` are those of every cam's roller, shape (joint,).
@@ -61,7 +60,7 @@ def assembled(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> 
 
 
 def open_loop(
-    model: Model, s: float, pose: Floats, arcs: NDArray[np.int64], known: OpenLoop | None = None
+    model: Model, s: float, pose: Floats, arcs: Integers, known: OpenLoop | None = None
 ) -> OpenLoop | None:
     """The loop that cannot close at a value of the driver; None where all of them close.
 
@@ -99,7 +98,7 @@ def open_loop(
     return OpenLoop(tuple(loop), blamed, gap, isinstance(joint, Link))
 
 
-def dead_loop(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> tuple[str, ...]:
+def dead_loop(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[str, ...]:
     """Joints whose constraints depend on each other at a dead point, with the driver given."""
     _, jacobian = constraints(model, s, pose, arcs)
     left, _, _ = np.linalg.svd(jacobian / _scales(model, columns=True))
@@ -126,9 +125,7 @@ def _scales(model: Model, *, columns: bool = False) -> Floats:
     return scales
 
 
-def constraints(
-    model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]
-) -> tuple[Floats, Floats]:
+def constraints(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Floats, Floats]:
     """Residuals, shape (n,), and Jacobian, shape (n, n), of joints and driver at a pose."""
     n = 3 * model.linkage.n_bodies
     residual, jacobian = np.zeros((1, n)), np.zeros((1, n, n))
@@ -138,7 +135,7 @@ def constraints(
 
 
 def _closest(
-    model: Model, s: float, pose: Floats, arcs: NDArray[np.int64], weights: Floats
+    model: Model, s: float, pose: Floats, arcs: Integers, weights: Floats
 ) -> tuple[Floats, Floats]:
     """Pose with the least sum of squares of the weighted residuals, and its residuals."""
     from scipy.optimize import least_squares  # imported where it is needed: it takes a while

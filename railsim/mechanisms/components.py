@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from railsim.arrays import Floats
 
 EDGE = 1e-9
 """Share of an interval by which rounding may leave a table."""
@@ -96,7 +97,7 @@ def next_size(sizes: list[float], wanted: float) -> float | None:
     return min((size for size in sizes if size >= wanted * (1.0 - 1e-12)), default=None)
 
 
-def table_value(rows: NDArray[np.float64], x: Any) -> Any:
+def table_value(rows: Floats, x: Any) -> Any:
     """Value of a table of rows (x, y), straight in between; NaN outside.
 
     Examples
@@ -124,9 +125,9 @@ def _interval(grid: Any, x: Any) -> tuple[Any, Any]:
 class AirSpringTable:
     """Force of an air spring: linear in the height, then in the pressure."""
 
-    heights: NDArray[np.float64]  # rising [m]
-    pressures: NDArray[np.float64]  # rising [Pa]
-    forces: NDArray[np.float64]  # shape (height, pressure) [N]
+    heights: Floats  # rising [m]
+    pressures: Floats  # rising [Pa]
+    forces: Floats  # shape (height, pressure) [N]
 
     def rows(self, height: Any) -> Any:
         """Forces at the table's pressures, shape (..., pressure); NaN outside the heights."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.definitions.mechanism.expressions import atan2
 from railsim.definitions.mechanism.parts import Angle
 from railsim.errors import Fault, InputError
@@ -36,7 +36,7 @@ class Motion:
     q: NDArray[Any]  # x, y, theta, (..., position, body, 3); body 0 is the ground
     q1: NDArray[Any]  # its derivatives by the driver
     q2: NDArray[Any]
-    arcs: NDArray[np.int64]  # arc on which each cam's roller is, (position, joint)
+    arcs: Integers  # arc on which each cam's roller is, (position, joint)
     known: dict[str, Triple] = field(default_factory=dict, repr=False, compare=False)
 
     def point(self, name: str) -> Triple:
@@ -158,11 +158,11 @@ class _Tracked(NamedTuple):
     q: Floats
     q1: Floats
     q2: Floats
-    arcs: NDArray[np.int64]
+    arcs: Integers
     failure: Floats
 
 
-def _track(model: Model, s: Floats, pose: Floats, arc_start: NDArray[np.int64]) -> _Tracked:
+def _track(model: Model, s: Floats, pose: Floats, arc_start: Integers) -> _Tracked:
     linkage = model.linkage
     shape = (len(s), linkage.n_bodies + 1, 3)
     q, q1, q2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -256,7 +256,7 @@ def check_freedom(model: Model) -> None:
     raise InputError([Fault(model.definition.name, "joints", where, "1 is needed")])
 
 
-def _held(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> tuple[Any, int]:
+def _held(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, int]:
     """Left singular vectors and rank of the joints' Jacobian."""
     left, singular, _ = np.linalg.svd(constraints(model, s, pose, arcs)[1][:-1])
     return left, int(np.sum(singular > 1e-9 * singular[0]))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Complexes, Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
 from railsim.definitions.mechanism.values import coordinates, number, parameter_values, point_names
@@ -33,7 +34,7 @@ class Model:
     linkage: Linkage  # arrays of the kernel
     points: dict[str, int]  # number of every point by name
     bodies: dict[str, int]  # and of every body; the ground is body 0
-    pose: NDArray[np.float64]  # where the assembly at the start is looked for, (body, 3)
+    pose: Floats  # where the assembly at the start is looked for, (body, 3)
     start: float  # range of the driver [rad or m]
     end: float
 
@@ -116,7 +117,7 @@ def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Mo
     )
 
 
-def with_lanes(values: Mapping[str, float]) -> dict[str, NDArray[np.complex128]]:
+def with_lanes(values: Mapping[str, float]) -> dict[str, Complexes]:
     """Values of parameters with a lane for each, in which it is moved by `1j * STEP`."""
     moved = {}
     for lane, (name, value) in enumerate(values.items()):
@@ -290,7 +291,7 @@ def _unit(angle: float | None) -> tuple[float, float]:
     return (0.0, 0.0) if angle is None else (float(np.cos(angle)), float(np.sin(angle)))
 
 
-def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> NDArray[np.float64]:
+def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> Floats:
     """Pose to start from: given coordinates, else carried on through revolute joints."""
     pose = np.zeros((len(arrays.bodies), 3))
     placed = {"ground"}
@@ -325,7 +326,7 @@ def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> 
     return pose
 
 
-def _world(pose: NDArray[np.float64], local: NDArray[Any]) -> NDArray[np.float64]:
+def _world(pose: Floats, local: NDArray[Any]) -> Floats:
     u, v = local[0].real
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.array([pose[0] + c * u - s * v, pose[1] + s * u + c * v])

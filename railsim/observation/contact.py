@@ -17,8 +17,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes, Floats, Integers
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -29,9 +29,6 @@ from railsim.observation.grid import on_grid
 from railsim.result import Result
 from railsim.simulation.run import simulate
 from railsim.track.irregularity import displacement
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 LENGTH, SEED, TAPER = 1500.0, 11, 60.0  # of the simulated run [m]
 RATE = 1000.0  # 1/s
@@ -105,7 +102,7 @@ def in_the_mean(
     assert moved is not None  # it has irregularities
     window = _window(len(grid))
 
-    def spectrum(values: Floats) -> Complex:
+    def spectrum(values: Floats) -> Complexes:
         return np.fft.rfft((values - values.mean()) * window)
 
     rails = moved(grid)[0]
@@ -167,8 +164,8 @@ def _states(
     linear: LinearVehicle,
     tangent: TrackResponse,
     result: Result,
-    spectrum: Callable[[Floats], Complex],
-) -> tuple[Complex, NDArray[np.int64]]:
+    spectrum: Callable[[Floats], Complexes],
+) -> tuple[Complexes, Integers]:
     """Spectra of the states that a result holds, and which these are."""
     c, n = linear.coordinates, len(tangent.A)
     places = np.flatnonzero(c.bodies[:n] >= 0)

@@ -6,16 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes, Floats
 from railsim.definitions.excitations.recording import ORDER
 from railsim.files.access import make_folder, whole_file
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation.pieces import STEP, Piece
 from railsim.table import Column, Table
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0)}
 """Wavelengths of EN 13848-1 [m]."""
@@ -235,10 +232,10 @@ class Irregularity:
 
 def estimate_of(
     piece: Piece,
-    spectra: Complex,
-    covariance: Complex,
+    spectra: Complexes,
+    covariance: Complexes,
     power: Floats,
-    forces: tuple[tuple[str, ...], Complex, Floats],
+    forces: tuple[tuple[str, ...], Complexes, Floats],
 ) -> Estimate:
     """Return the estimate of a piece from spectra of fields and their covariance.
 

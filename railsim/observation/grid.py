@@ -1,11 +1,10 @@
 """Signals over arc length at equal steps."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, oaconvolve
 
-Floats = NDArray[np.float64]
+from railsim.arrays import Floats
 
 HALF = 32  # of the filter's length, in steps of the grid
 SHAPE = 8.0  # of Kaiser's window: 80 dB

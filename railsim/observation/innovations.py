@@ -15,14 +15,11 @@ of which each step makes the data more likely (Zhou, Hu, Qiao and Lange 2019).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes, Flags, Floats, Integers
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation.pieces import STEP, Piece
-from railsim.observation.smoother import Complex, Fields
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from railsim.observation.smoother import Fields
 
 TAPER = 60.0  # at both ends of a piece [m]
 ALIKE, UNLIKE = 0.3, 3.0  # correlation, ratio of rms values: read, and said by other channels
@@ -83,7 +80,7 @@ class Powers:
     points: int
     track: Floats
     unknown: Floats
-    response: Complex
+    response: Complexes
     white: Floats
 
     @property
@@ -92,7 +89,7 @@ class Powers:
         H = self.response[:, :, : len(QUANTITIES)]
         return np.asarray(np.einsum("kcq,kq,kcq->kc", H, self.track, H.conj(), optimize=True).real)
 
-    def part(self, bins: slice | NDArray[np.int64], channels: slice | list[int] = ALL) -> "Powers":
+    def part(self, bins: slice | Integers, channels: slice | list[int] = ALL) -> "Powers":
         """Return the powers of some wave numbers and channels."""
         return Powers(self.points, self.track[bins], self.unknown[bins],
                       self.response[bins][:, channels], self.white[bins][:, channels])  # fmt: skip
@@ -103,7 +100,7 @@ class Powers:
         return Fields(self.points, power, self.response, self.white + sizes.model**2 * self.own)
 
 
-def spectra_of(signals: Floats, there: Bools, points: int) -> Complex:
+def spectra_of(signals: Floats, there: Flags, points: int) -> Complexes:
     """Spectra of signals with cosines at both ends, complex128[channel, k], as powers are."""
     n = signals.shape[1]
     ramp = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) * STEP / TAPER)
@@ -115,7 +112,7 @@ def spectra_of(signals: Floats, there: Bools, points: int) -> Complex:
     return np.asarray(found / np.where(size > 0.0, size, 1.0))
 
 
-def level_of(powers: Powers, spectra: Complex) -> float:
+def level_of(powers: Powers, spectra: Complexes) -> float:
     """Median over the channels of the rms that they read over the one that is expected."""
     bins = powers.track.any(axis=1)
     read = np.sum(np.abs(spectra[:, bins]) ** 2, axis=1) / powers.points
@@ -123,7 +120,7 @@ def level_of(powers: Powers, spectra: Complex) -> float:
     return float(np.median(np.sqrt(read / expected)))
 
 
-def likely_sizes(powers: Powers, spectra: Complex) -> Sizes:
+def likely_sizes(powers: Powers, spectra: Complexes) -> Sizes:
     """Return the most likely sizes of errors; channels that read nothing keep those assumed."""
     used = np.flatnonzero(spectra.any(axis=1)).tolist()
     bins = np.flatnonzero(powers.track.any(axis=1))

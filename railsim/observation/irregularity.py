@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
+from railsim.arrays import Complexes, Flags, Floats
 from railsim.contact.geometry import geometry_of
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
@@ -38,12 +38,10 @@ from railsim.observation.innovations import (
 )
 from railsim.observation.pieces import READ, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refined
-from railsim.observation.smoother import Complex, Fields
+from railsim.observation.smoother import Fields
 from railsim.result.sensors import all_sensors
 from railsim.simulation.remarks import silent
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Progress = Callable[[float], None]
 
 PERIOD = 60.0  # by which the period is longer than a piece [m]
@@ -218,7 +216,7 @@ class _Smooth:
         self.said: list[str] = []
         self._wrong: set[int] | None = None
         self.flanges = _flanges(self.linear, track)
-        self._last: tuple[tuple[float, int], Complex] | None = None
+        self._last: tuple[tuple[float, int], Complexes] | None = None
 
     def remarks(self) -> list[str]:
         """Remarks on the model, and on channels that read another thing than they should."""
@@ -239,7 +237,7 @@ class _Smooth:
                 )
         return self._models[speed]
 
-    def _response(self, response: TrackResponse, k: Floats, speed: float) -> Complex:
+    def _response(self, response: TrackResponse, k: Floats, speed: float) -> Complexes:
         """H of all outputs, that of a constant left out; the last one is kept."""
         key = speed, len(k)
         if self._last is None or self._last[0] != key:
@@ -293,9 +291,9 @@ class _Smooth:
         run: SimulatedRun,
         powers: Powers,
         sizes: Sizes,
-        forces: Complex,
+        forces: Complexes,
         mean: Floats,
-        there: Bools,
+        there: Flags,
     ) -> tuple[Fields, Floats, Floats] | None:
         """Fields about the simulated run that agrees with the measured one.
 
@@ -334,7 +332,7 @@ class _Smooth:
         base = found.reading.forces - _applied(forces[:, :, :count], found.fields)[:, :n]
         return fields, mean, base
 
-    def _there(self, powers: Powers, piece: Piece, read: Floats) -> Bools:
+    def _there(self, powers: Powers, piece: Piece, read: Floats) -> Flags:
         """Where the channels say something; the first piece tells which of them are wrong."""
         if self._wrong is None:
             level = level_of(powers, spectra_of(read, piece.there, powers.points))
@@ -369,7 +367,7 @@ def _flanges(linear: LinearVehicle, track: Track) -> Floats:
     return np.array(found)
 
 
-def _applied(matrix: Complex, values: Floats) -> Floats:
+def _applied(matrix: Complexes, values: Floats) -> Floats:
     """complex128[k, row, column] on float64[column, points]."""
     spectra = np.einsum("krc,ck->rk", matrix, np.fft.rfft(values, axis=1), optimize=True)
     return np.asarray(np.fft.irfft(spectra, values.shape[1], axis=1))

@@ -4,14 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.errors import Fault, InputError, nearest
 from railsim.measurement import Measurement
 from railsim.observation.grid import HALF, on_grid
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 STEP = 0.25  # m
 LONGEST, OVERLAP, SHORTEST = 2000.0, 200.0, 300.0  # of pieces [m]
@@ -40,7 +37,7 @@ class Piece:
 
     grid: Floats
     signals: Floats
-    there: Bools
+    there: Flags
     speeds: Floats
     rate: float
 

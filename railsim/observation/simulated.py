@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.definitions.settings import Drive, Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import is_straight_and_level
@@ -30,8 +30,6 @@ from railsim.observation.pieces import STEP, Piece
 from railsim.result import Result
 from railsim.simulation.remarks import silent
 from railsim.simulation.run import simulate
-
-Floats = NDArray[np.float64]
 
 OUTPUTS: Any = {"quantities": ["Q", "Y", "sum_Y", "wheelset_lateral"], "sensors": "readings"}
 LEAD, AFTER = 100.0, 30.0  # of a piece that is simulated [m]
@@ -171,7 +169,7 @@ def refined(
     run: Callable[[Floats], Reading | str],
     gain: Callable[[Floats], Floats],
     seen: Callable[[Floats], Floats],
-    data: tuple[Floats, NDArray[np.bool_]],
+    data: tuple[Floats, Flags],
     first: tuple[Floats, Floats],
     most: int,
 ) -> Refined | str:

@@ -21,13 +21,9 @@ period is longer than the record by samples that do not exist.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes, Flags, Floats
 from railsim.errors import ModelError
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
 
 RESIDUAL = 1e-2  # of the linear equations, over the rms of the errors
 MOST_ITERATIONS = 2000
@@ -52,10 +48,10 @@ class Fields:
 
     points: int
     power: Floats
-    response: Complex
+    response: Complexes
     errors: Floats
 
-    def covariance(self) -> Complex:
+    def covariance(self) -> Complexes:
         """Cov[r | y] of (1) per bin, complex128[bin, field, field]."""
         N = 1.0 / self.errors
         seen = np.einsum("kcp,kc,kcq->kpq", self.response.conj(), N, self.response, optimize=True)
@@ -64,14 +60,14 @@ class Fields:
             np.linalg.solve(one + self.power[:, :, None] * seen, self.power[:, :, None] * one)
         )
 
-    def gain(self, fields: int) -> Complex:
+    def gain(self, fields: int) -> Complexes:
         """P H* G^-1 of (1) for the first fields, complex128[bin, field, channel]."""
         return np.asarray(np.einsum(
             "kp,kcp,kcd->kpd", self.power[:, :fields], self.response[:, :, :fields].conj(),
             self._inverse(), optimize=True,
         ))  # fmt: skip
 
-    def mean(self, data: Floats, there: Bools | None = None, residual: float = RESIDUAL) -> Floats:
+    def mean(self, data: Floats, there: Flags | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].
 
         Parameters
@@ -101,11 +97,11 @@ class Fields:
         read = np.einsum("kcq,qk->ck", self.response, spectra, optimize=True)
         return np.asarray(np.fft.irfft(read, self.points, axis=1))
 
-    def _weights(self, data: Floats, there: Bools, residual: float) -> Floats:
+    def _weights(self, data: Floats, there: Flags, residual: float) -> Floats:
         """Weights of the samples, w of (2), zero where no sample exists."""
         forth, back = self.data_covariance(), self._inverse()
 
-        def applied(matrix: Complex, values: Floats) -> Floats:
+        def applied(matrix: Complexes, values: Floats) -> Floats:
             spectra = np.fft.rfft(values, axis=1)
             spectra = np.einsum("kcd,dk->ck", matrix, spectra, optimize=True)
             return np.where(there, np.fft.irfft(spectra, self.points, axis=1), 0.0)
@@ -132,14 +128,14 @@ class Fields:
             f"the smoother's equations are not solved after {MOST_ITERATIONS} iterations"
         )
 
-    def data_covariance(self) -> Complex:
+    def data_covariance(self) -> Complexes:
         """G of (1), complex128[bin, channel, channel]."""
         H, channels = self.response, np.arange(self.errors.shape[1])
         found = np.einsum("kcq,kq,kdq->kcd", H, self.power, H.conj(), optimize=True)
         found[:, channels, channels] += self.errors
         return np.asarray(found)
 
-    def _inverse(self) -> Complex:
+    def _inverse(self) -> Complexes:
         """G^-1, complex128[bin, channel, channel]."""
         H, N = self.response, self.errors
         channels = np.arange(N.shape[1])

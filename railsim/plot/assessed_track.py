@@ -20,28 +20,28 @@ class Assessed(Protocol):
     def shares(self) -> Mapping[tuple[str, float, str], np.ndarray]: ...  # noqa: D102
 
 
+@styled()
 def heat_strip(found: Assessed) -> Figure:
     """Draw one row for each vehicle, speed and quantity; the colour is the share of the limit."""
-    with styled():
-        names = list(found.shares)
-        figure = Figure(figsize=(10.0, 1.2 + 0.24 * len(names)), layout="constrained")
-        axes = figure.subplots()
-        if names:
-            cell = float(found.cells[1] - found.cells[0])
-            edges = np.append(found.cells, found.cells[-1] + cell) / 1e3
-            mesh = axes.pcolormesh(
-                edges,
-                np.arange(len(names) + 1),
-                np.array([found.shares[name] for name in names]),
-                cmap="inferno_r",
-                vmin=0.0,
-                vmax=1.2,
-            )
-            figure.colorbar(mesh, ax=axes, label="share of the limit (1)")
-        axes.set_yticks(
-            np.arange(len(names)) + 0.5,
-            [f"{vehicle}, {3.6 * speed:.0f} km/h, {q}" for vehicle, speed, q in names],
+    names = list(found.shares)
+    figure = Figure(figsize=(10.0, 1.2 + 0.24 * len(names)), layout="constrained")
+    axes = figure.subplots()
+    if names:
+        cell = float(found.cells[1] - found.cells[0])
+        edges = np.append(found.cells, found.cells[-1] + cell) / 1e3
+        mesh = axes.pcolormesh(
+            edges,
+            np.arange(len(names) + 1),
+            np.array([found.shares[name] for name in names]),
+            cmap="inferno_r",
+            vmin=0.0,
+            vmax=1.2,
         )
-        axes.set(xlabel="s (km)")
-        axes.invert_yaxis()
+        figure.colorbar(mesh, ax=axes, label="share of the limit (1)")
+    axes.set_yticks(
+        np.arange(len(names)) + 0.5,
+        [f"{vehicle}, {3.6 * speed:.0f} km/h, {q}" for vehicle, speed, q in names],
+    )
+    axes.set(xlabel="s (km)")
+    axes.invert_yaxis()
     return figure

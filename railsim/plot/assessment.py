@@ -17,24 +17,24 @@ from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
-from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, styled
 from railsim.text import unformatted
 
 LEAST_SPEEDS = 3  # for curves over the speed
 LONGEST_BAR = 250.0  # per cent; longer ones are cut and say how long they are
 
 
+@styled()
 def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw assessments of one standard, vehicles side by side; None where nothing is to draw."""
-    with styled():
-        if any(a.zones for a in assessments):
-            return _limits_figure(assessments)
-        if any(a.comfort for a in assessments):
-            speeds = {speed for a in assessments for speed, _, _ in a.driven.values()}
-            over = _comfort_over_speed if len(speeds) >= LEAST_SPEEDS else _comfort_figure
-            return over(assessments)
-        if any(a.wear for a in assessments):
-            return _wear_figure(assessments)
+    if any(a.zones for a in assessments):
+        return _limits_figure(assessments)
+    if any(a.comfort for a in assessments):
+        speeds = {speed for a in assessments for speed, _, _ in a.driven.values()}
+        over = _comfort_over_speed if len(speeds) >= LEAST_SPEEDS else _comfort_figure
+        return over(assessments)
+    if any(a.wear for a in assessments):
+        return _wear_figure(assessments)
     return None
 
 
@@ -44,7 +44,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
     rules = {row.criterion.name: row.criterion for a in assessments for row in a.worst}
     height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
-    figure = Picture(figsize=(max(6.8, 2.4 + 2.6 * len(zones)), height), layout="constrained")
+    figure = Picture(max(6.8, 2.4 + 2.6 * len(zones)), height)
     axes = figure.subplots(1, len(zones), sharey=True, squeeze=False)[0]
     width = 0.8 / len(assessments)
     most = 110.0
@@ -54,17 +54,21 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
             shares = [100.0 * worst[name][1].share if name in worst else np.nan for name in rules]
             rows = np.arange(len(rules)) + (k - 0.5 * (len(assessments) - 1)) * width
             label = _verdicts(assessment) if ax is axes[0] else None
-            ax.barh(rows, shares, 0.9 * width, color=DISTINCT[k % len(DISTINCT)], label=label)
+            ax.barh(rows, shares, 0.9 * width, color=distinct(k), label=label)
             most = max(most, 1.1 * float(np.nanmax([0.0, *shares])))
             for row, share in zip(rows, shares, strict=True):
                 if share > LONGEST_BAR:
                     ax.text(
-                        0.98 * LONGEST_BAR, row, f"{share:.0f} %", color="w", size=7,
-                        ha="right", va="center",
-                    )  # fmt: skip
+                        0.98 * LONGEST_BAR,
+                        row,
+                        f"{share:.0f} %",
+                        color="w",
+                        size=7,
+                        ha="right",
+                        va="center",
+                    )
         ax.axvline(100.0, color=LIMIT, lw=1.0)
-        ax.set_title(f"Zone {zone}")
-        ax.set_xlabel("estimate / limit (%)")
+        ax.set(title=f"Zone {zone}", xlabel="estimate / limit (%)")
         ax.grid(axis="y", visible=False)
     axes[0].set_yticks(range(len(rules)), [rule.words for rule in rules.values()])
     axes[0].invert_yaxis()
@@ -82,6 +86,7 @@ def _verdicts(assessment: Assessment) -> str:
     return f"{assessment.vehicle}: {assessment.verdict}\n{', '.join(parts)}"
 
 
+@styled()
 def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw the values of the sections over the distance; None where there are no zones.
 
@@ -98,28 +103,24 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
         name: {"color": DISTINCT[k % n], "marker": "o^"[k // n % 2], "ls": "", "ms": 4}
         for k, name in enumerate(names)
     }
-    with styled():
-        figure = Picture(
-            figsize=(max(6.8, 1.2 + 2.8 * len(zones)), 1.8 + 2.4 * len(assessments)),
-            layout="constrained",
-        )
-        grid = figure.subplots(len(assessments), len(zones), sharex="col", squeeze=False)
-        for axes, assessment in zip(grid, assessments, strict=True):
-            for ax, zone in zip(axes, zones, strict=True):
-                for report in assessment.zones:
-                    if report.zone == zone:
-                        _sections(ax, report, looks)
-                ax.axhline(100.0, color=LIMIT, lw=1.0)
-                ax.set_ylim(bottom=0.0)
-                ax.set_title(f"zone {zone}", loc="right", fontsize=9)
-            # above the zones, and as wide as all of them
-            axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
-            axes[0].set_ylabel("section value / limit (%)")
-        for ax in grid[-1]:
-            ax.set_xlabel("middle of the section (km)")
-        words = {row.criterion.name: row.criterion.words for zone in reports for row in zone.rows}
-        handles = [Line2D([], [], label=words[name], **look) for name, look in looks.items()]
-        figure.legend(handles=handles, loc="outside lower left", ncols=2)
+    figure = Picture(max(6.8, 1.2 + 2.8 * len(zones)), 1.8 + 2.4 * len(assessments))
+    grid = figure.subplots(len(assessments), len(zones), sharex="col", squeeze=False)
+    for axes, assessment in zip(grid, assessments, strict=True):
+        for ax, zone in zip(axes, zones, strict=True):
+            for report in assessment.zones:
+                if report.zone == zone:
+                    _sections(ax, report, looks)
+            ax.axhline(100.0, color=LIMIT, lw=1.0)
+            ax.set_ylim(bottom=0.0)
+            ax.set_title(f"zone {zone}", loc="right", fontsize=9)
+        # above the zones, and as wide as all of them
+        axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
+        axes[0].set_ylabel("section value / limit (%)")
+    for ax in grid[-1]:
+        ax.set_xlabel("middle of the section (km)")
+    words = {row.criterion.name: row.criterion.words for zone in reports for row in zone.rows}
+    handles = [Line2D([], [], label=words[name], **look) for name, look in looks.items()]
+    figure.legend(handles=handles, loc="outside lower left", ncols=2)
     return figure
 
 
@@ -139,6 +140,7 @@ def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any
             ax.plot(*zip(*points, strict=True), **look)
 
 
+@styled()
 def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw section values over the cant deficiency with regression line and upper bound.
 
@@ -150,52 +152,57 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
     if not zones:
         return None
     names = list(dict.fromkeys(z.population.name for a in assessments for z in a.zones))
-    with styled():
-        figure = Picture(
-            figsize=(max(6.8, 1.2 + 2.8 * len(zones)), 1.4 + 2.6 * len(assessments)),
-            layout="constrained",
-        )
-        grid = figure.subplots(len(assessments), len(zones), squeeze=False)
-        for axes, assessment, own in zip(grid, assessments, chosen, strict=True):
-            for ax, zone in zip(axes, zones, strict=True):
-                if zone not in own:
-                    ax.set_axis_off()
-                    continue
-                for report in assessment.zones:
-                    if report.zone == zone:
-                        colour = DISTINCT[names.index(report.population.name) % len(DISTINCT)]
-                        _regression(ax, report, own[zone], colour)
-                row = own[zone]
-                ax.axhline(row.criterion.scale * row.limit, color=LIMIT, lw=1.0)
-                ax.set_title(f"zone {zone}", loc="right", fontsize=9)
-                unit = row.criterion.unit.replace("-", "1")
-                ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
-            axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
-        for ax in grid[-1]:
-            ax.set_xlabel("cant deficiency (mm)")
-        handles = [
-            Line2D([], [], marker="o", ls="", color=DISTINCT[k % len(DISTINCT)], label=name)
-            for k, name in enumerate(names)
-        ]
-        if any(names):  # beside the axes, where it hides no value
-            figure.legend(handles=handles, loc="outside lower left", ncols=len(names))
+    figure = Picture(max(6.8, 1.2 + 2.8 * len(zones)), 1.4 + 2.6 * len(assessments))
+    grid = figure.subplots(len(assessments), len(zones), squeeze=False)
+    for axes, assessment, own in zip(grid, assessments, chosen, strict=True):
+        for ax, zone in zip(axes, zones, strict=True):
+            if zone not in own:
+                ax.set_axis_off()
+                continue
+            for report in assessment.zones:
+                if report.zone == zone:
+                    colour = distinct(names.index(report.population.name))
+                    _regression(ax, report, own[zone], colour)
+            row = own[zone]
+            ax.axhline(row.criterion.scale * row.limit, color=LIMIT, lw=1.0)
+            ax.set_title(f"zone {zone}", loc="right", fontsize=9)
+            unit = row.criterion.unit.replace("-", "1")
+            ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
+        axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
+    for ax in grid[-1]:
+        ax.set_xlabel("cant deficiency (mm)")
+    handles = [
+        Line2D([], [], marker="o", ls="", color=distinct(k), label=name)
+        for k, name in enumerate(names)
+    ]
+    if any(names):  # beside the axes, where it hides no value
+        figure.legend(handles=handles, loc="outside lower left", ncols=len(names))
     return figure
 
 
 def _widest(assessment: Assessment, zone: str) -> Assessed | None:
     """Row with an upper bound, of the verdicts that decide, with the largest share in a zone."""
     deciding = getattr(assessment.limits, "deciding", ())
-    rows = [row for report in assessment.zones if report.zone == zone for row in report.rows
-            if row.estimate.line is not None and row.estimate.line.quantile > 0.0
-            and row.criterion.group in deciding]  # fmt: skip
+    rows = [
+        row
+        for report in assessment.zones
+        if report.zone == zone
+        for row in report.rows
+        if row.estimate.line is not None
+        and row.estimate.line.quantile > 0.0
+        and row.criterion.group in deciding
+    ]
     return max(rows, key=lambda row: row.share, default=None)
 
 
 def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> None:
     """Draw the values of one quantity at one place in one population."""
     key, scale = (like.criterion.name, like.place), like.criterion.scale
-    points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[key]))
-              for v in report.values if key in v.values]  # fmt: skip
+    points = [
+        (1e3 * v.section.cant_deficiency, scale * max(v.values[key]))
+        for v in report.values
+        if key in v.values
+    ]
     if points:
         ax.plot(*zip(*points, strict=True), "o", color=colour, ms=3.5)
     row = next((r for r in report.rows if (r.criterion.name, r.place) == key), None)
@@ -215,7 +222,7 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     The line is the middle of the car, the band all its measuring points; behind the mean comfort
     the classes of the standard.
     """
-    figure = Picture(figsize=(10.2, 4.4), layout="constrained")
+    figure = Picture(10.2, 4.4)
     mean, index = figure.subplots(1, 2)
     kinds: dict[tuple[str, str, str], list[tuple[float, Sequence[PointComfort]]]] = {}
     for a in assessments:
@@ -225,7 +232,7 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     several = [len({key[k] for key in kinds}) > 1 for k in range(3)]  # vehicles, tracks, rails
     for number, (key, runs) in enumerate(kinds.items()):
         words = [word for word, differs in zip(key, several, strict=True) if differs]
-        colour = DISTINCT[number % len(DISTINCT)]
+        colour = distinct(number)
         runs.sort(key=lambda run: run[0])
         label = unformatted(", ".join(words)) or "middle of the car"
         _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
@@ -240,10 +247,12 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     for ax in (mean, index):
         ax.set_ylim(bottom=0.0)
     _classes(mean, assessments)
-    handles = [*mean.get_legend_handles_labels()[0],
-               Patch(color="0.3", alpha=0.2, label="all measuring points"),
-               Line2D([], [], color="0.3", label="$W_z$ lateral"),
-               Line2D([], [], color="0.3", ls="--", label="$W_z$ vertical")]  # fmt: skip
+    handles = [
+        *mean.get_legend_handles_labels()[0],
+        Patch(color="0.3", alpha=0.2, label="all measuring points"),
+        Line2D([], [], color="0.3", label="$W_z$ lateral"),
+        Line2D([], [], color="0.3", ls="--", label="$W_z$ vertical"),
+    ]
     figure.legend(handles=handles, loc="outside right upper")
     title = list(dict.fromkeys(key[k] for k in (0, 1) for key in kinds))
     figure.suptitle("\n".join(map(unformatted, title[:4])), x=0.012, ha="left")
@@ -274,30 +283,36 @@ def _classes(axes: Axes, assessments: Sequence[Assessment]) -> None:
     for number, (end, name) in enumerate(ends):
         if bottom < top:
             axes.axhspan(bottom, min(end, top), color="0.5", alpha=0.05 + 0.06 * number, lw=0)
-            axes.text(0.99, bottom + 0.02 * top, name, transform=axes.get_yaxis_transform(),
-                      ha="right", fontsize=7.5, color="0.35")  # fmt: skip
+            axes.text(
+                0.99,
+                bottom + 0.02 * top,
+                name,
+                transform=axes.get_yaxis_transform(),
+                ha="right",
+                fontsize=7.5,
+                color="0.35",
+            )
         bottom = end
     axes.set_ylim(0.0, top)
 
 
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean comfort and Sperling's index along the car, a line for each run."""
-    figure = Picture(figsize=(9.6, 3.8), layout="constrained")
+    figure = Picture(9.6, 3.8)
     mean, index = figure.subplots(1, 2)
     number = 0
     for assessment in assessments:
         for run, points in assessment.comfort.items():
             ordered = sorted(points, key=lambda point: point.place)
             x = [point.place for point in ordered]
-            colour = DISTINCT[number % len(DISTINCT)]
+            colour = distinct(number)
             mean.plot(x, [p.mean.N_MV for p in ordered], "o-", color=colour, label=run)
             for way, line in (("lateral", "-"), ("vertical", "--")):
                 values = [p.sperling[way] for p in ordered]
                 index.plot(x, values, "o", ls=line, color=colour)
             number += 1
-    mean.set(
-        xlabel="along the car, forwards (m)", ylabel="$N_{MV}$", title="Mean comfort, EN 12299"
-    )
+    mean.set(xlabel="along the car, forwards (m)", ylabel="$N_{MV}$")
+    mean.set(title="Mean comfort, EN 12299")
     index.set(xlabel="along the car, forwards (m)", ylabel="$W_z$", title="Sperling")
     index.plot([], [], "-", color="0.3", label="lateral")
     index.plot([], [], "--", color="0.3", label="vertical")
@@ -315,13 +330,13 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
 def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean wear number and rail damage of every wheel; damage over wear number, shakedown map."""
     runs = [(run, wheels) for a in assessments for run, wheels in a.wear.items()]
-    figure = Picture(figsize=(7.6, 7.0), layout="constrained")
+    figure = Picture(7.6, 7.0)
     (energy, damage), (life, map_) = figure.subplots(2, 2)
     damage.sharey(energy)
     width = 0.8 / len(runs)
     for k, (run, wheels) in enumerate(runs):
         rows = np.arange(len(wheels)) + (k - 0.5 * (len(runs) - 1)) * width
-        colour = DISTINCT[k % len(DISTINCT)]
+        colour = distinct(k)
         energy.barh(rows, [w.T_gamma for w in wheels], 0.9 * width, color=colour, label=run)
         damage.barh(rows, [1e6 * w.rail_damage for w in wheels], 0.9 * width, color=colour)
     energy.set_yticks(range(len(runs[0][1])), [wheel.place for wheel in runs[0][1]])
@@ -348,7 +363,7 @@ def _life_model(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) -> 
     for k, (_, wheels) in enumerate(runs):
         for percentile, marker in (("50", "o"), ("95", "^")):
             T = np.array([w.percentiles[percentile] for w in wheels])
-            axes.plot(T, 1e6 * model(T), marker, color=DISTINCT[k % len(DISTINCT)], ms=4)
+            axes.plot(T, 1e6 * model(T), marker, color=distinct(k), ms=4)
     axes.plot([], [], "o", color="0.3", ms=4, label="50 % of the time below")
     axes.plot([], [], "^", color="0.3", ms=4, label="95 %")
     axes.set(xlabel=r"wear number $T\gamma$ (N)", ylabel="damage a pass, WLRM ($10^{-6}$)")
@@ -364,7 +379,7 @@ def _shakedown_map(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) 
             (w.utilised_friction, w.pressure_ratio) for w in wheels if w.pressure_ratio is not None
         ]
         if found:
-            axes.plot(*zip(*found, strict=True), "o", color=DISTINCT[k % len(DISTINCT)], ms=4)
+            axes.plot(*zip(*found, strict=True), "o", color=distinct(k), ms=4)
     if not any(w.pressure_ratio is not None for _, wheels in runs for w in wheels):
         axes.set_title("needs outputs.contact_patches", fontsize=9)
     axes.set(xlabel="utilised friction $T/N$", ylabel="$p_0/k$", xlim=(0.0, None), ylim=(0.0, None))

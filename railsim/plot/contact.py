@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import inclined_to_track, rail_curve, tape_circle_position
 from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
@@ -21,8 +21,6 @@ from railsim.contact.summary import Pair
 from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
-
-Array = NDArray[np.float64]
 
 SIDES = ("left", "right")
 WHEEL, RAIL = DISTINCT[0], "0.35"
@@ -33,6 +31,7 @@ LIFT = 14.0
 """Height at which the wheel is drawn above its rail [mm]."""
 
 
+@styled()
 def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     """Wheels above their rails, with lines between the points that touch.
 
@@ -43,30 +42,29 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     pairs : sequence of Pair, left and right
         What is drawn.
     """
-    with styled():
-        measured = [p for pair in pairs for p in (pair.wheel, pair.rail) if p.measured is not None]
-        unique = list(dict.fromkeys(measured))
-        rows = 1 + bool(unique)
-        height = 3.0 + 2.4 * bool(unique)
-        figure = Picture(figsize=(9.6, height))
-        figure.subplots_adjust(
-            left=0.06,
-            right=0.99,
-            bottom=0.45 / height,
-            top=1.0 - 0.3 / height,
-            wspace=0.14,
-            hspace=0.28,
-        )
-        grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
-        for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
-            axes = figure.add_subplot(grid[0, side])
-            _draw_pair(axes, geometry, pair, side)
-            words = f"{name}: {pair.wheel.name} on {pair.rail.name}"
-            axes.set_title(unformatted(words))
-            if side == 0:
-                _explain(axes)
-        if unique:
-            _draw_smoothing(figure.add_subplot(grid[1, :]), unique)
+    measured = [p for pair in pairs for p in (pair.wheel, pair.rail) if p.measured is not None]
+    unique = list(dict.fromkeys(measured))
+    rows = 1 + bool(unique)
+    height = 3.0 + 2.4 * bool(unique)
+    figure = Picture(9.6, height, layout=None)
+    figure.subplots_adjust(
+        left=0.06,
+        right=0.99,
+        bottom=0.45 / height,
+        top=1.0 - 0.3 / height,
+        wspace=0.14,
+        hspace=0.28,
+    )
+    grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
+    for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
+        axes = figure.add_subplot(grid[0, side])
+        _draw_pair(axes, geometry, pair, side)
+        words = f"{name}: {pair.wheel.name} on {pair.rail.name}"
+        axes.set_title(unformatted(words))
+        if side == 0:
+            _explain(axes)
+    if unique:
+        _draw_smoothing(figure.add_subplot(grid[1, :]), unique)
     return figure
 
 
@@ -99,18 +97,16 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
         axes.annotate(
             number,
             (x_wheel, -1e3 * heights[i] + LIFT),
-            xytext=(0, 3),
-            textcoords="offset points",
+            (0, 3),
+            "data",
+            "offset points",
             ha="center",
             fontsize=6,
             color="0.3",
         )
     low, high = 1e3 * tape - 72.0, 1e3 * rail_y.max() + 12.0
-    axes.set_xlim(*sorted((sign * low, sign * high)))
-    axes.set_ylim(-30.0, LIFT + 10.0)
-    axes.set_aspect("equal")
-    axes.set_xlabel("lateral position $y$ (mm)")
-    axes.set_ylabel("height (mm)")
+    axes.set(xlim=sorted((sign * low, sign * high)), ylim=(-30.0, LIFT + 10.0), aspect="equal")
+    axes.set(xlabel="lateral position $y$ (mm)", ylabel="height (mm)")
 
 
 def _explain(axes: Axes) -> None:
@@ -139,53 +135,50 @@ def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
         name = unformatted(profile.name)
         axes.plot(1e3 * profile.y, 1e6 * normal, ".", ms=2, color=colour, label=name)
     axes.axhline(0.0, color="0.35", lw=0.7)
-    axes.set_xlabel("position on the profile $y$ (mm)")
-    axes.set_ylabel("measured − smoothed (µm)")
+    axes.set(xlabel="position on the profile $y$ (mm)", ylabel="measured − smoothed (µm)")
     axes.legend(loc="upper right")
 
 
+@styled()
 def functions_figure(geometry: ContactGeometry) -> Figure:
     """Rolling radius difference, radii, contact angles, positions and roll over displacement."""
     y = 1e3 * geometry.lateral
-    with styled():
-        figure = Picture(figsize=(9.6, 5.4))
-        figure.subplots_adjust(
-            left=0.06, right=0.99, bottom=0.085, top=0.985, wspace=0.24, hspace=0.08
-        )
-        axes = figure.subplots(2, 3, sharex=True)
-        axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
-        panels = (
-            (axes[0, 1], 1e3 * geometry.rolling_radius, "rolling radius (mm)"),
-            (axes[0, 2], np.degrees(geometry.contact_angle), "contact angle (deg)"),
-            (axes[1, 0], 1e3 * geometry.wheel_y, "position on the wheel (mm)"),
-            (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
-        )
-        for panel, values, label in panels:
-            for side, name in enumerate(SIDES):
-                panel.plot(
-                    y, values[:, side], color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name
-                )
-            panel.set_ylabel(label)
-        axes[0, 1].legend(loc="upper center")
-        axes[0, 0].set_ylabel("rolling radius difference $\\Delta r$ (mm)")
-        axes[1, 2].plot(y, 1e3 * geometry.roll, color=DISTINCT[0])
-        axes[1, 2].set_ylabel("roll (mrad)")
-        # with a flange on its rail everything else would be a flat line
-        for panel, values in (
-            (axes[0, 0], 1e3 * geometry.delta_r),
-            (axes[0, 1], 1e3 * geometry.rolling_radius),
-            (axes[1, 2], 1e3 * geometry.roll),
-        ):
-            _limit(panel, values, geometry)
-        for panel in axes[1]:
-            panel.set_xlabel("lateral displacement $y$ (mm)")
-        for panel in axes.flat:
-            for lateral, _ in geometry.jumps():
-                panel.axvline(1e3 * lateral, color="0.8", lw=0.5, zorder=0)
+    figure = Picture(9.6, 5.4, layout=None)
+    figure.subplots_adjust(left=0.06, right=0.99, bottom=0.085, top=0.985, wspace=0.24, hspace=0.08)
+    axes = figure.subplots(2, 3, sharex=True)
+    axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
+    panels = (
+        (axes[0, 1], 1e3 * geometry.rolling_radius, "rolling radius (mm)"),
+        (axes[0, 2], np.degrees(geometry.contact_angle), "contact angle (deg)"),
+        (axes[1, 0], 1e3 * geometry.wheel_y, "position on the wheel (mm)"),
+        (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
+    )
+    for panel, values, label in panels:
+        for side, name in enumerate(SIDES):
+            panel.plot(
+                y, values[:, side], color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name
+            )
+        panel.set_ylabel(label)
+    axes[0, 1].legend(loc="upper center")
+    axes[0, 0].set_ylabel("rolling radius difference $\\Delta r$ (mm)")
+    axes[1, 2].plot(y, 1e3 * geometry.roll, color=DISTINCT[0])
+    axes[1, 2].set_ylabel("roll (mrad)")
+    # with a flange on its rail everything else would be a flat line
+    for panel, values in (
+        (axes[0, 0], 1e3 * geometry.delta_r),
+        (axes[0, 1], 1e3 * geometry.rolling_radius),
+        (axes[1, 2], 1e3 * geometry.roll),
+    ):
+        _limit(panel, values, geometry)
+    for panel in axes[1]:
+        panel.set_xlabel("lateral displacement $y$ (mm)")
+    for panel in axes.flat:
+        for lateral, _ in geometry.jumps():
+            panel.axvline(1e3 * lateral, color="0.8", lw=0.5, zorder=0)
     return figure
 
 
-def _limit(axes: Axes, values: Array, geometry: ContactGeometry) -> None:
+def _limit(axes: Axes, values: Floats, geometry: ContactGeometry) -> None:
     """Show the range that belongs to tread and flange root, contact angles below 45 degrees."""
     angle = np.max(np.abs(geometry.contact_angle), axis=1)
     usual = np.isfinite(angle) & (angle < np.radians(45.0))
@@ -196,7 +189,8 @@ def _limit(axes: Axes, values: Array, geometry: ContactGeometry) -> None:
     axes.set_ylim(low - margin, high + margin)
 
 
-def conicity_figure(conicity: Mapping[str, tuple[Array, Array]]) -> Figure:
+@styled()
+def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
     """Equivalent conicity over the amplitude.
 
     Parameters
@@ -204,23 +198,22 @@ def conicity_figure(conicity: Mapping[str, tuple[Array, Array]]) -> Figure:
     conicity : mapping of str to (amplitudes [m], values [1])
         Curves by their name.
     """
-    with styled():
-        figure = Picture(figsize=(5.6, 3.6))
-        figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
-        axes = figure.subplots()
-        for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
-            words = unformatted(name)
-            axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=words)
-        axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
-        axes.set_xlabel("amplitude $\\hat y$ (mm)")
-        axes.set_ylabel("equivalent conicity $\\tan\\gamma_e$")
-        axes.set_xlim(left=0.0)
-        axes.set_ylim(bottom=0.0)
-        axes.legend(loc="best")
+    figure = Picture(5.6, 3.6, layout=None)
+    figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
+    axes = figure.subplots()
+    for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
+        words = unformatted(name)
+        axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=words)
+    axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
+    axes.set(xlabel="amplitude $\\hat y$ (mm)", ylabel="equivalent conicity $\\tan\\gamma_e$")
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="best")
     return figure
 
 
-def conicity_map_figure(gauges: Sequence[float], amplitudes: Array, values: Array) -> Figure:
+@styled()
+def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Floats) -> Figure:
     """Equivalent conicity over gauge and amplitude.
 
     Parameters
@@ -230,45 +223,42 @@ def conicity_map_figure(gauges: Sequence[float], amplitudes: Array, values: Arra
     values : float64[gauge, amplitude]
         [1].
     """
-    with styled():
-        figure = Picture(figsize=(5.6, 3.6))
-        figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
-        axes = figure.subplots()
-        # the flange's slopes beyond would hide the tread's
-        levels = np.linspace(0.0, 0.8, 17)
-        x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes
-        filled = axes.contourf(x, y, values.T, levels, extend="max")
-        figure.colorbar(filled, ax=axes, label="equivalent conicity $\\tan\\gamma_e$")
-        axes.set_xlabel("gauge (mm)")
-        axes.set_ylabel("amplitude $\\hat y$ (mm)")
+    figure = Picture(5.6, 3.6, layout=None)
+    figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
+    axes = figure.subplots()
+    # the flange's slopes beyond would hide the tread's
+    levels = np.linspace(0.0, 0.8, 17)
+    x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes
+    filled = axes.contourf(x, y, values.T, levels, extend="max")
+    figure.colorbar(filled, ax=axes, label="equivalent conicity $\\tan\\gamma_e$")
+    axes.set(xlabel="gauge (mm)", ylabel="amplitude $\\hat y$ (mm)")
     return figure
 
 
+@styled()
 def overlay_figure(profiles: Sequence[Profile]) -> Figure:
     """Profiles of one kind on each other, and how far the others are off the first."""
     first, *others = profiles
-    with styled():
-        figure = Picture(figsize=(9.6, 5.0))
-        figure.subplots_adjust(left=0.07, right=0.99, bottom=0.09, top=0.98, hspace=0.12)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
-        order = np.argsort(first.y, kind="stable")
-        for colour, profile in zip(DISTINCT, profiles, strict=False):
-            above.plot(
-                1e3 * profile.y, -1e3 * profile.z, color=colour, label=unformatted(profile.name)
-            )
-        for colour, profile in zip(DISTINCT[1:], others, strict=False):
-            # not where a contour is nearly upright
-            flat = np.abs(np.gradient(profile.z)) < 4.0 * np.abs(np.gradient(profile.y))
-            off = np.interp(profile.y, first.y[order], first.z[order]) - profile.z
-            below.plot(1e3 * profile.y, np.where(flat, 1e3 * off, np.nan), color=colour)
-        above.set_aspect("equal", adjustable="datalim")
-        above.set_ylabel("height (mm)")
-        above.legend(loc="best")
-        below.set_ylabel(f"above {unformatted(first.name)} (mm)")
-        below.set_xlabel("position on the profile $y$ (mm)")
+    figure = Picture(9.6, 5.0, layout=None)
+    figure.subplots_adjust(left=0.07, right=0.99, bottom=0.09, top=0.98, hspace=0.12)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
+    order = np.argsort(first.y, kind="stable")
+    for colour, profile in zip(DISTINCT, profiles, strict=False):
+        above.plot(1e3 * profile.y, -1e3 * profile.z, color=colour, label=unformatted(profile.name))
+    for colour, profile in zip(DISTINCT[1:], others, strict=False):
+        # not where a contour is nearly upright
+        flat = np.abs(np.gradient(profile.z)) < 4.0 * np.abs(np.gradient(profile.y))
+        off = np.interp(profile.y, first.y[order], first.z[order]) - profile.z
+        below.plot(1e3 * profile.y, np.where(flat, 1e3 * off, np.nan), color=colour)
+    above.set_aspect("equal", adjustable="datalim")
+    above.set_ylabel("height (mm)")
+    above.legend(loc="best")
+    below.set(ylabel=f"above {unformatted(first.name)} (mm)")
+    below.set(xlabel="position on the profile $y$ (mm)")
     return figure
 
 
+@styled()
 def patches_figure(
     contacts: Mapping[float, LoadedContact],
     load: float,
@@ -291,49 +281,46 @@ def patches_figure(
     labels : tuple of str
         What both tables are called.
     """
-    with styled():
-        columns = 4
-        rows = -(-len(contacts) // columns)
-        height = 1.75 * rows + 1.1
-        figure = Picture(figsize=(9.6, height))
-        figure.subplots_adjust(
-            left=0.06,
-            right=0.90 if exact else 0.99,
-            bottom=0.45 / height,
-            top=1.0 - 0.85 / height,
-            wspace=0.08,
-            hspace=0.32,
-        )
-        title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN"
-        figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
-        _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
-        axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
-        positions = [patch.y for contact in contacts.values() for patch in contact.patches]
-        low, high = 1e3 * min(positions) - 14.0, 1e3 * max(positions) + 14.0
-        image = None
-        for panel, (y, contact) in zip(axes, contacts.items(), strict=False):
-            if exact is not None and y in exact and exact[y].pressure.size:
-                solution = exact[y]
-                shown = np.where(solution.pressure > 0.0, 1e-6 * solution.pressure, np.nan)
-                image = panel.pcolormesh(
-                    1e3 * solution.Y, 1e3 * solution.x, shown, cmap="YlOrBr", vmin=0.0, vmax=2500.0
-                )
-            _draw_ellipses(panel, contact, TABLE_LINES[0])
-            if other is not None:
-                _draw_ellipses(panel, other[y], TABLE_LINES[1])
-            panel.set_title(f"$y$ = {1e3 * y:g} mm".replace("-", "−"))
-            panel.set_xlim(low, high)
-            panel.set_ylim(-22.0, 22.0)
-            panel.set_aspect("equal")
-        for panel in axes[len(contacts) :]:
-            panel.set_visible(False)
-        for panel in axes[::columns]:
-            panel.set_ylabel("along the rail (mm)")
-        for panel in axes[max(len(contacts) - columns, 0) : len(contacts)]:
-            panel.set_xlabel("lateral position (mm)")
-        if image is not None:
-            bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
-            figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")
+    columns = 4
+    rows = -(-len(contacts) // columns)
+    height = 1.75 * rows + 1.1
+    figure = Picture(9.6, height, layout=None)
+    figure.subplots_adjust(
+        left=0.06,
+        right=0.90 if exact else 0.99,
+        bottom=0.45 / height,
+        top=1.0 - 0.85 / height,
+        wspace=0.08,
+        hspace=0.32,
+    )
+    title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN"
+    figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
+    _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
+    axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
+    positions = [patch.y for contact in contacts.values() for patch in contact.patches]
+    low, high = 1e3 * min(positions) - 14.0, 1e3 * max(positions) + 14.0
+    image = None
+    for panel, (y, contact) in zip(axes, contacts.items(), strict=False):
+        if exact is not None and y in exact and exact[y].pressure.size:
+            solution = exact[y]
+            shown = np.where(solution.pressure > 0.0, 1e-6 * solution.pressure, np.nan)
+            image = panel.pcolormesh(
+                1e3 * solution.Y, 1e3 * solution.x, shown, cmap="YlOrBr", vmin=0.0, vmax=2500.0
+            )
+        _draw_ellipses(panel, contact, TABLE_LINES[0])
+        if other is not None:
+            _draw_ellipses(panel, other[y], TABLE_LINES[1])
+        panel.set(title=f"$y$ = {1e3 * y:g} mm".replace("-", "−"), xlim=(low, high))
+        panel.set(ylim=(-22.0, 22.0), aspect="equal")
+    for panel in axes[len(contacts) :]:
+        panel.set_visible(False)
+    for panel in axes[::columns]:
+        panel.set_ylabel("along the rail (mm)")
+    for panel in axes[max(len(contacts) - columns, 0) : len(contacts)]:
+        panel.set_xlabel("lateral position (mm)")
+    if image is not None:
+        bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
+        figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")
     return figure
 
 

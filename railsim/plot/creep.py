@@ -11,15 +11,13 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Rectangle
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.creep import creep_force
 from railsim.contact.creep_curves import CASES, Patch, exact_force
 from railsim.contact.exact_creep import ExactCreepForce
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.plot.style import DISTINCT, Picture, styled
-
-Array = NDArray[np.float64]
 
 LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
 STICK, HELD = "#2a6f97", "stick; elsewhere slip"
@@ -29,6 +27,7 @@ LARGEST = 5.0
 """End of the axis of normalised creepage."""
 
 
+@styled()
 def creep_curves_figure(
     patch: Patch, laws: Sequence[CreepLawName], nx: int = 10, ny: int = 10, exact_points: int = 7
 ) -> Figure:
@@ -46,33 +45,30 @@ def creep_curves_figure(
         Points of the full theory in each picture (half a second each); 0 for none.
     """
     scale = np.linspace(0.0, 1.0, 121) ** 1.5 * LARGEST
-    with styled():
-        figure = Picture(figsize=(9.6, 6.2))
-        figure.subplots_adjust(
-            left=0.06, right=0.99, bottom=0.13, top=0.90, wspace=0.18, hspace=0.36
-        )
-        figure.suptitle(
-            f"Creep forces, a/b = {patch.a / patch.b:.3g}, N = {1e-3 * patch.N:.3g} kN, "
-            f"μ = {patch.mu:.3g}"
-        )
-        panels: list[Axes] = list(figure.subplots(2, 3, sharex=True).flat)
-        for panel, (name, direction) in zip(panels, CASES.items(), strict=True):
-            _draw_curves(panel, patch, direction, scale, laws, (nx, ny))
-            if exact_points:
-                _draw_exact(panel, patch, direction, exact_points)
-            panel.set_title(name)
-            panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
-            panel.set_xlim(0.0, LARGEST)
-        for panel in panels[::3]:
-            panel.set_ylabel("force over $\\mu N$")
-        for panel in panels[3:]:
-            panel.set_xlabel("magnitude of the normalised creepage")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(
-            [*handles], [*labels], loc="lower center", ncols=len(labels), bbox_to_anchor=(0.5, 0.0)
-        )
-        for panel in panels:
-            _name_components(panel)
+    figure = Picture(9.6, 6.2, layout=None)
+    figure.subplots_adjust(left=0.06, right=0.99, bottom=0.13, top=0.90, wspace=0.18, hspace=0.36)
+    figure.suptitle(
+        f"Creep forces, a/b = {patch.a / patch.b:.3g}, N = {1e-3 * patch.N:.3g} kN, "
+        f"μ = {patch.mu:.3g}"
+    )
+    panels: list[Axes] = list(figure.subplots(2, 3, sharex=True).flat)
+    for panel, (name, direction) in zip(panels, CASES.items(), strict=True):
+        _draw_curves(panel, patch, direction, scale, laws, (nx, ny))
+        if exact_points:
+            _draw_exact(panel, patch, direction, exact_points)
+        panel.set_title(name)
+        panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
+        panel.set_xlim(0.0, LARGEST)
+    for panel in panels[::3]:
+        panel.set_ylabel("force over $\\mu N$")
+    for panel in panels[3:]:
+        panel.set_xlabel("magnitude of the normalised creepage")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        [*handles], [*labels], loc="lower center", ncols=len(labels), bbox_to_anchor=(0.5, 0.0)
+    )
+    for panel in panels:
+        _name_components(panel)
     return figure
 
 
@@ -80,7 +76,7 @@ def _draw_curves(
     panel: Axes,
     patch: Patch,
     direction: Sequence[float],
-    scale: Array,
+    scale: Floats,
     laws: Sequence[CreepLawName],
     grid: tuple[int, int],
 ) -> None:
@@ -115,9 +111,16 @@ def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: in
         if shown:
             values = forces[:, column] / (patch.mu * patch.N)
             panel.plot(
-                sizes, values, "o", ms=3.6, mfc="none", mec="0.1", mew=0.9, label=label,
+                sizes,
+                values,
+                "o",
+                ms=3.6,
+                mfc="none",
+                mec="0.1",
+                mew=0.9,
+                label=label,
                 clip_on=False,
-            )  # fmt: skip
+            )
             label = "_"
 
 
@@ -125,11 +128,18 @@ def _name_components(panel: Axes) -> None:
     """Say which lines are longitudinal where a picture has both."""
     if any(line.get_linestyle() == "--" for line in panel.get_lines()):
         panel.text(
-            0.985, 0.03, "solid $T_x$, dashed $T_y$", transform=panel.transAxes, ha="right",
-            va="bottom", fontsize=8, color="0.3",
-        )  # fmt: skip
+            0.985,
+            0.03,
+            "solid $T_x$, dashed $T_y$",
+            transform=panel.transAxes,
+            ha="right",
+            va="bottom",
+            fontsize=8,
+            color="0.3",
+        )
 
 
+@styled()
 def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: float) -> Figure:
     """Traction on the rail within the contact ellipse, stick zone shaded.
 
@@ -147,43 +157,40 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
     reach_y = 1e3 * float(np.abs(first.y).max() * 1.08)
     width = float(np.clip(3.2 * (reach_y / reach_x) ** 0.5, 1.6, 3.4))
     panel_height = width * reach_x / reach_y
-    with styled():
-        height = rows * (panel_height + 0.75) + 0.25 + KEY
-        figure = Picture(figsize=(columns * (width + 0.3) + 1.5, height))
-        axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
-        figure.subplots_adjust(
-            left=0.55 / figure.get_figwidth(),
-            right=1.0 - 0.95 / figure.get_figwidth(),
-            bottom=(0.45 + KEY) / height,
-            top=1.0 - 0.45 / height,
-            wspace=0.3 / width,
-            hspace=0.75 / panel_height,
+    height = rows * (panel_height + 0.75) + 0.25 + KEY
+    figure = Picture(columns * (width + 0.3) + 1.5, height, layout=None)
+    axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
+    figure.subplots_adjust(
+        left=0.55 / figure.get_figwidth(),
+        right=1.0 - 0.95 / figure.get_figwidth(),
+        bottom=(0.45 + KEY) / height,
+        top=1.0 - 0.45 / height,
+        wspace=0.3 / width,
+        hspace=0.75 / panel_height,
+    )
+    top = 1e-6 * max(float(s.bound.max()) for s in solutions.values())
+    for panel, (title, solution) in zip(axes, solutions.items(), strict=False):
+        image = _draw_traction(panel, solution, top)
+        panel.set(xlim=(-reach_y, reach_y), ylim=(-reach_x, reach_x), aspect="equal")
+        panel.grid(False)
+        panel.set_title(
+            f"{title}\n$T_x$ {solution.T_x / friction_force:+.2f}, "
+            f"$T_y$ {solution.T_y / friction_force:+.2f} $\\mu N$".replace("-", "−")
         )
-        top = 1e-6 * max(float(s.bound.max()) for s in solutions.values())
-        for panel, (title, solution) in zip(axes, solutions.items(), strict=False):
-            image = _draw_traction(panel, solution, top)
-            panel.set_xlim(-reach_y, reach_y)
-            panel.set_ylim(-reach_x, reach_x)
-            panel.set_aspect("equal")
-            panel.grid(False)
-            panel.set_title(
-                f"{title}\n$T_x$ {solution.T_x / friction_force:+.2f}, "
-                f"$T_y$ {solution.T_y / friction_force:+.2f} $\\mu N$".replace("-", "−")
-            )
-        for panel in axes[max(len(solutions) - columns, 0) : len(solutions)]:
-            panel.set_xlabel("to the right (mm)")
-        for panel in axes[len(solutions) :]:
-            panel.set_visible(False)
-        for panel in axes[::columns]:
-            panel.set_ylabel("forward (mm)")
-        bar = figure.add_axes((1.0 - 0.8 / figure.get_figwidth(), 0.2, 0.12 / width * 0.3, 0.6))
-        figure.colorbar(image, cax=bar, label="traction on the rail (MPa)")
-        handles = [
-            Rectangle((0, 0), 1, 1, fc="none", ec=STICK, hatch="////", lw=0.0, label=HELD),
-            Line2D([], [], color="0.1", marker=r"$\rightarrow$", ms=14, ls="", label=DIRECTION),
-            Line2D([], [], color="0.2", lw=1.0, label="edge of the contact; leading edge above"),
-        ]  # fmt: skip
-        figure.legend(handles=handles, loc="lower left", ncols=3 if columns > 2 else 1, fontsize=8)
+    for panel in axes[max(len(solutions) - columns, 0) : len(solutions)]:
+        panel.set_xlabel("to the right (mm)")
+    for panel in axes[len(solutions) :]:
+        panel.set_visible(False)
+    for panel in axes[::columns]:
+        panel.set_ylabel("forward (mm)")
+    bar = figure.add_axes((1.0 - 0.8 / figure.get_figwidth(), 0.2, 0.12 / width * 0.3, 0.6))
+    figure.colorbar(image, cax=bar, label="traction on the rail (MPa)")
+    handles = [
+        Rectangle((0, 0), 1, 1, fc="none", ec=STICK, hatch="////", lw=0.0, label=HELD),
+        Line2D([], [], color="0.1", marker=r"$\rightarrow$", ms=14, ls="", label=DIRECTION),
+        Line2D([], [], color="0.2", lw=1.0, label="edge of the contact; leading edge above"),
+    ]
+    figure.legend(handles=handles, loc="lower left", ncols=3 if columns > 2 else 1, fontsize=8)
     return figure
 
 

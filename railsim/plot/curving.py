@@ -5,13 +5,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from numpy.typing import NDArray
 
-from railsim.plot.style import DISTINCT, Picture, say, styled, wheelset_colours
+from railsim.arrays import Floats, Indices
+from railsim.plot.style import Picture, distinct, say, styled, wheelset_colours
 from railsim.stability.curving import Curving
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LEFT, RIGHT = 0, 1
 MAPS = 3  # maps of wear side by side at most
@@ -24,6 +21,7 @@ HALF, WHEEL = (
 WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 
 
+@styled()
 def curving_figure(found: Curving, title: str = "") -> Figure:
     """Leading wheelset over radius, one line for each friction; wear of all over radius.
 
@@ -33,55 +31,54 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     title : str
         By default vehicle, cant and rails.
     """
-    with styled():
-        mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
-        heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
-        figure = Picture(figsize=(10.2, sum(heights)), layout="constrained")
-        figure.suptitle(title or found.title.replace(": ", "\n", 1), x=0.01, ha="left")
-        rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-        _plan(figure.add_subfigure(rows[1]).subplots(), found)
-        if mapped:
-            _wear_maps(figure.add_subfigure(rows[2]), found, np.argsort(found.radius))
-        axes = figure.add_subfigure(rows[0]).subplots(2, 2)
-        order = np.argsort(found.radius)
-        radius = found.radius[order]
-        outer = np.where(radius > 0.0, LEFT, RIGHT)
-        _lines(
-            axes[0, 0],
-            found,
-            order,
-            1e3 * found.attack[..., 0],
-            "angle of attack, leading wheelset (mrad)",
-        )
-        guiding = np.abs(
-            np.take_along_axis(found.Y[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[
-                ..., 0
-            ]
-        )
-        _lines(
-            axes[0, 1],
-            found,
-            order,
-            1e-3 * guiding[np.argsort(order)],
-            "guiding force Y of the leading outer wheel (kN)",
-        )
-        _lines(
-            axes[1, 0],
-            found,
-            order,
-            np.sum(found.T_gamma, axis=(-2, -1)),
-            r"wear number $T_\gamma$ of all wheels (N)",
-        )
-        _steering(axes[1, 1], found, order)
-        for one in axes.flat:
-            if not found.converged.any():
-                say(one, "no steady state at any point")
-            one.set_xlabel("radius (m)")
-            if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
-                one.set_xscale("log")
-                one.set_xticks(_ticks(radius), [f"{tick:g}" for tick in _ticks(radius)])
-                one.minorticks_off()
-        axes[0, 0].legend(fontsize=7.5)
+    mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
+    heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
+    figure = Picture(10.2, sum(heights))
+    figure.suptitle(title or found.title.replace(": ", "\n", 1), x=0.01, ha="left")
+    rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    _plan(figure.add_subfigure(rows[1]).subplots(), found)
+    if mapped:
+        _wear_maps(figure.add_subfigure(rows[2]), found, np.argsort(found.radius))
+    axes = figure.add_subfigure(rows[0]).subplots(2, 2)
+    order = np.argsort(found.radius)
+    radius = found.radius[order]
+    outer = np.where(radius > 0.0, LEFT, RIGHT)
+    _lines(
+        axes[0, 0],
+        found,
+        order,
+        1e3 * found.attack[..., 0],
+        "angle of attack, leading wheelset (mrad)",
+    )
+    guiding = np.abs(
+        np.take_along_axis(found.Y[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[
+            ..., 0
+        ]
+    )
+    _lines(
+        axes[0, 1],
+        found,
+        order,
+        1e-3 * guiding[np.argsort(order)],
+        "guiding force Y of the leading outer wheel (kN)",
+    )
+    _lines(
+        axes[1, 0],
+        found,
+        order,
+        np.sum(found.T_gamma, axis=(-2, -1)),
+        r"wear number $T_\gamma$ of all wheels (N)",
+    )
+    _steering(axes[1, 1], found, order)
+    for one in axes.flat:
+        if not found.converged.any():
+            say(one, "no steady state at any point")
+        one.set_xlabel("radius (m)")
+        if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
+            one.set_xscale("log")
+            one.set_xticks(_ticks(radius), [f"{tick:g}" for tick in _ticks(radius)])
+            one.minorticks_off()
+    axes[0, 0].legend(fontsize=7.5)
     return figure
 
 
@@ -110,11 +107,8 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
         axes.set_yticks(np.arange(len(deficiency)), [f"{value:g}" for value in deficiency])
         if wear[:, :, m].size <= NUMBERS:
             _numbers(axes, wear[:, :, m], largest)
-        axes.set(
-            xlabel="radius (m)",
-            ylabel="cant deficiency (mm)" if m == 0 else "",
-            title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}",
-        )
+        axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "")
+        axes.set(title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
     figure.colorbar(picture, ax=figure.axes, label=r"$T_\gamma$ (N)", fraction=0.03)
 
 
@@ -148,7 +142,7 @@ def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: st
             axes.plot(
                 found.radius[order],
                 shown,
-                color=DISTINCT[m % len(DISTINCT)],
+                color=distinct(m),
                 ls=styles[i % len(styles)],
                 marker=".",
                 ms=4,
@@ -161,7 +155,7 @@ def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: st
                 "o",
                 ms=6,
                 mfc="none",
-                color=DISTINCT[m % len(DISTINCT)],
+                color=distinct(m),
                 label="by time integration" if timed.any() else None,
             )
     axes.set_title(words)

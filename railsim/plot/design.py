@@ -7,19 +7,18 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
-from railsim.result.data import Array
 
-Flags = NDArray[np.bool_]
 MOST_PAIRS = 6
 NARROW = 0.05  # of the widest bar, below which its ends bear no words
 FEW = 12  # designs of a front that are numbered
 
 
+@styled()
 def front_figure(
-    values: Array, labels: Sequence[str], feasible: Flags, front: Sequence[int], chosen: int | None
+    values: Floats, labels: Sequence[str], feasible: Flags, front: Sequence[int], chosen: int | None
 ) -> Figure:
     """All designs, the front and the chosen one, for each pair of objectives.
 
@@ -40,21 +39,21 @@ def front_figure(
     pairs = list(combinations(range(values.shape[1]), 2))[:MOST_PAIRS]
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
-    with styled():
-        figure = Picture(figsize=(6.4 if columns == 1 else 4.4 * columns, 4.4 * rows),
-                         layout="constrained")  # fmt: skip
-        for number, (i, j) in enumerate(pairs, start=1):
-            axes = figure.add_subplot(rows, columns, number)
-            _pair(axes, values[:, [i, j]], feasible, list(front), chosen)
-            axes.set(xlabel=labels[i], ylabel=labels[j])
-            if single:
-                axes.set_title("Designs in the order of computation")
-            if number == 1:
-                axes.legend(loc="best")
+    figure = Picture(6.4 if columns == 1 else 4.4 * columns, 4.4 * rows)
+    for number, (i, j) in enumerate(pairs, start=1):
+        axes = figure.add_subplot(rows, columns, number)
+        _pair(axes, values[:, [i, j]], feasible, list(front), chosen)
+        axes.set(xlabel=labels[i], ylabel=labels[j])
+        if single:
+            axes.set_title("Designs in the order of computation")
+        if number == 1:
+            axes.legend(loc="best")
     return figure
 
 
-def _pair(axes: Axes, values: Array, feasible: Flags, front: list[int], chosen: int | None) -> None:
+def _pair(
+    axes: Axes, values: Floats, feasible: Flags, front: list[int], chosen: int | None
+) -> None:
     others = np.ones(len(values), bool)
     others[front] = False
     axes.plot(*values[others & feasible].T, "o", color="0.72", ms=3.5, label="designs")
@@ -67,11 +66,18 @@ def _pair(axes: Axes, values: Array, feasible: Flags, front: list[int], chosen: 
         axes.plot(*values[chosen], "o", mfc="none", mec=LIMIT, mew=1.6, ms=11, label="chosen")
     if len(front) <= FEW:
         for number in front:
-            axes.annotate(str(number + 1), values[number], xytext=(4, 4),
-                          textcoords="offset points", fontsize=7, color="0.3")  # fmt: skip
+            axes.annotate(
+                str(number + 1),
+                values[number],
+                (4, 4),
+                "data",
+                "offset points",
+                fontsize=7,
+                color="0.3",
+            )
 
 
-def _ordered(values: Array) -> bool:
+def _ordered(values: Floats) -> bool:
     """Whether points that follow each other go one way in both directions."""
     steps = np.diff(values, axis=0)
     return bool(len(steps)) and all(
@@ -79,6 +85,7 @@ def _ordered(values: Array) -> bool:
     )
 
 
+@styled()
 def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Figure:
     """Tornado about the chosen design, and Sobol indices over the whole range, for each quantity.
 
@@ -90,14 +97,13 @@ def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]
         Quantities with their units.
     """
     count = len(found[0]["low"])
-    with styled():
-        figure = Picture(figsize=(10.2, len(found) * (1.3 + 0.32 * count)), layout="constrained")
-        grid = figure.subplots(len(found), 2, squeeze=False)
-        for (left, right), one, label in zip(grid, found, labels, strict=True):
-            _tornado(left, one, label)
-            _indices(right, one)
-        handles, names = grid[0][1].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower right", ncols=2)
+    figure = Picture(10.2, len(found) * (1.3 + 0.32 * count))
+    grid = figure.subplots(len(found), 2, squeeze=False)
+    for (left, right), one, label in zip(grid, found, labels, strict=True):
+        _tornado(left, one, label)
+        _indices(right, one)
+    handles, names = grid[0][1].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower right", ncols=2)
     return figure
 
 
@@ -112,9 +118,17 @@ def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
             continue
         for value, words in ((low, "low"), (high, "high")):
             outer = (value >= max(low, high)) if words == "high" else (value > min(low, high))
-            axes.annotate(words, (value, row), xytext=(4 if outer else -4, 0),
-                          textcoords="offset points", va="center",
-                          ha="left" if outer else "right", fontsize=7, color="0.3")  # fmt: skip
+            axes.annotate(
+                words,
+                (value, row),
+                (4 if outer else -4, 0),
+                "data",
+                "offset points",
+                va="center",
+                ha="left" if outer else "right",
+                fontsize=7,
+                color="0.3",
+            )
     axes.set_yticks(range(len(names)), [_short(name) for name in names])
     axes.set(xlabel=label, title="From bound to bound, the others as chosen")
     axes.margins(x=0.15)
@@ -128,11 +142,8 @@ def _indices(axes: Axes, one: Mapping[str, Any]) -> None:
     axes.barh(rows + 0.17, total, height=0.3, color=DISTINCT[0], label="with interactions")
     axes.barh(rows - 0.17, first, height=0.3, color=DISTINCT[5], label="alone")
     axes.set_yticks(rows, [_short(name) for name in names])
-    axes.set_xlim(0.0, max(1.0, *total, *first))
-    axes.set(
-        xlabel="share of the variance",
-        title=f"Sobol indices (surrogate's error {100.0 * one['error']:.0f} %)",
-    )
+    axes.set(xlim=(0.0, max(1.0, *total, *first)), xlabel="share of the variance")
+    axes.set(title=f"Sobol indices (surrogate's error {100.0 * one['error']:.0f} %)")
 
 
 def _short(name: str) -> str:

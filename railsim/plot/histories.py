@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
@@ -20,16 +21,17 @@ from railsim.plot.style import (
     LIMIT,
     SIDE_LINES,
     Picture,
+    distinct,
     shade,
     spans,
     styled,
     wheelset_colours,
 )
 from railsim.result import Result
-from railsim.result.data import Array
 from railsim.text import unformatted
 
 
+@styled()
 def histories(
     result: Result,
     selections: Sequence[str] = STUDY,
@@ -64,17 +66,16 @@ def histories(
     """
     check_not_empty(result)
     window = slice(None) if between is None else _window(result[over], between)
-    with styled():
-        rows = panels(result, tuple(selections))
-        if by == "wheelset":
-            cells = [_by_wheelset(result, panel) for panel in rows]
-            columns = max(len(row) for row in cells)
-            grid = [row + [None] * (columns - len(row)) for row in cells]
-        else:
-            columns = 1 if len(rows) < 3 else 2
-            grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
-            grid[-1] += [None] * (columns - len(grid[-1]))
-        return _figure(result, grid, over, by, window)
+    rows = panels(result, tuple(selections))
+    if by == "wheelset":
+        cells = [_by_wheelset(result, panel) for panel in rows]
+        columns = max(len(row) for row in cells)
+        grid = [row + [None] * (columns - len(row)) for row in cells]
+    else:
+        columns = 1 if len(rows) < 3 else 2
+        grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
+        grid[-1] += [None] * (columns - len(grid[-1]))
+    return _figure(result, grid, over, by, window)
 
 
 def check_not_empty(result: Result, name: str = "") -> None:
@@ -84,7 +85,7 @@ def check_not_empty(result: Result, name: str = "") -> None:
         raise InputError([Fault(name or "result", "time", found, "give a run of some length")])
 
 
-def _window(horizontal: Array, between: tuple[float, float]) -> slice:
+def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
     start, stop = np.searchsorted(horizontal, between)
     if stop - start < 2:
         found = f"nothing between {between[0]:g} and {between[1]:g}"
@@ -107,7 +108,7 @@ def _figure(
 ) -> Figure:
     rows, columns = len(grid), len(grid[0])
     width = 7.0 if columns == 1 else 3.0 + 3.4 * min(columns, 4)
-    figure = Picture(figsize=(width, 1.3 + 2.1 * rows), layout="constrained")
+    figure = Picture(width, 1.3 + 2.1 * rows)
     axes = figure.subplots(
         rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
     )
@@ -139,7 +140,7 @@ def title(result: Result) -> str:
 
 
 def _draw(
-    axes: Axes, result: Result, panel: Panel, horizontal: Array, by: str, window: slice
+    axes: Axes, result: Result, panel: Panel, horizontal: Floats, by: str, window: slice
 ) -> None:
     quantity = panel.quantity
     wheelsets = wheelset_colours(result.wheelsets)
@@ -151,7 +152,7 @@ def _draw(
         elif "wheelset" in line.labels:
             colour = wheelsets[line.labels["wheelset"]]
         else:
-            colour = DISTINCT[index % len(DISTINCT)]
+            colour = distinct(index)
         above = 3.0 - 0.01 * index  # the leading wheelset stays visible
         axes.plot(
             horizontal,
@@ -175,8 +176,7 @@ def _draw(
         axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
     elif names and names[0]:
         heading = f"{heading}: {names[0]}"
-    axes.set_title(heading)
-    axes.set_ylabel(unit_label(quantity))
+    axes.set(title=heading, ylabel=unit_label(quantity))
     axes.margins(x=0.0)
     draw_limit(axes, quantity, [result])
 
@@ -201,9 +201,9 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     axes.annotate(
         words,
         (1.0, shown),
-        xycoords=("axes fraction", "data"),
-        xytext=(-3, 2.5 if value < 0 else -2.5),
-        textcoords="offset points",
+        (-3, 2.5 if value < 0 else -2.5),
+        ("axes fraction", "data"),
+        "offset points",
         ha="right",
         va="bottom" if value < 0 else "top",
         fontsize=7.5,

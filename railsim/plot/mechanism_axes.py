@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.links import Course
 from railsim.mechanisms.quantities import quantity
-from railsim.plot.style import DISTINCT, Picture
+from railsim.plot.style import DISTINCT, Picture, distinct
 
-Floats = NDArray[np.float64]
 DASHES: tuple[Any, ...] = (
     "-",
     (0, (5, 2)),
@@ -28,7 +27,7 @@ MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 
 def line_style(i: int) -> dict[str, Any]:
     """Colour and dashes of the line of a number."""
-    return {"color": DISTINCT[i % len(DISTINCT)], "ls": DASHES[i % len(DASHES)]}
+    return {"color": distinct(i), "ls": DASHES[i % len(DASHES)]}
 
 
 def label_of(name: str, result: Analysis, words: str = "") -> str:
@@ -61,7 +60,7 @@ def way(result: Analysis) -> str:
 
 def single(width: float, height: float) -> tuple[Picture, Axes]:
     """A figure with one pair of axes."""
-    figure = Picture(figsize=(width, height), layout="constrained")
+    figure = Picture(width, height)
     return figure, figure.subplots()
 
 
@@ -72,8 +71,7 @@ def curves(
     for i, (values, name) in enumerate(lines):
         axes.plot(values_of(over, result), values, label=name, **line_style(i))
     mark_zone(axes, result, over)
-    axes.set_xlabel(label_of(over, result, "driver" if over == "travel" else ""))
-    axes.set_ylabel(label)
+    axes.set(xlabel=label_of(over, result, "driver" if over == "travel" else ""), ylabel=label)
     axes.legend(ncols=3)
 
 
@@ -81,7 +79,7 @@ def three_rows(
     over: Any, courses: Mapping[str, Course], scale: float, labels: Iterable[str]
 ) -> tuple[Picture, Any]:
     """A figure of courses, their first and their second derivatives."""
-    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
+    figure = Picture(7.6, 5.6)
     rows = figure.subplots(3, 1, sharex=True)
     for i, (name, course) in enumerate(courses.items()):
         for axes, values in zip(rows, vars(course).values(), strict=True):

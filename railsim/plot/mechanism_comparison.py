@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from railsim.arrays import Floats
 from railsim.mechanisms.analysis import Analysis
 from railsim.plot.mechanism_axes import (
     DASHES,
     MAIN,
     SECOND,
-    Floats,
     label_of,
     line_style,
     mark_zone,
@@ -36,8 +36,8 @@ def cases_figure(results: Mapping[str, Analysis]) -> Figure:
         travel, force = values_of("travel", result), values_of("force", result)
         axes.plot(travel, force, label=name, **line_style(i))
     axes.axhline(0.0, color="0.4", lw=0.8)
-    axes.set_xlabel(label_of("travel", first, "driver"))
-    axes.set_ylabel(label_of("force", first, f"force of '{first.definition.solve.unknown}'"))
+    axes.set(xlabel=label_of("travel", first, "driver"))
+    axes.set(ylabel=label_of("force", first, f"force of '{first.definition.solve.unknown}'"))
     axes.legend()
     return figure
 
@@ -48,7 +48,7 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
     With `zoom`, in the zone only, and below it what they are above the first one.
     """
     first = next(iter(results.values()))
-    figure = Picture(figsize=(7.6, 6.4 if zoom else 3.8), layout="constrained")
+    figure = Picture(7.6, 6.4 if zoom else 3.8)
     panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
     for column, name in enumerate(("ratio", "force")):
         base = _over_height(first, name, zoom)
@@ -73,7 +73,7 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
 
 def held_figure(results: Mapping[str, Analysis]) -> Figure:
     """Pressures that several mechanisms need, and their contact forces at the held pressures."""
-    figure = Picture(figsize=(7.6, 3.8), layout="constrained")
+    figure = Picture(7.6, 3.8)
     left, right = figure.subplots(1, 2)
     for i, (label, result) in enumerate(results.items()):
         if "pressure" not in result.output or "height" not in result.output:
@@ -87,8 +87,7 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
     first = next(iter(results.values()))
     for axes, text in ((left, "pressure needed (MPa)"), (right, "static contact force (N)")):
         mark_zone(axes, first, way(first))
-        axes.set_xlabel(label_of(way(first), first))
-        axes.set_ylabel(text)
+        axes.set(xlabel=label_of(way(first), first), ylabel=text)
         axes.legend(fontsize=7.5)
     left.set_ylim(bottom=0.0)
     return figure

@@ -75,13 +75,13 @@ def drawing_figure(result: Analysis) -> Figure:
     small = max(box[1] - box[0], box[3] - box[2]) < 0.6 * size
     flat = box[1] - box[0] > 1.6 * (box[3] - box[2])
     if small and flat:
-        figure = Picture(figsize=(6.6, 7.4), layout="constrained")
+        figure = Picture(6.6, 7.4)
         axes = figure.subplots(2, 1, height_ratios=[1.5, 1.0])
     elif small:
-        figure = Picture(figsize=(9.0, 4.6), layout="constrained")
+        figure = Picture(9.0, 4.6)
         axes = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
     else:
-        figure = Picture(figsize=(6.6, 5.2), layout="constrained")
+        figure = Picture(6.6, 5.2)
         axes = [figure.subplots()]
     scale = quantity("travel", result.definition)
     for k in range(4):
@@ -91,13 +91,10 @@ def drawing_figure(result: Analysis) -> Figure:
     if small:
         draw(named, lines(motion), 3, "0.8", "")
         draw(named, lines(motion), 0, "#004a80", "")
-        named.set_xlim(box[0] * 1e3, box[1] * 1e3)
-        named.set_ylim(box[2] * 1e3, box[3] * 1e3)
-        named.set_title("working parts at the start (grey: at the end)")
+        named.set(xlim=(box[0] * 1e3, box[1] * 1e3), ylim=(box[2] * 1e3, box[3] * 1e3))
+        named.set(title="working parts at the start (grey: at the end)")
     for one in axes:
-        one.set_aspect("equal")
-        one.set_xlabel("x (mm)")
-        one.set_ylabel("y (mm)")
+        one.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
     for xy in centres(motion).values():
         axes[0].plot(*(xy[0] * 1e3), **CENTRE)
         if named is not axes[0]:
@@ -178,7 +175,7 @@ def path_figure(result: Analysis) -> Figure:
     for name, values in result.zone.items():
         point = (values["x"] * 1e3, values["height"] * 1e3)
         axes.plot(*point, "o", color="k", ms=4)
-        axes.annotate(name, point, xytext=(6, -3), textcoords="offset points", fontsize=8)
+        axes.annotate(name, point, (6, -3), "data", "offset points", fontsize=8)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x since start (mm)", ylabel="height over start (mm)")
     return figure
@@ -236,14 +233,13 @@ def cam_figure(result: Analysis) -> Figure:
         axes.annotate(
             f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm",
             (at, 1.0),
-            xycoords=("data", "axes fraction"),
+            (3, -10),
+            ("data", "axes fraction"),
+            "offset points",
             fontsize=8,
-            xytext=(3, -10),
-            textcoords="offset points",
         )
     mark_zone(axes, result, "travel")
-    axes.set_xlabel(label_of("travel", result, "driver"))
-    axes.set_ylabel(words)
+    axes.set(xlabel=label_of("travel", result, "driver"), ylabel=words)
     axes.legend()
     return figure
 
@@ -257,7 +253,7 @@ def force_figure(result: Analysis) -> Figure:
     }
     words = {"ratio": "ratio dy/dL, dx/dL", "force": "force of the unknown"}
     shown = [name for name in rows if name in result.output]
-    figure = Picture(figsize=(7.8, 5.4), layout="constrained")
+    figure = Picture(7.8, 5.4)
     grid = figure.subplots(len(shown), len(over), sharex="col", sharey="row", squeeze=False)
     for name, row in zip(shown, grid, strict=True):
         lines = [(values_of(n, result), label) for n, label in rows[name] if n in result.output]
@@ -310,9 +306,10 @@ def carpet_figure(result: Analysis) -> Figure:
         axes.annotate(
             f"{pressure / 1e6:g} MPa",
             point,
-            xytext=(-4, 0),
+            (-4, 0),
+            "data",
+            "offset points",
             fontsize=8,
-            textcoords="offset points",
             ha="right",
             va="center",
         )
@@ -321,8 +318,7 @@ def carpet_figure(result: Analysis) -> Figure:
     if result.zone:
         mark_zone(axes, result, "length")
     axes.set_xlim(left=heights[0] - 0.14 * (heights[-1] - heights[0]))
-    axes.set_xlabel("height of the air spring (mm)")
-    axes.set_ylabel("force (kN)")
+    axes.set(xlabel="height of the air spring (mm)", ylabel="force (kN)")
     axes.legend()
     return figure
 
@@ -330,7 +326,7 @@ def carpet_figure(result: Analysis) -> Figure:
 def gas_spring_figure(result: Analysis) -> Figure:
     """Length and force of the gas springs over the driver."""
     names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
-    figure = Picture(figsize=(7.2, 3.4), layout="constrained")
+    figure = Picture(7.2, 3.4)
     for axes, kind, words in zip(
         figure.subplots(1, 2), ("length", "force"), ("length (mm)", "push (N)"), strict=True
     ):
@@ -343,7 +339,7 @@ def time_figure(result: Analysis) -> Figure:
     """Motion in time: driver, output's speed and acceleration, driving force."""
     timed = result.timed
     assert timed is not None
-    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
+    figure = Picture(7.6, 5.6)
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
     a.plot(timed.time, timed.motion.s * quantity("travel", result.definition).scale, color=MAIN)
     a.set_ylabel(label_of("travel", result, "driver"))

@@ -7,12 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes
 from railsim.linear.modes import Mode, Modes, RootLocus
 from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
-
-Floats = NDArray[np.float64]
 
 SHOWN = 25.0  # Hz, oscillations up to which are drawn
 BARS = 14  # components of a shape that are drawn
@@ -28,6 +26,7 @@ PHASES = {
 DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
 
 
+@styled()
 def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     """Damping ratio and frequency over the parameter, and the root locus.
 
@@ -37,40 +36,39 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     title : str
         By default vehicle, track and contact.
     """
-    with styled():
-        figure = Picture(figsize=(10.2, 7.4), layout="constrained")
-        figure.suptitle(title or locus.title.replace(": ", "\n", 1), x=0.01, ha="left")
-        grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
-        damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
-        plane = figure.add_subplot(grid[1, 1])
-        values = np.array(locus.values)
-        eigenvalues = locus.eigenvalues
-        chosen = _drawn(eigenvalues)
-        if not chosen:
-            say(plane, f"no oscillation below {SHOWN:g} Hz")
-            return figure
-        colours = _colours(locus.names, chosen)
-        for k in chosen:
-            size = np.abs(eigenvalues[:, k])
-            colour, width = colours[k]
-            dashes = (0, (4, 2)) if width > 1.0 and locus.names[k][-1].isdigit() else "-"
-            style: dict[str, Any] = {"color": colour, "lw": width, "ls": dashes}
-            if len(values) == 1:
-                style["marker"] = "o"
-            label = locus.names[k] if width > 1.0 else None
-            zeta = -eigenvalues[:, k].real / size
-            damping.plot(values, 100.0 * zeta, label=label, **style)
-            frequency.plot(values, size / (2.0 * np.pi), **style)
-            plane.plot(eigenvalues[:, k].real, eigenvalues[:, k].imag / (2.0 * np.pi), **style)
-            known = np.flatnonzero(np.isfinite(size))
-            plane.plot(
-                eigenvalues[known[-1], k].real,
-                eigenvalues[known[-1], k].imag / (2 * np.pi),
-                ">",
-                ms=3.5,
-                color=colour,
-            )
-        _frame(damping, frequency, plane, locus)
+    figure = Picture(10.2, 7.4)
+    figure.suptitle(title or locus.title.replace(": ", "\n", 1), x=0.01, ha="left")
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
+    damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
+    plane = figure.add_subplot(grid[1, 1])
+    values = np.array(locus.values)
+    eigenvalues = locus.eigenvalues
+    chosen = _drawn(eigenvalues)
+    if not chosen:
+        say(plane, f"no oscillation below {SHOWN:g} Hz")
+        return figure
+    colours = _colours(locus.names, chosen)
+    for k in chosen:
+        size = np.abs(eigenvalues[:, k])
+        colour, width = colours[k]
+        dashes = (0, (4, 2)) if width > 1.0 and locus.names[k][-1].isdigit() else "-"
+        style: dict[str, Any] = {"color": colour, "lw": width, "ls": dashes}
+        if len(values) == 1:
+            style["marker"] = "o"
+        label = locus.names[k] if width > 1.0 else None
+        zeta = -eigenvalues[:, k].real / size
+        damping.plot(values, 100.0 * zeta, label=label, **style)
+        frequency.plot(values, size / (2.0 * np.pi), **style)
+        plane.plot(eigenvalues[:, k].real, eigenvalues[:, k].imag / (2.0 * np.pi), **style)
+        known = np.flatnonzero(np.isfinite(size))
+        plane.plot(
+            eigenvalues[known[-1], k].real,
+            eigenvalues[known[-1], k].imag / (2 * np.pi),
+            ">",
+            ms=3.5,
+            color=colour,
+        )
+    _frame(damping, frequency, plane, locus)
     return figure
 
 
@@ -83,19 +81,15 @@ def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> Non
     damping.plot([], [], color="0.65", lw=0.9, label="bogies, wheelsets")
     damping.legend(ncol=1, loc="upper left", bbox_to_anchor=(1.0, 1.02), fontsize=7.5)
     frequency.set(xlabel=words, ylabel="undamped frequency (Hz)", title="Frequency")
-    frequency.set_ylim(0.0, None)
+    frequency.set(ylim=(0.0, None))
     plane.axvline(0.0, color=LIMIT, lw=0.8)
     towards = "higher speed" if locus.key == "speed" else f"higher {locus.key}"
-    plane.set(
-        xlabel="growth Re λ (1/s)",
-        ylabel="frequency Im λ/2π (Hz)",
-        title=f"Root locus; arrows point towards {towards}",
-    )
-    plane.set_xlim(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1])
-    plane.set_ylim(0.0, None)
+    plane.set(xlabel="growth Re λ (1/s)", ylabel="frequency Im λ/2π (Hz)")
+    plane.set(title=f"Root locus; arrows point towards {towards}")
+    plane.set(xlim=(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1]), ylim=(0.0, None))
 
 
-def _drawn(eigenvalues: NDArray[np.complex128]) -> list[int]:
+def _drawn(eigenvalues: Complexes) -> list[int]:
     """Modes that exist at two values at least (of several) and stay below `SHOWN`."""
     with np.errstate(invalid="ignore"):
         low = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN
@@ -121,6 +115,7 @@ def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str
     return found
 
 
+@styled()
 def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
     """Shapes of the least damped oscillations as bars with their phase.
 
@@ -133,25 +128,24 @@ def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
         How many modes are drawn.
     """
     drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
-    with styled():
-        rows = max(1, (len(drawn) + 1) // 2)
-        figure = Picture(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
-        figure.suptitle(title or modes.title.replace(": ", "\n", 1), x=0.01, ha="left")
-        grid = figure.add_gridspec(rows, 2)
-        if not drawn:
-            say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")
-            return figure
-        for k, mode in enumerate(drawn):
-            axes = figure.add_subplot(grid[k // 2, k % 2])
-            _shape(axes, mode)
-            if k + 2 >= len(drawn):
-                axes.set_xlabel("share of the kinetic energy (%)")
-        figure.legend(
-            handles=[Patch(color=colour, label=label) for colour, label in PHASES.items()],
-            loc="outside lower center",
-            ncol=len(PHASES),
-            fontsize=8,
-        )
+    rows = max(1, (len(drawn) + 1) // 2)
+    figure = Picture(10.2, 0.9 + 2.1 * rows)
+    figure.suptitle(title or modes.title.replace(": ", "\n", 1), x=0.01, ha="left")
+    grid = figure.add_gridspec(rows, 2)
+    if not drawn:
+        say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")
+        return figure
+    for k, mode in enumerate(drawn):
+        axes = figure.add_subplot(grid[k // 2, k % 2])
+        _shape(axes, mode)
+        if k + 2 >= len(drawn):
+            axes.set_xlabel("share of the kinetic energy (%)")
+    figure.legend(
+        handles=[Patch(color=colour, label=label) for colour, label in PHASES.items()],
+        loc="outside lower center",
+        ncol=len(PHASES),
+        fontsize=8,
+    )
     return figure
 
 
@@ -172,8 +166,7 @@ def _shape(axes: Axes, mode: Mode) -> None:
     rows = np.arange(len(names))
     axes.barh(rows, shares, color=colours, height=0.7)
     axes.set_yticks(rows, names, fontsize=6.5)
-    axes.set_ylim(max(len(names), LEAST_BARS) - 0.5, -0.5)
-    axes.set_xlim(0.0, None)
+    axes.set(ylim=(max(len(names), LEAST_BARS) - 0.5, -0.5), xlim=(0.0, None))
     axes.grid(visible=False, axis="y")
     axes.set_title(
         f"{mode.name}: {mode.natural_frequency:.3g} Hz, damping {100.0 * mode.damping_ratio:.2f} %",

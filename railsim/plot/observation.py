@@ -11,39 +11,39 @@ SHOWN = 3  # alignment, level, cross level
 POINTS = 8000
 
 
+@styled()
 def irregularity_figure(found: Irregularity) -> Figure:
     """Draw alignment, level and cross level in D1 with their 95 % intervals, and what is seen.
 
     The bottom shows over the wavelength which share of the assumed variance the channels explain.
     """
-    with styled():
-        figure = Figure(figsize=(9.0, 9.0), layout="constrained")
-        axes = figure.subplots(SHOWN + 1, 1)
-        every = max(1, len(found.s) // POINTS)
-        s = found.s[::every]
+    figure = Figure(figsize=(9.0, 9.0), layout="constrained")
+    axes = figure.subplots(SHOWN + 1, 1)
+    every = max(1, len(found.s) // POINTS)
+    s = found.s[::every]
+    for q in range(SHOWN):
+        at, name = axes[q], QUANTITIES[q].replace("_", " ")
+        for band, colour in (("D2", "0.6"), ("D1", "C0")):
+            values = 1e3 * found.bands[band][q, ::every]
+            wide = 1.96e3 * found.band_deviations[band][q, ::every]
+            at.fill_between(s, values - wide, values + wide, color=colour, alpha=0.3, lw=0)
+            at.plot(s, values, color=colour, lw=0.7, label=band)
+        at.set_ylabel(f"{name} (mm)")
+        at.sharex(axes[0])
+    axes[0].legend(loc="upper right", ncols=2)
+    axes[0].set_title(f"{found.name}: track of {found.vehicle}, with 95 % intervals")
+    axes[SHOWN - 1].set_xlabel("s (m)")
+    for piece in found.pieces:
         for q in range(SHOWN):
-            at, name = axes[q], QUANTITIES[q].replace("_", " ")
-            for band, colour in (("D2", "0.6"), ("D1", "C0")):
-                values = 1e3 * found.bands[band][q, ::every]
-                wide = 1.96e3 * found.band_deviations[band][q, ::every]
-                at.fill_between(s, values - wide, values + wide, color=colour, alpha=0.3, lw=0)
-                at.plot(s, values, color=colour, lw=0.7, label=band)
-            at.set_ylabel(f"{name} (mm)")
-            at.sharex(axes[0])
-        axes[0].legend(loc="upper right", ncols=2)
-        axes[0].set_title(f"{found.name}: track of {found.vehicle}, with 95 % intervals")
-        axes[SHOWN - 1].set_xlabel("s (m)")
-        for piece in found.pieces:
-            for q in range(SHOWN):
-                there = piece.power[q] > 0.0
-                axes[SHOWN].plot(
-                    2.0 * np.pi / piece.wave_numbers[there],
-                    piece.seen[q, there],
-                    color=f"C{q}",
-                    lw=0.9,
-                    label=QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None,
-                )
-        axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")
-        axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="variance explained (1)")
-        axes[SHOWN].legend(loc="lower right")
+            there = piece.power[q] > 0.0
+            axes[SHOWN].plot(
+                2.0 * np.pi / piece.wave_numbers[there],
+                piece.seen[q, there],
+                color=f"C{q}",
+                lw=0.9,
+                label=QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None,
+            )
+    axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")
+    axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="variance explained (1)")
+    axes[SHOWN].legend(loc="lower right")
     return figure

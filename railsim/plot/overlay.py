@@ -7,19 +7,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from railsim.arrays import Floats
 from railsim.compare import Difference
 from railsim.definitions.track.layout import curvature_sections
 from railsim.plot.histories import check_not_empty, draw_limit, unit_label
 from railsim.plot.selection import STUDY, Panel, panels
-from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, shade, spans, styled
+from railsim.plot.style import SIDE_LINES, Picture, distinct, shade, spans, styled
 from railsim.result import Result
-from railsim.result.data import Array
 from railsim.text import unformatted
 
 LEADING = tuple(f"{name}:1" for name in STUDY)
 """Default quantities of comparisons: those of the leading wheelset."""
 
 
+@styled()
 def overlay(
     results: Mapping[str, Result], selections: Sequence[str] = LEADING, *, over: str = "distance"
 ) -> Figure:
@@ -51,27 +52,24 @@ def overlay(
     count = max(len(found) for found in drawn.values())
     columns = 1 if count < 3 else 2
     rows = -(-count // columns)
-    with styled():
-        figure = Picture(
-            figsize=(7.0 if columns == 1 else 9.8, 1.3 + 2.1 * rows), layout="constrained"
-        )
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        cells = list(grid.flat)
-        for axes, *same in zip_longest(cells, *drawn.values()):
-            if not any(same):
-                axes.remove()
-                continue
-            for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
-                if panel is not None:
-                    _draw(axes, result[over], panel, DISTINCT[index % len(DISTINCT)])
-            _label(axes, next(panel for panel in same if panel is not None), results.values())
-            shade(axes, shown, named=same_radii and axes in cells[:columns])
-        for axes in cells[max(0, count - columns) : count]:
-            axes.set_xlabel(first.quantities[over].label)
-            axes.tick_params(labelbottom=True)
-        handles = _legend(list(results), drawn)
-        figure.legend(handles=handles, loc="outside lower left", ncols=_columns(figure, handles))
-        return figure
+    figure = Picture(7.0 if columns == 1 else 9.8, 1.3 + 2.1 * rows)
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    cells = list(grid.flat)
+    for axes, *same in zip_longest(cells, *drawn.values()):
+        if not any(same):
+            axes.remove()
+            continue
+        for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
+            if panel is not None:
+                _draw(axes, result[over], panel, distinct(index))
+        _label(axes, next(panel for panel in same if panel is not None), results.values())
+        shade(axes, shown, named=same_radii and axes in cells[:columns])
+    for axes in cells[max(0, count - columns) : count]:
+        axes.set_xlabel(first.quantities[over].label)
+        axes.tick_params(labelbottom=True)
+    handles = _legend(list(results), drawn)
+    figure.legend(handles=handles, loc="outside lower left", ncols=_columns(figure, handles))
+    return figure
 
 
 def _columns(figure: Figure, handles: Sequence[Line2D]) -> int:
@@ -80,6 +78,7 @@ def _columns(figure: Figure, handles: Sequence[Line2D]) -> int:
     return max(1, min(6, len(handles), int(figure.get_figwidth() / (0.5 + 0.075 * longest))))
 
 
+@styled()
 def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     """Differences of results from the first one along the track, an axis for each quantity.
 
@@ -93,48 +92,41 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     names = list(dict.fromkeys(one.quantity.name for one in found))
     columns = 1 if len(names) < 3 else 2
     rows = -(-len(names) // columns)
-    with styled():
-        figure = Picture(
-            figsize=(7.0 if columns == 1 else 9.8, 1.5 + 2.1 * rows), layout="constrained"
-        )
-        figure.suptitle(
-            f"Leading wheelset: difference from {unformatted(first)}", x=0.01, ha="left"
-        )
-        cells = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
-        for axes, name in zip_longest(cells, names):
-            if name is None:
-                axes.remove()
-                continue
-            own = [one for one in found if one.quantity.name == name]
-            for one in own:
-                colour = DISTINCT[(1 + labels.index(one.result)) % len(DISTINCT)]
-                style = SIDE_LINES[one.labels.get("side", "left")]
-                axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=style)
-            quantity = own[0].quantity
-            axes.set_title(quantity.long_name[:1].upper() + quantity.long_name[1:])
-            axes.set_ylabel(unit_label(quantity))
-            axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
-            axes.margins(x=0.0)
-        for axes in cells[max(0, len(names) - columns) : len(names)]:
-            axes.set_xlabel("distance (m)")
-            axes.tick_params(labelbottom=True)
-        handles = [
-            Line2D(
-                [], [], color=DISTINCT[(1 + k) % len(DISTINCT)], lw=2.0, label=unformatted(label)
-            )
-            for k, label in enumerate(labels)
-        ]
-        sides = {one.labels.get("side") for one in found} - {None}
-        handles += [
-            Line2D([], [], color="0.25", ls=style, label=f"{side} wheel")
-            for side, style in SIDE_LINES.items()
-            if side in sides
-        ]
-        figure.legend(handles=handles, loc="outside lower left", ncols=_columns(figure, handles))
-        return figure
+    figure = Picture(7.0 if columns == 1 else 9.8, 1.5 + 2.1 * rows)
+    figure.suptitle(f"Leading wheelset: difference from {unformatted(first)}", x=0.01, ha="left")
+    cells = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
+    for axes, name in zip_longest(cells, names):
+        if name is None:
+            axes.remove()
+            continue
+        own = [one for one in found if one.quantity.name == name]
+        for one in own:
+            colour = distinct(1 + labels.index(one.result))
+            style = SIDE_LINES[one.labels.get("side", "left")]
+            axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=style)
+        quantity = own[0].quantity
+        axes.set(title=quantity.long_name[:1].upper() + quantity.long_name[1:])
+        axes.set(ylabel=unit_label(quantity))
+        axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+        axes.margins(x=0.0)
+    for axes in cells[max(0, len(names) - columns) : len(names)]:
+        axes.set_xlabel("distance (m)")
+        axes.tick_params(labelbottom=True)
+    handles = [
+        Line2D([], [], color=distinct(1 + k), lw=2.0, label=unformatted(label))
+        for k, label in enumerate(labels)
+    ]
+    sides = {one.labels.get("side") for one in found} - {None}
+    handles += [
+        Line2D([], [], color="0.25", ls=style, label=f"{side} wheel")
+        for side, style in SIDE_LINES.items()
+        if side in sides
+    ]
+    figure.legend(handles=handles, loc="outside lower left", ncols=_columns(figure, handles))
+    return figure
 
 
-def _draw(axes: Axes, horizontal: Array, panel: Panel, colour: str) -> None:
+def _draw(axes: Axes, horizontal: Floats, panel: Panel, colour: str) -> None:
     for line in panel.lines:
         style = SIDE_LINES[line.labels.get("side", "left")]
         axes.plot(horizontal, line.values * panel.quantity.scale, color=colour, ls=style)
@@ -148,8 +140,7 @@ def _label(axes: Axes, panel: Panel, results: Iterable[Result]) -> None:
     heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
     if len(labels) == 1:
         heading += f": {unformatted(labels.pop())}"
-    axes.set_title(heading)
-    axes.set_ylabel(unit_label(quantity))
+    axes.set(title=heading, ylabel=unit_label(quantity))
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     axes.margins(x=0.0)
     draw_limit(axes, quantity, results)
@@ -157,7 +148,7 @@ def _label(axes: Axes, panel: Panel, results: Iterable[Result]) -> None:
 
 def _legend(labels: Sequence[str], drawn: Mapping[str, Sequence[Panel]]) -> list[Line2D]:
     handles = [
-        Line2D([], [], color=DISTINCT[index % len(DISTINCT)], lw=2.0, label=unformatted(label))
+        Line2D([], [], color=distinct(index), lw=2.0, label=unformatted(label))
         for index, label in enumerate(labels)
     ]
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]

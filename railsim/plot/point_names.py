@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from railsim.arrays import Floats
+
 SIZE = 7.0
 """Of the letters [points]."""
 REACHES = (5.0, 12.0, 20.0, 30.0)
@@ -85,8 +85,9 @@ def _write(axes: Axes, name: str, xy: Floats, offset: Floats) -> None:
     text = axes.annotate(
         name,
         (float(xy[0]), float(xy[1])),
-        xytext=(float(offset[0]), float(offset[1])),
-        textcoords="offset points",
+        (float(offset[0]), float(offset[1])),
+        "data",
+        "offset points",
         ha="center",
         va="center",
         fontsize=SIZE,

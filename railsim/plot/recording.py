@@ -11,13 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
+from railsim.arrays import Floats
 from railsim.definitions.excitations.recording import BANDS, band_passed
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.plot.style import DISTINCT, Picture, styled
-from railsim.result.data import Array
 from railsim.text import unformatted
 
-CHANNELS: dict[str, tuple[str, str, Callable[[Array], Array]]] = {
+CHANNELS: dict[str, tuple[str, str, Callable[[Floats], Floats]]] = {
     "lateral": ("y", "Alignment, positive to the right", lambda v: 0.5 * (v[0] + v[2])),
     "vertical": ("z", "Longitudinal level, positive downwards", lambda v: 0.5 * (v[1] + v[3])),
     "cross_level": ("h", "Cross level, positive with the left rail higher", lambda v: v[3] - v[1]),
@@ -30,7 +30,8 @@ SEGMENTS = 8  # of a recording at least, for its spectrum; half overlapping
 LONGEST = 400.0  # m, of a segment
 
 
-def recording_figure(before: Array, after: Array, title: str) -> Figure:
+@styled()
+def recording_figure(before: Floats, after: Floats, title: str) -> Figure:
     """Draw a recording as its file holds it and as its rows act, over the distance and as spectra.
 
     Parameters
@@ -47,35 +48,32 @@ def recording_figure(before: Array, after: Array, title: str) -> Figure:
         (Welch 1967, Hann windows of at most 400 m) over the wavelength beside ERRI B176, formerly
         ORE; in the titles the standard deviations in the bands D1 and D2 of EN 13848-1.
     """
-    with styled():
-        figure = Picture(figsize=(10.6, 9.6), layout="constrained")
-        figure.suptitle(unformatted(title), x=0.012, ha="left")
-        grid = figure.subplots(4, 2, width_ratios=[1.7, 1.0], sharex="col")
-        for (channel, (symbol, words, of)), (over, density) in zip(
-            CHANNELS.items(), grid, strict=True
-        ):
-            for (name, look), rows in zip(LOOKS.items(), (before, after), strict=True):
-                over.plot(rows[:, 0], 1e3 * of(rows[:, 1:].T), label=name, **look)
-                _spectrum(density, rows, of, look)
-            over.set(title=f"{words}{_deviations(after, of)}", ylabel=f"${symbol}$ (mm)")
-            over.margins(x=0.0)
-            _beside(density, channel)
-        grid[-1, 0].set_xlabel("$s$ (m)")
-        grid[-1, 1].set(xlabel="wavelength (m)", xlim=WAVELENGTHS[::-1])
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        more, named = grid[0, 1].get_legend_handles_labels()
-        figure.legend(handles + more, labels + named, loc="outside lower left", ncols=4)
+    figure = Picture(10.6, 9.6)
+    figure.suptitle(unformatted(title), x=0.012, ha="left")
+    grid = figure.subplots(4, 2, width_ratios=[1.7, 1.0], sharex="col")
+    for (channel, (symbol, words, of)), (over, density) in zip(CHANNELS.items(), grid, strict=True):
+        for (name, look), rows in zip(LOOKS.items(), (before, after), strict=True):
+            over.plot(rows[:, 0], 1e3 * of(rows[:, 1:].T), label=name, **look)
+            _spectrum(density, rows, of, look)
+        over.set(title=f"{words}{_deviations(after, of)}", ylabel=f"${symbol}$ (mm)")
+        over.margins(x=0.0)
+        _beside(density, channel)
+    grid[-1, 0].set_xlabel("$s$ (m)")
+    grid[-1, 1].set(xlabel="wavelength (m)", xlim=WAVELENGTHS[::-1])
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    more, named = grid[0, 1].get_legend_handles_labels()
+    figure.legend(handles + more, labels + named, loc="outside lower left", ncols=4)
     return figure
 
 
-def _even(rows: Array, of: Callable[[Array], Array]) -> tuple[Array, float]:
+def _even(rows: Floats, of: Callable[[Floats], Floats]) -> tuple[Floats, float]:
     """Values at equal steps, and the step [m]."""
     step = float(np.mean(np.diff(rows[:, 0])))
     s = rows[0, 0] + step * np.arange(len(rows))
     return np.interp(s, rows[:, 0], of(rows[:, 1:].T)), step
 
 
-def _deviations(rows: Array, of: Callable[[Array], Array]) -> str:
+def _deviations(rows: Floats, of: Callable[[Floats], Floats]) -> str:
     values, step = _even(rows, of)
     parts = []
     for name in ("D1", "D2"):
@@ -86,7 +84,7 @@ def _deviations(rows: Array, of: Callable[[Array], Array]) -> str:
 
 
 def _spectrum(
-    axes: Axes, rows: Array, of: Callable[[Array], Array], look: dict[str, object]
+    axes: Axes, rows: Floats, of: Callable[[Floats], Floats], look: dict[str, object]
 ) -> None:
     values, step = _even(rows, of)
     size = max(8, min(round(LONGEST / step), 2 * len(values) // (SEGMENTS + 1)))
@@ -108,4 +106,4 @@ def _beside(axes: Axes, channel: str) -> None:
         label = f"{spectrum.label} (formerly ORE)"
         axes.plot(wavelength, 1e6 * S, color=colour, ls=line, lw=1.0, label=label)
     axes.set(xscale="log", yscale="log", ylabel="$S$ (mm²·m)")
-    axes.set_title("Power spectral density" if channel == "lateral" else "")
+    axes.set(title="Power spectral density" if channel == "lateral" else "")

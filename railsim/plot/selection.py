@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError, nearest
 from railsim.notation import Quantity
 from railsim.result import Result
-from railsim.result.data import Array
 from railsim.result.labels import known_labels
 
 MOST_LINES = 24
@@ -45,7 +45,7 @@ class Line:
         Where: dimension to name.
     """
 
-    values: Array
+    values: Floats
     labels: Mapping[str, str]
 
 

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.plot.style import DISTINCT, LIMIT, Picture
 from railsim.springs import arm as trailing_arm
@@ -28,7 +28,6 @@ from railsim.text import unformatted
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
 
-Floats = NDArray[np.float64]
 
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
@@ -36,7 +35,7 @@ SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 def stiffness_figure(result: Verification) -> Figure:
     """System stiffness, and the rate that small movements feel, over load and deflection."""
-    figure = Picture(figsize=(7.6, 3.2))
+    figure = Picture(7.6, 3.2, layout=None)
     over_load, over_deflection = figure.subplots(1, 2, sharey=True)
     figure.subplots_adjust(left=0.085, right=0.985, bottom=0.15, top=0.97, wspace=0.06)
     curve = _curve(result)
@@ -59,7 +58,7 @@ def stiffness_figure(result: Verification) -> Figure:
 
 def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """Deflection, rotation of the arm and heights of the springs over the load."""
-    figure = Picture(figsize=(7.6, 5.4))
+    figure = Picture(7.6, 5.4, layout=None)
     grid = figure.add_gridspec(
         2, 2, left=0.085, right=0.985, bottom=0.09, top=0.98, wspace=0.2, hspace=0.38
     )
@@ -91,9 +90,9 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
         heights.annotate(
             unformatted(case.name),
             (case.load * 1e-3, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
+            (0, 2),
+            ("data", "axes fraction"),
+            "offset points",
             ha="center",
             fontsize=7.5,
             color="0.25",
@@ -107,7 +106,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
 
 def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     """Active coils that give the designed stiffness, over the wire diameter."""
-    figure = Picture(figsize=(5.6, 3.7))
+    figure = Picture(5.6, 3.7, layout=None)
     axes = figure.subplots()
     figure.subplots_adjust(left=0.1, right=0.98, bottom=0.13, top=0.85)
     listed = coils_by_wire(suspension, result)
@@ -137,7 +136,7 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
     if suspension.fatigue is None:
         raise ValueError("the suspension has no fatigue table")
     line = np.array(suspension.fatigue.goodman) * 1e-6
-    figure = Picture(figsize=(4.8, 4.9))
+    figure = Picture(4.8, 4.9, layout=None)
     axes = figure.subplots()
     figure.subplots_adjust(left=0.13, right=0.97, bottom=0.1, top=0.98)
     end = float(line[-1, 1])
@@ -150,13 +149,8 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
         axes.plot([low, low], [high, spring.limit * 1e-6], color=colour, lw=1.0, ls=":")
         axes.plot(low, high, "o", color=colour, ms=6, label=f"{name}, margin {spring.margin:.2f}")
         axes.plot(low, low, "o", mfc="w", mec=colour, ms=5)
-    axes.set(
-        xlabel="lower stress $\\tau_{min}$ (MPa)",
-        ylabel="stress $\\tau$ (MPa)",
-        xlim=(0.0, 1.05 * end),
-        ylim=(0.0, 1.12 * end),
-        aspect="equal",
-    )
+    axes.set(xlabel="lower stress $\\tau_{min}$ (MPa)", ylabel="stress $\\tau$ (MPa)")
+    axes.set(xlim=(0.0, 1.05 * end), ylim=(0.0, 1.12 * end), aspect="equal")
     axes.legend(loc="lower right")
     return figure
 
@@ -172,23 +166,20 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
     # one pair of axes for all cases, each at its own origin: far quicker than many axes
     wide = 1e3 * arm.length + half_spring + 170.0
     high = max(tops) + 420.0
-    figure = Picture(figsize=(2.55 * columns, 2.55 * rows * high / wide))
+    figure = Picture(2.55 * columns, 2.55 * rows * high / wide, layout=None)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     for i, case in enumerate(cases):
         origin = np.array([(i % columns) * wide, -(i // columns) * high])
         _draw_arm(axes, suspension, arm, case, origin, max(tops))
-    axes.set(
-        xlim=(-90.0, columns * wide - 90.0),
-        ylim=(max(tops) + 150.0 - rows * high, max(tops) + 150.0),
-        aspect="equal",
-    )
+    axes.set(xlim=(-90.0, columns * wide - 90.0))
+    axes.set(ylim=(max(tops) + 150.0 - rows * high, max(tops) + 150.0), aspect="equal")
     axes.set_axis_off()
     return figure
 
 
 def search_figure(result: "SearchResult") -> Figure:
     """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
-    figure = Picture(figsize=(5.6, 3.6))
+    figure = Picture(5.6, 3.6, layout=None)
     axes = figure.subplots()
     figure.subplots_adjust(left=0.11, right=0.98, bottom=0.13, top=0.97)
     cloud = result.cloud[np.all(np.isfinite(result.cloud), axis=1)]
@@ -197,9 +188,7 @@ def search_figure(result: "SearchResult") -> Figure:
     margin = [nest.fatigue_margin for nest in result.nests]
     axes.plot(mass, margin, "o", color=MAIN, ms=5, label="ranked nests, as built", zorder=2)
     for rank, point in enumerate(zip(mass, margin, strict=True), start=1):
-        axes.annotate(
-            str(rank), point, xytext=(4, 3), textcoords="offset points", fontsize=8, color=MAIN
-        )
+        axes.annotate(str(rank), point, (4, 3), "data", "offset points", fontsize=8, color=MAIN)
     axes.set(xlabel="mass of the nest (kg)", ylabel="fatigue margin")
     axes.legend(loc="best")
     return figure
@@ -207,7 +196,7 @@ def search_figure(result: "SearchResult") -> Figure:
 
 def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -> Figure:
     """Ride height by single deviation under one load, and its range under every load."""
-    figure = Picture(figsize=(7.6, 3.5))
+    figure = Picture(7.6, 3.5, layout=None)
     single, every = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     figure.subplots_adjust(left=0.235, right=0.985, bottom=0.19, top=0.97, wspace=0.22)
     shown = next((result for result in results if result.name == tare), results[0])
@@ -284,8 +273,9 @@ def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
         axes.annotate(
             unformatted(name),
             (x, y),
-            xytext=(-4, 3) if above else (4, -3),
-            textcoords="offset points",
+            (-4, 3) if above else (4, -3),
+            "data",
+            "offset points",
             ha="right" if above else "left",
             va="bottom" if above else "top",
             fontsize=7.5,

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, say, styled
 from railsim.stability.branches import THRESHOLD, Branch
 from railsim.stability.result import Conicity, CriticalSpeed
 
@@ -24,6 +24,7 @@ BRANCHES: dict[str, tuple[str, str, str]] = {
 SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 
 
+@styled()
 def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     """Amplitude, frequency and track shift force of the hunting motion over speed.
 
@@ -35,37 +36,36 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     """
     if not found.branches:
         return _linear_figure(found, title or _title(found))
-    with styled():
-        figure = Picture(figsize=(10.2, 7.2), layout="constrained")
-        figure.suptitle(title or _title(found), x=0.01, ha="left")
-        grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
-        upper = figure.add_subplot(grid[0, 0])
-        lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
-        for branch in found.branches:
-            hunts = branch.column("amplitude") > THRESHOLD
-            _draw(upper, branch, 1e3 * branch.column("amplitude"))
-            _draw(lower[0], branch, np.where(hunts, branch.column("frequency"), np.nan))
-            _draw(lower[1], branch, 1e-3 * branch.column("sum_Y_rms"))
-        _mark(upper, found)
-        for axes, limit, scale in (
-            (upper, found.amplitude_limit, 1e3),
-            (lower[1], found.instability_limit, 1e-3),
-        ):
-            if limit is not None:
-                words = "limits: 3 mm, half the limit of ΣY"
-                axes.axhline(scale * limit.limit, color=LIMIT, lw=0.8, ls=(0, (1, 2)), label=words)
-        words = f"Hunting, {found.type}" if found.type else "Hunting"
-        upper.set(ylabel="amplitude of the wheelsets (mm)", title=words, xlim=_shown(found))
-        upper.set_ylim(0.0, None)
-        lower[0].set(ylabel="frequency (Hz)")
-        lower[1].set(xlabel="speed (m/s)", ylabel="ΣY, rms (kN)", ylim=(0.0, None))
-        if found.conicity_over_amplitude is not None:
-            _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
-        handles, labels = upper.get_legend_handles_labels()
-        named = dict(zip(labels, handles, strict=True))  # of several branches of a kind once
-        figure.add_subplot(grid[1:, 1], frame_on=False, xticks=[], yticks=[]).legend(
-            named.values(), named.keys(), loc="upper left", fontsize=7.5, borderpad=0.0
-        )
+    figure = Picture(10.2, 7.2)
+    figure.suptitle(title or _title(found), x=0.01, ha="left")
+    grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
+    upper = figure.add_subplot(grid[0, 0])
+    lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
+    for branch in found.branches:
+        hunts = branch.column("amplitude") > THRESHOLD
+        _draw(upper, branch, 1e3 * branch.column("amplitude"))
+        _draw(lower[0], branch, np.where(hunts, branch.column("frequency"), np.nan))
+        _draw(lower[1], branch, 1e-3 * branch.column("sum_Y_rms"))
+    _mark(upper, found)
+    for axes, limit, scale in (
+        (upper, found.amplitude_limit, 1e3),
+        (lower[1], found.instability_limit, 1e-3),
+    ):
+        if limit is not None:
+            words = "limits: 3 mm, half the limit of ΣY"
+            axes.axhline(scale * limit.limit, color=LIMIT, lw=0.8, ls=(0, (1, 2)), label=words)
+    words = f"Hunting, {found.type}" if found.type else "Hunting"
+    upper.set(ylabel="amplitude of the wheelsets (mm)", title=words, xlim=_shown(found))
+    upper.set(ylim=(0.0, None))
+    lower[0].set(ylabel="frequency (Hz)")
+    lower[1].set(xlabel="speed (m/s)", ylabel="ΣY, rms (kN)", ylim=(0.0, None))
+    if found.conicity_over_amplitude is not None:
+        _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
+    handles, labels = upper.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))  # of several branches of a kind once
+    figure.add_subplot(grid[1:, 1], frame_on=False, xticks=[], yticks=[]).legend(
+        named.values(), named.keys(), loc="upper left", fontsize=7.5, borderpad=0.0
+    )
     return figure
 
 
@@ -88,24 +88,24 @@ def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
     return 0.9 * min(marks), min(found.high, 1.25 * max(marks))
 
 
+@styled()
 def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     """What there is without a branch: linear critical speeds over amplitude, the conicity."""
     words = "no linear critical speed in the range"
     if found.linear is not None:
         words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
-    with styled():
-        figure = Picture(figsize=(8.4, 4.4), layout="constrained")
-        figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
-        left, right = figure.subplots(1, 2, sharey=True)
-        left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
-        left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
-        _mark(left, found)
-        if left.has_data():
-            left.legend(fontsize=7.5)
-        if found.conicity_over_amplitude is None:
-            say(right, "the wheelset does not fit between the rails")
-        else:
-            _conicity(right, found.conicity_over_amplitude)
+    figure = Picture(8.4, 4.4)
+    figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
+    left, right = figure.subplots(1, 2, sharey=True)
+    left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
+    left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
+    _mark(left, found)
+    if left.has_data():
+        left.legend(fontsize=7.5)
+    if found.conicity_over_amplitude is None:
+        say(right, "the wheelset does not fit between the rails")
+    else:
+        _conicity(right, found.conicity_over_amplitude)
     return figure
 
 
@@ -166,6 +166,7 @@ def _draw(axes: Axes, branch: Branch, values: np.ndarray) -> None:
         style["label"] = None  # once
 
 
+@styled()
 def map_figure(
     axes_values: Mapping[str, Sequence[float]], speeds: Mapping[str, np.ndarray], title: str
 ) -> Figure:
@@ -180,26 +181,25 @@ def map_figure(
     title : str
     """
     first, *others = axes_values
-    with styled():
-        figure = Picture(figsize=(8.4, 4.6), layout="constrained")
-        figure.suptitle(title, x=0.01, ha="left")
-        axes = figure.subplots()
-        for method, values in speeds.items():
-            for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):
-                more = f", {others[0]} {axes_values[others[0]][number]:g}" if others else ""
-                axes.plot(
-                    axes_values[first],
-                    column,
-                    marker="o",
-                    ms=3.5,
-                    color=DISTINCT[number % len(DISTINCT)],
-                    ls="-" if method.startswith("linear") else DASHED,
-                    label=f"{method}{more}",
-                )
-        axes.set(xlabel=first, ylabel="critical speed (m/s)")
-        if not any(np.isfinite(values).any() for values in speeds.values()):
-            say(axes, "no critical speed in the range at any point")
-            return figure
-        axes.set_ylim(0.0, None)
-        axes.legend()
+    figure = Picture(8.4, 4.6)
+    figure.suptitle(title, x=0.01, ha="left")
+    axes = figure.subplots()
+    for method, values in speeds.items():
+        for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):
+            more = f", {others[0]} {axes_values[others[0]][number]:g}" if others else ""
+            axes.plot(
+                axes_values[first],
+                column,
+                marker="o",
+                ms=3.5,
+                color=distinct(number),
+                ls="-" if method.startswith("linear") else DASHED,
+                label=f"{method}{more}",
+            )
+    axes.set(xlabel=first, ylabel="critical speed (m/s)")
+    if not any(np.isfinite(values).any() for values in speeds.values()):
+        say(axes, "no critical speed in the range at any point")
+        return figure
+    axes.set_ylim(0.0, None)
+    axes.legend()
     return figure

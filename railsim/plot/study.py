@@ -45,6 +45,7 @@ class Column:
         return sorted(there, key=lambda value: (isinstance(value, str), value))
 
 
+@styled()
 def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None) -> Figure:
     """Quantities over a parameter, a curve for each member of a family.
 
@@ -55,21 +56,19 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
     colours = _colours(len(members))
     others = [None] * len(x.values) if family is None else family.values
     points = list(zip(x.values, others, strict=True))
-    with styled():
-        figure, cells = _panels(len(quantities))
-        if len(set(points)) < len(points):
-            words = "Medians of the runs at each point; bands from the smallest to the largest"
-            figure.suptitle(words, x=0.01, ha="left", fontsize=8.5, fontweight="normal")
-        for axes, quantity in zip(cells, quantities, strict=True):
-            for member, colour in zip(members, colours, strict=True):
-                _curve(axes, quantity, x, _of(family, member), colour, member)
-            axes.set_title(quantity.words)
-            axes.set_xlabel(x.words)
-            if not x.numeric:
-                axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
-                _turned(axes)
-        if family is not None:
-            _legend(figure, cells[0], family.words)
+    figure, cells = _panels(len(quantities))
+    if len(set(points)) < len(points):
+        words = "Medians of the runs at each point; bands from the smallest to the largest"
+        figure.suptitle(words, x=0.01, ha="left", fontsize=8.5, fontweight="normal")
+    for axes, quantity in zip(cells, quantities, strict=True):
+        for member, colour in zip(members, colours, strict=True):
+            _curve(axes, quantity, x, _of(family, member), colour, member)
+        axes.set(title=quantity.words, xlabel=x.words)
+        if not x.numeric:
+            axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
+            _turned(axes)
+    if family is not None:
+        _legend(figure, cells[0], family.words)
     return figure
 
 
@@ -99,25 +98,24 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
             axes.vlines(at, low, high, color=colour, alpha=0.4, lw=4)
 
 
+@styled()
 def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
     """Quantities over two parameters in colours; the median where several runs share a point."""
-    with styled():
-        figure, cells = _panels(len(quantities))
-        columns, rows = x.different, y.different
-        for axes, quantity in zip(cells, quantities, strict=True):
-            there: dict[tuple[int, int], list[float]] = {}
-            for value, a, b in zip(quantity.values, x.values, y.values, strict=True):
-                if value is not None and a is not None and b is not None:
-                    there.setdefault((rows.index(b), columns.index(a)), []).append(value)
-            values = np.full((len(rows), len(columns)), np.nan)
-            for cell, found in there.items():
-                values[cell] = float(np.median(found))
-            _draw_map(figure, axes, values)
-            axes.set_title(quantity.words)
-            axes.set(xlabel=x.words, ylabel=y.words)
-            _ticks(axes.set_xticks, columns)
-            _turned(axes)
-            _ticks(axes.set_yticks, rows)
+    figure, cells = _panels(len(quantities))
+    columns, rows = x.different, y.different
+    for axes, quantity in zip(cells, quantities, strict=True):
+        there: dict[tuple[int, int], list[float]] = {}
+        for value, a, b in zip(quantity.values, x.values, y.values, strict=True):
+            if value is not None and a is not None and b is not None:
+                there.setdefault((rows.index(b), columns.index(a)), []).append(value)
+        values = np.full((len(rows), len(columns)), np.nan)
+        for cell, found in there.items():
+            values[cell] = float(np.median(found))
+        _draw_map(figure, axes, values)
+        axes.set(title=quantity.words, xlabel=x.words, ylabel=y.words)
+        _ticks(axes.set_xticks, columns)
+        _turned(axes)
+        _ticks(axes.set_yticks, rows)
     return figure
 
 
@@ -131,8 +129,9 @@ def _draw_map(figure: Figure, axes: Axes, values: Any) -> None:
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if value < middle else "black"
-            axes.text(column, row, f"{value:.3g}", ha="center", va="center", fontsize=7,
-                      color=colour)  # fmt: skip
+            axes.text(
+                column, row, f"{value:.3g}", ha="center", va="center", fontsize=7, color=colour
+            )
 
 
 def _ticks(tell: Any, values: Sequence[Any]) -> None:
@@ -149,26 +148,28 @@ def _turned(axes: Axes) -> None:
             label.set(ha="right", rotation_mode="anchor")
 
 
+@styled()
 def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure:
     """The runs with the largest values of each quantity."""
     most = max(min(MOST_RANKED, sum(v is not None for v in q.values)) for q in quantities)
-    with styled():
-        figure = Picture(
-            figsize=(9.8, len(quantities) * (0.9 + 0.2 * max(most, 2))), layout="constrained"
+    figure = Picture(9.8, len(quantities) * (0.9 + 0.2 * max(most, 2)))
+    grid = figure.subplots(len(quantities), 1, squeeze=False)
+    for axes, quantity in zip(grid[:, 0], quantities, strict=True):
+        pairs = [(v, n) for v, n in zip(quantity.values, names, strict=True) if v is not None]
+        shown = sorted(pairs, key=lambda pair: -pair[0])[:MOST_RANKED]
+        bars = axes.barh(
+            [unformatted(_shortened(n)) for _, n in shown],
+            [v for v, _ in shown],
+            color=DISTINCT[0],
+            height=0.7,
         )
-        grid = figure.subplots(len(quantities), 1, squeeze=False)
-        for axes, quantity in zip(grid[:, 0], quantities, strict=True):
-            pairs = [(v, n) for v, n in zip(quantity.values, names, strict=True) if v is not None]
-            shown = sorted(pairs, key=lambda pair: -pair[0])[:MOST_RANKED]
-            bars = axes.barh([unformatted(_shortened(n)) for _, n in shown],
-                             [v for v, _ in shown], color=DISTINCT[0], height=0.7)  # fmt: skip
-            axes.bar_label(bars, [f"{value:.4g}" for value, _ in shown], padding=3, fontsize=7)
-            axes.invert_yaxis()
-            axes.margins(x=0.1, y=0.02)
-            axes.tick_params(axis="y", labelsize=7)
-            left_out = len(pairs) - len(shown)
-            more = f", the largest {len(shown)} of {len(pairs)}" if left_out else ""
-            axes.set_title(quantity.words + more)
+        axes.bar_label(bars, [f"{value:.4g}" for value, _ in shown], padding=3, fontsize=7)
+        axes.invert_yaxis()
+        axes.margins(x=0.1, y=0.02)
+        axes.tick_params(axis="y", labelsize=7)
+        left_out = len(pairs) - len(shown)
+        more = f", the largest {len(shown)} of {len(pairs)}" if left_out else ""
+        axes.set_title(quantity.words + more)
     return figure
 
 
@@ -183,9 +184,7 @@ def _text(value: Any) -> str:
 def _panels(count: int) -> tuple[Figure, list[Axes]]:
     columns = 1 if count == 1 else 2
     rows = -(-count // columns)
-    figure = Picture(
-        figsize=(6.8 if columns == 1 else 10.0, 1.0 + 2.9 * rows), layout="constrained"
-    )
+    figure = Picture(6.8 if columns == 1 else 10.0, 1.0 + 2.9 * rows)
     cells = list(figure.subplots(rows, columns, squeeze=False).flat)
     for axes in cells[count:]:
         axes.remove()
@@ -204,6 +203,10 @@ def _legend(figure: Figure, axes: Axes, title: str) -> None:
     longest = max(map(len, labels), default=1)
     fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
     figure.legend(
-        handles, labels, loc="outside lower left", ncols=min(fitting, 8, len(labels)), title=title,
+        handles,
+        labels,
+        loc="outside lower left",
+        ncols=min(fitting, 8, len(labels)),
+        title=title,
         alignment="left",
-    )  # fmt: skip
+    )

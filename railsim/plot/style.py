@@ -19,9 +19,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from railsim.arrays import Floats
 from railsim.definitions.track.section import Section
 from railsim.files.access import PICTURES, check_file, whole_file
-from railsim.result.data import Array
 
 STYLE: Any = {
     "axes.axisbelow": True,
@@ -68,8 +68,18 @@ NARROW = 0.011
 LIMIT = "#b3122b"
 
 
+def distinct(number: int) -> str:
+    """Return the colour of the thing of a number, after the last the first again."""
+    return DISTINCT[number % len(DISTINCT)]
+
+
 class Picture(Figure):
-    """A figure that a notebook displays, without pyplot."""
+    """A figure that a notebook displays, without pyplot; width and height in inches."""
+
+    def __init__(self, width: float, height: float, title: str = "", **how: Any) -> None:
+        super().__init__(figsize=(width, height), **{"layout": "constrained"} | how)
+        if title:
+            self.suptitle(title, x=0.012, ha="left")
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
@@ -93,7 +103,7 @@ def wheelset_colours(names: Sequence[str]) -> dict[str, Any]:
     for name in names:
         bogies.setdefault(name.split(".")[0], []).append(name)
     if len(bogies) == len(names):
-        return {name: DISTINCT[i % len(DISTINCT)] for i, name in enumerate(names)}
+        return {name: distinct(i) for i, name in enumerate(names)}
     colours = {}
     for i, members in enumerate(bogies.values()):
         dark, light = HUES[i % len(HUES)]
@@ -117,7 +127,7 @@ class Span:
     high: float
 
 
-def spans(sections: Sequence[Section], distance: Array, axis: Array) -> list[Span]:
+def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[Span]:
     """Return the transitions and curves that a run passed, on the axis of a picture.
 
     Parameters
@@ -152,9 +162,9 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
         axes.annotate(
             words.replace("-", "−"),
             (0.5 * (span.low + span.high), 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
+            (0, 2),
+            ("data", "axes fraction"),
+            "offset points",
             ha="center",
             va="bottom",
             fontsize=6.5,

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.integrate import cumulative_simpson
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import (
     cant_sections,
@@ -23,7 +24,6 @@ from railsim.definitions.track.layout import (
 from railsim.definitions.track.section import Section
 from railsim.laws.permission import refused
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, shade, spans, styled
-from railsim.result.data import Array
 from railsim.text import unformatted
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
@@ -39,9 +39,10 @@ class _Row:
 
     title: str
     label: str
-    curves: dict[str, Array]
+    curves: dict[str, Floats]
 
 
+@styled()
 def track_figure(track: Track, title: str = "") -> Figure:
     """Draw a track: plan, curvature, cant, and what else is not constant along it.
 
@@ -69,35 +70,39 @@ def track_figure(track: Track, title: str = "") -> Figure:
     ]
     sections = curvature_sections(track)
     remarks = _marked(track)
-    with styled():
-        height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
-        figure = Picture(figsize=(8.0, height), layout="constrained")
-        axes = figure.subplots(1 + len(rows), 1, height_ratios=[1.9] + [1.0] * len(rows))
-        name = unformatted(title or track.name)
-        figure.suptitle(f"{name}\n ", x=0.012, ha="left")
-        figure.text(0.012, 1.0 - 0.30 / height, _constants(track), fontsize=8.5, va="top")
-        _plan(axes[0], alignment, sections, s)
-        shown = spans(sections, s, s)
-        for k, row in enumerate(rows):
-            _draw(axes[1 + k], row, s)
-            if k:
-                axes[1 + k].sharex(axes[1])
-            shade(axes[1 + k], shown, named=k == 0)
-            if k + 1 < len(rows):
-                axes[1 + k].tick_params(labelbottom=False)
-        for position, _ in remarks:
-            axes[1].plot(
-                position, 0.0, marker="^", ms=5, color=LIMIT, clip_on=False,
-                transform=axes[1].get_xaxis_transform(),
-            )  # fmt: skip
-        axes[-1].set_xlabel("Distance along the track $s$ (m)")
-        if remarks:
-            words = "\n".join(f"s = {position:.0f} m: {text}" for position, text in remarks)
-            figure.supxlabel(f"Remarks\n{words}", x=0.012, ha="left", fontsize=8, color=LIMIT)
-        return figure
+    height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
+    figure = Picture(8.0, height)
+    axes = figure.subplots(1 + len(rows), 1, height_ratios=[1.9] + [1.0] * len(rows))
+    name = unformatted(title or track.name)
+    figure.suptitle(f"{name}\n ", x=0.012, ha="left")
+    figure.text(0.012, 1.0 - 0.30 / height, _constants(track), fontsize=8.5, va="top")
+    _plan(axes[0], alignment, sections, s)
+    shown = spans(sections, s, s)
+    for k, row in enumerate(rows):
+        _draw(axes[1 + k], row, s)
+        if k:
+            axes[1 + k].sharex(axes[1])
+        shade(axes[1 + k], shown, named=k == 0)
+        if k + 1 < len(rows):
+            axes[1 + k].tick_params(labelbottom=False)
+    for position, _ in remarks:
+        axes[1].plot(
+            position,
+            0.0,
+            marker="^",
+            ms=5,
+            color=LIMIT,
+            clip_on=False,
+            transform=axes[1].get_xaxis_transform(),
+        )
+    axes[-1].set_xlabel("Distance along the track $s$ (m)")
+    if remarks:
+        words = "\n".join(f"s = {position:.0f} m: {text}" for position, text in remarks)
+        figure.supxlabel(f"Remarks\n{words}", x=0.012, ha="left", fontsize=8, color=LIMIT)
+    return figure
 
 
-def _draw(axes: Axes, row: _Row, s: Array) -> None:
+def _draw(axes: Axes, row: _Row, s: Floats) -> None:
     for k, (name, values) in enumerate(row.curves.items()):
         line = SIDE_LINES["right" if k else "left"]  # the second shows where both agree
         axes.plot(s, values, color=DISTINCT[k], ls=line, label=name)
@@ -106,14 +111,13 @@ def _draw(axes: Axes, row: _Row, s: Array) -> None:
     if len(row.curves) > 1:
         corner = (1.0, 0.93)  # beside the title
         axes.legend(loc="lower right", bbox_to_anchor=corner, ncols=len(row.curves))
-    axes.set_title(row.title)
-    axes.set_ylabel(row.label)
+    axes.set(title=row.title, ylabel=row.label)
     axes.margins(x=0.0)
     if all(np.ptp(values) == 0.0 for values in row.curves.values()):
         axes.set_ylim(min(axes.get_ylim()[0], -1.0), max(axes.get_ylim()[1], 1.0))
 
 
-def _alignment_rows(track: Track, alignment: Alignment, s: Array) -> list[_Row]:
+def _alignment_rows(track: Track, alignment: Alignment, s: Floats) -> list[_Row]:
     rows = [
         _Row(
             "Curvature, positive to the right",
@@ -132,7 +136,7 @@ def _alignment_rows(track: Track, alignment: Alignment, s: Array) -> list[_Row]:
     return rows
 
 
-def _rail_rows(track: Track, s: Array) -> list[_Row]:
+def _rail_rows(track: Track, s: Floats) -> list[_Row]:
     """Displacements of the rails by irregularities, and the gauge where it changes."""
     moved, without = shown_displacement(track), ""
     if names := refused(track):
@@ -160,7 +164,7 @@ def _rail_rows(track: Track, s: Array) -> list[_Row]:
     return rows
 
 
-def _friction_rows(track: Track, s: Array) -> list[_Row]:
+def _friction_rows(track: Track, s: Floats) -> list[_Row]:
     if track.friction_table is None:
         return []
     table_s, left, right = np.array(track.friction_table).T
@@ -168,7 +172,7 @@ def _friction_rows(track: Track, s: Array) -> list[_Row]:
     return [_Row("Friction", r"$\mu$", curves)]
 
 
-def _support_rows(track: Track, s: Array) -> list[_Row]:
+def _support_rows(track: Track, s: Floats) -> list[_Row]:
     if track.support.variation is None or track.support.preset == "rigid":
         return []
     table_s, pads, ballast = np.array(track.support.variation).T
@@ -210,7 +214,7 @@ def _marked(track: Track) -> list[tuple[float, str]]:
     return [*shown, (position, f"{text}; and {len(marked) - MOST_REMARKS} more")]
 
 
-def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Array) -> None:
+def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Floats) -> None:
     heading = alignment.heading(s)
     x = cumulative_simpson(np.cos(heading), x=s, initial=0.0)
     y = cumulative_simpson(np.sin(heading), x=s, initial=0.0)
@@ -220,9 +224,8 @@ def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Arra
         if section.type == "CIR":
             _name_curve(axes, section, s, x, y, heading)
     axes.plot(x[0], y[0], marker="o", color=KINDS["STR"][1], ms=4)
-    axes.set_title("Plan, from the dot on, seen from above")
-    axes.set_xlabel("$X$ (m)")
-    axes.set_ylabel("$Y$ (m), to the right")
+    axes.set(title="Plan, from the dot on, seen from above", xlabel="$X$ (m)")
+    axes.set(ylabel="$Y$ (m), to the right")
     axes.margins(0.1)
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
@@ -235,15 +238,18 @@ def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Arra
     axes.legend(handles=handles, loc="best")
 
 
-def _name_curve(axes: Axes, section: Section, s: Array, x: Array, y: Array, heading: Array) -> None:
+def _name_curve(
+    axes: Axes, section: Section, s: Floats, x: Floats, y: Floats, heading: Floats
+) -> None:
     """Write the radius on the outer side of a curve."""
     at = int(np.searchsorted(s, 0.5 * (section.begin + section.end)))
     outwards = -np.sign(section.start_value) * np.array([-np.sin(heading[at]), np.cos(heading[at])])
     axes.annotate(
         f"R {1.0 / section.start_value:.6g} m".replace("-", "\N{MINUS SIGN}"),
         (x[at], y[at]),
-        xytext=(12.0 * outwards[0], -12.0 * outwards[1]),  # Y points down on the page
-        textcoords="offset points",
+        (12.0 * outwards[0], -12.0 * outwards[1]),
+        "data",
+        "offset points",
         ha="left" if outwards[0] > 0.3 else "right" if outwards[0] < -0.3 else "center",
         va="bottom" if outwards[1] < -0.3 else "top" if outwards[1] > 0.3 else "center",
         fontsize=8,

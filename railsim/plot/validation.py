@@ -4,13 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.assessment.model_comparison import ModelValidation, Overlay
 from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
 
-Floats = NDArray[np.float64]
 WORDS = ("measured", "before", "after")
 MOST = 12  # channels of a picture
 LONGEST = 20_000  # values of a line
@@ -48,8 +47,7 @@ def scatter(validation: ModelValidation) -> Figure:
             for sign in (-1.0, 1.0):
                 axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
         axes.plot(measured, simulated, ".", color="C3" if one.verdict == "fail" else "C0")
-        axes.set_xlim(*ends)
-        axes.set_ylim(*ends)
+        axes.set(xlim=ends, ylim=ends)
         unit = one.quantity.column.unit
         axes.set_title(f"{one.quantity.name}: {one.verdict}", fontsize="small")
         axes.set_xlabel(f"measured{f' ({unit})' if unit else ''}", fontsize="small")

@@ -14,7 +14,7 @@ from railsim.definitions.base import Vector
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import Box, body_boxes
-from railsim.plot.style import DISTINCT, Picture, styled
+from railsim.plot.style import Picture, distinct, styled
 from railsim.text import unformatted
 
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
@@ -29,6 +29,7 @@ BOGIE = 4.0
 NEAR = (3.0, 0.4)
 
 
+@styled()
 def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     """Draw a vehicle in three views with its elements.
 
@@ -52,25 +53,24 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     """
     flat = flatten(vehicle)
     kinds = list(dict.fromkeys(_kind(element) for element in flat.elements))
-    colours = {kind: DISTINCT[i % len(DISTINCT)] for i, kind in enumerate(kinds)}
-    with styled():
-        figure = Picture(figsize=(11.0, 9.0), layout="constrained")
-        figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
-        grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
-        end, boxes = _leading_end(flat), body_boxes(flat)
-        for cell, view, limits in (
-            (grid[0, :], SIDE, None),
-            (grid[1, :], TOP, None),
-            (grid[2, 0], SIDE, end),
-            (grid[2, 1], TOP, end),
-            (grid[2, 2], BEHIND, None),
-        ):
-            axes = figure.add_subplot(cell)
-            for box in boxes.values():
-                axes.add_patch(_outline(box, view))
-            _draw_view(axes, view, flat, colours, limits)
-        figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
-        return figure
+    colours = {kind: distinct(i) for i, kind in enumerate(kinds)}
+    figure = Picture(11.0, 9.0)
+    figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
+    grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
+    end, boxes = _leading_end(flat), body_boxes(flat)
+    for cell, view, limits in (
+        (grid[0, :], SIDE, None),
+        (grid[1, :], TOP, None),
+        (grid[2, 0], SIDE, end),
+        (grid[2, 1], TOP, end),
+        (grid[2, 2], BEHIND, None),
+    ):
+        axes = figure.add_subplot(cell)
+        for box in boxes.values():
+            axes.add_patch(_outline(box, view))
+        _draw_view(axes, view, flat, colours, limits)
+    figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
+    return figure
 
 
 def _outline(box: Box, view: tuple[int, int]) -> Rectangle:
@@ -113,13 +113,11 @@ def _draw_view(
         if across == 0 and (limits is None or limits[0] < x < limits[1]):
             together.setdefault((round(x, 2), round(y, 2)), []).append(body.name)
     _name_bodies(axes, together, above=18 if upright == 2 else 10)
-    axes.set_title(TITLES[view] + (", leading end" if limits else ""))
-    axes.set_xlabel(LABELS[across])
-    axes.set_ylabel(LABELS[upright])
+    axes.set(title=TITLES[view] + (", leading end" if limits else ""), xlabel=LABELS[across])
+    axes.set(ylabel=LABELS[upright])
     axes.margins(0.06)
     if limits:
-        axes.set_xlim(*limits)
-        axes.set_ylim(*((-2.5, 0.5) if upright == 2 else (-1.7, 1.7)))
+        axes.set(xlim=limits, ylim=(-2.5, 0.5) if upright == 2 else (-1.7, 1.7))
     axes.set_aspect("equal", adjustable="box" if limits else "datalim")
     axes.invert_yaxis()
 
@@ -131,14 +129,17 @@ def _name_bodies(axes: Axes, together: dict[tuple[float, float], list[str]], abo
         if len(names) > 1:  # one behind the other: left and right
             names = [name.removesuffix("_left").removesuffix("_right") for name in names]
         words = ", ".join(dict.fromkeys(names))
-        near = sum(abs(x - other_x) < NEAR[0] and abs(y - other_y) < NEAR[1]
-                   for other_x, other_y in written)  # fmt: skip
+        near = sum(
+            abs(x - other_x) < NEAR[0] and abs(y - other_y) < NEAR[1]
+            for other_x, other_y in written
+        )
         written.append((x, y))
         label = axes.annotate(
             unformatted(words),
             (x, y),
             (0, above + 9 * near),
-            textcoords="offset points",
+            "data",
+            "offset points",
             ha="center",
             fontsize=7,
             color=BODY,

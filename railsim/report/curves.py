@@ -13,16 +13,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.track.section import Section
 from railsim.notation import plain_symbol
 from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result
 from railsim.text import printable
-
-Floats = NDArray[np.float64]
 
 CELLS = 6400  # of the horizontal axis; the page draws fewer, and more where it is zoomed
 MOST_VALUES = 1_600_000  # of all curves of a page, 2 bytes each

@@ -13,8 +13,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.errors import InputError, nearest, optional_package
 from railsim.notation import Quantity
 from railsim.plottable import image_tag, picture_of
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from railsim.definitions.vehicle.definition import Vehicle
 
 D = TypeVar("D")
-Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]
 Writer = Callable[["Result", str | Path, bool], Path]
 _WRITERS: dict[str, Writer] = {}  # of files; each enters itself when the package is imported
@@ -122,14 +121,14 @@ class Result:
 
     # -- the arrays ---------------------------------------------------------------------------
 
-    def __getitem__(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> Floats:
         """Return the array of quantity `name` [SI]."""
         try:
             return self._arrays[name]
         except KeyError:
             raise KeyError(f"no quantity '{name}'; {nearest(name, self._arrays)}") from None
 
-    def __getattr__(self, name: str) -> Array:
+    def __getattr__(self, name: str) -> Floats:
         if not name.startswith("_") and name in self._arrays:
             return self._arrays[name]
         raise AttributeError(f"a result has no '{name}'; {nearest(name, self._names())}")
@@ -184,7 +183,7 @@ class Result:
     def _names(self) -> tuple[str, ...]:
         return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
 
-    def part(self, name: str, rows: slice) -> Array:
+    def part(self, name: str, rows: slice) -> Floats:
         """Return some instants of a quantity; of a file that is not read yet only these are read.
 
         Parameters
@@ -198,7 +197,7 @@ class Result:
             raise KeyError(f"no quantity '{name}'; {nearest(name, self._arrays)}")
         return self._arrays.part(name, rows)
 
-    def series(self, name: str, **labels: str | int) -> Array:
+    def series(self, name: str, **labels: str | int) -> Floats:
         """Return one quantity, selected by labels along its dimensions.
 
         Parameters
@@ -266,7 +265,7 @@ class Result:
         return self._profiles
 
     @property
-    def groups(self) -> Mapping[str, Mapping[str, Array]]:
+    def groups(self) -> Mapping[str, Mapping[str, Floats]]:
         """Further arrays by group: ``state`` and ``peaks``."""
         return self._groups
 
@@ -320,7 +319,7 @@ class Result:
     def inputs(self) -> dict[str, Any]:
         """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
         facts = self._attributes
-        states: Mapping[str, Array] = self._groups.get("state", {})
+        states: Mapping[str, Floats] = self._groups.get("state", {})
         before = {"end": states.get("start"), "memory": states.get("start_memory")}
         return {
             "vehicle": self.vehicle(),
@@ -450,7 +449,7 @@ class Result:
         frame.attrs["units"] = {column: unit for column, unit, _ in found}
         return frame
 
-    def columns(self, *names: str) -> Iterator[tuple[str, str, Array]]:
+    def columns(self, *names: str) -> Iterator[tuple[str, str, Floats]]:
         """Yield name, unit and values of every column of quantities over time, see `to_pandas`."""
         over_time = [n for n, q in self._quantities.items() if q.dims[0] == "time" != n]
         for text in names or over_time:
@@ -474,16 +473,16 @@ def _remade(*parts: Any) -> Result:
     return Result(*parts[:-1], source=parts[-1])
 
 
-class FrozenArrays(Mapping[str, Array]):
+class FrozenArrays(Mapping[str, Floats]):
     """Read-only arrays by name."""
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:
         self._loaded = {name: frozen(array) for name, array in arrays.items()}
 
-    def __getitem__(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> Floats:
         return self._loaded[name]
 
-    def part(self, name: str, rows: slice) -> Array:
+    def part(self, name: str, rows: slice) -> Floats:
         """Return some rows of an array."""
         return self[name][rows]
 
@@ -494,6 +493,6 @@ class FrozenArrays(Mapping[str, Array]):
         return len(self._loaded)
 
 
-def frozen(array: Any) -> Array:
+def frozen(array: Any) -> Floats:
     """Return `array` as float64 that cannot be written to, nor made so."""
     return np.asarray(np.asarray(array, dtype=np.float64).data.toreadonly())

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.errors import InputError, argument_fault, nearest
 from railsim.files.access import check_file, whole_file
-from railsim.result.data import Array, Result
+from railsim.result.data import Result
 from railsim.result.filters import low_passed
 
 ENDINGS = (".csv", ".mat", ".parquet")
@@ -102,7 +103,7 @@ def selected(
     return Result(arrays, chosen, result.coordinates, result.attributes, result.profiles)
 
 
-def _smooth(time: Array, values: Array, rate: float) -> Array:
+def _smooth(time: Floats, values: Floats, rate: float) -> Floats:
     """Return values without what changes faster than half the rate; as they are at uneven times."""
     steps = np.diff(time[:-1])  # the last one may be shorter
     if len(steps) < 2 or np.ptp(steps) > 1e-6 * steps[0] or rate * steps[0] >= 1.0:
@@ -110,13 +111,13 @@ def _smooth(time: Array, values: Array, rate: float) -> Array:
     return low_passed(values, 1.0 / float(np.mean(steps)), 0.4 * rate)
 
 
-def _at(instants: Array, time: Array, values: Array) -> Array:
+def _at(instants: Floats, time: Floats, values: Floats) -> Floats:
     series = values.reshape(len(time), -1).T
     found = np.array([np.interp(instants, time, one) for one in series])
     return found.T.reshape(len(instants), *values.shape[1:])
 
 
-def _columns(result: Result) -> list[tuple[str, str, Array]]:
+def _columns(result: Result) -> list[tuple[str, str, Floats]]:
     """Return name, unit and values of every column, time first."""
     return [("time", "s", result["time"]), *result.columns()]
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.track.section import Section
 from railsim.notation import Quantity
-from railsim.result.data import Array, Result
+from railsim.result.data import Result
 from railsim.result.filters import low_passed
 
 PEAK_QUANTITIES = (
@@ -142,13 +143,13 @@ def evaluated(result: Result) -> slice:
     return slice(first if first < len(result["time"]) else 0, None)
 
 
-def _extreme(array: Array, kind: str) -> tuple[Any, ...]:
+def _extreme(array: Floats, kind: str) -> tuple[Any, ...]:
     """Index of the extreme value of an array; values that are not a number are left out."""
     key = {"abs": np.abs(array), "max": array, "min": -array}[kind]
     return np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
 
 
-def low_pass_of(result: Result, name: str, known: dict[str, Array] | None = None) -> Array | None:
+def low_pass_of(result: Result, name: str, known: dict[str, Floats] | None = None) -> Floats | None:
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
     Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
@@ -166,7 +167,7 @@ def low_pass_of(result: Result, name: str, known: dict[str, Array] | None = None
     rate = 1.0 / step
     known = {} if known is None else known
 
-    def passed(part: str) -> Array:
+    def passed(part: str) -> Floats:
         if part not in known:
             known[part] = low_passed(result[part], rate, LOW_PASS)
         return known[part]
@@ -184,7 +185,7 @@ def low_pass_of(result: Result, name: str, known: dict[str, Array] | None = None
     return np.asarray(smooth[evaluated(result)])
 
 
-def _with_low_pass(result: Result, found: Peak, known: dict[str, Array]) -> Peak:
+def _with_low_pass(result: Result, found: Peak, known: dict[str, Floats]) -> Peak:
     smooth = low_pass_of(result, found.quantity.name, known)
     if smooth is None or not len(smooth) or np.isnan(smooth).all():
         return found
@@ -210,7 +211,7 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
         return ()
     if names is None:
         names = [name for name in PEAK_QUANTITIES if name in result]
-    known: dict[str, Array] = {}
+    known: dict[str, Floats] = {}
     found: list[Peak] = []
     for name in names:
         for kind in ("max", "min") if name in BY_SIGN else ("abs",):
@@ -251,10 +252,10 @@ class MidCurve:
     radius: float
     distance: float
     time: float
-    values: Mapping[str, Array]
+    values: Mapping[str, Floats]
     peaks: tuple[Peak, ...]
-    medians: Mapping[str, Array]
-    scatter: Mapping[str, Array]
+    medians: Mapping[str, Floats]
+    scatter: Mapping[str, Floats]
     median_peaks: tuple[Peak, ...]
     full_curve: tuple[float, float]
     settling: bool
@@ -324,7 +325,7 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
     after = max(1, int(np.searchsorted(distance, middle)))
     share = (middle - distance[after - 1]) / (distance[after] - distance[after - 1])
 
-    def there(name: str) -> Array:
+    def there(name: str) -> Floats:
         array = result[name]
         return np.asarray((1.0 - share) * array[after - 1] + share * array[after])
 
@@ -335,9 +336,9 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
     rows = slice(
         int(np.searchsorted(distance, begin)), int(np.searchsorted(distance, end, "right"))
     )
-    medians: dict[str, Array] = {}
-    scatter: dict[str, Array] = {}
-    settling: list[Array] = []
+    medians: dict[str, Floats] = {}
+    scatter: dict[str, Floats] = {}
+    settling: list[Floats] = []
     for name, array in values.items():
         over = result.part(name, rows)
         if len(over) < 2:
@@ -358,7 +359,7 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
     )  # fmt: skip
 
 
-def _settling(values: Array) -> Array:
+def _settling(values: Floats) -> Floats:
     """Which columns are in their way to steady values; not those that do not change or have gaps.
 
     On smooth rails a vehicle in a full curve has a steady state: what changes so slowly that it
@@ -377,7 +378,7 @@ def _settling(values: Array) -> Array:
     return np.asarray((after < SETTLES * before) | (crossings < CROSSINGS))
 
 
-def _largest(result: Result, name: str, array: Array, time: float, distance: float) -> Peak:
+def _largest(result: Result, name: str, array: Floats, time: float, distance: float) -> Peak:
     """Largest magnitude over the dimensions of a quantity."""
     index = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
     labels = _labels(result, name, index)

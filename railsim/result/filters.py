@@ -17,10 +17,10 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy import fft  # scipy's takes a tenth of the whole command `run` to import
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Response = Callable[[Floats], NDArray[np.complex128] | Floats]
+from railsim.arrays import Complexes, Floats
+
+Response = Callable[[Floats], Complexes | Floats]
 
 BLOCK = 2**16
 """Samples of a block at least."""

@@ -31,11 +31,12 @@ from urllib.parse import quote
 import h5py
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError
 from railsim.files.access import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
-from railsim.result.data import Array, Attributes, Result, frozen, register_writer
+from railsim.result.data import Attributes, Result, frozen, register_writer
 from railsim.result.integrity import DIGEST, content_digest, seal
 from railsim.result.reading import open_result
 from railsim.result.sinks import (
@@ -120,7 +121,7 @@ class Hdf5Sink(SinkContext):
         self._overwrite = overwrite
         self._quantities: dict[str, Quantity] = {}
         self._datasets: dict[str, h5py.Dataset] = {}
-        self._blocks: dict[str, Array] = {}  # what waits to be written, by quantity
+        self._blocks: dict[str, Floats] = {}  # what waits to be written, by quantity
         self._crc: dict[str, int] = {}
         self._waiting = 0
         self._length = 0
@@ -165,7 +166,7 @@ class Hdf5Sink(SinkContext):
                 self._file, self._quantities[name], inner, length, self._storage
             )
 
-    def append(self, chunk: Mapping[str, Array]) -> None:
+    def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`; rows wait until they are worth writing."""
         rows, done = len(chunk["time"]), 0
         while done < rows:

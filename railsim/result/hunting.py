@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from railsim.result.data import Array, Result
+from railsim.arrays import Floats
+from railsim.result.data import Result
 from railsim.result.filters import band_passed
 
 LOW, HIGH = 0.5, 15.0  # Hz
@@ -45,7 +46,7 @@ HUNTS = "The vehicle hunts"  # how the sentence begins
 SEEN = ("time", "distance", "wheelset_distance", "wheelset_lateral", "sum_Y")
 """Quantities that are looked at."""
 
-Rails = Callable[[Array], tuple[Array, Array]]
+Rails = Callable[[Floats], tuple[Floats, Floats]]
 """Arc lengths to displacements of the rails (y_left, z_left, y_right, z_right) and their rates."""
 
 
@@ -94,7 +95,7 @@ class Hunting:
         )
 
 
-def thinned(chunk: Mapping[str, Array]) -> dict[str, Array]:
+def thinned(chunk: Mapping[str, Floats]) -> dict[str, Floats]:
     """Return what `hunting` looks at of a chunk of a run, at `RATE` or a little above."""
     time = chunk["time"]
     step = float(time[1] - time[0]) if len(time) > 1 else math.inf
@@ -119,11 +120,11 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
     rate = min(RATE, (len(time) - 1) / duration)
     grid = np.arange(time[0], time[-1], 1.0 / rate)
 
-    def seen(name: str) -> Array:
+    def seen(name: str) -> Floats:
         columns = record[name].reshape(len(time), -1).T
         return np.stack([np.interp(grid, time, column) for column in columns], axis=-1)
 
-    def band(values: Array) -> Array:
+    def band(values: Floats) -> Floats:
         return band_passed(values, rate, LOW, min(HIGH, 0.4 * rate))
 
     lateral, force = band(seen("wheelset_lateral")), band(seen("sum_Y"))
@@ -171,11 +172,11 @@ class _Cycles:
         In samples.
     """
 
-    def __init__(self, swing: Array) -> None:
+    def __init__(self, swing: Floats) -> None:
         self.starts = np.flatnonzero((swing[:-1] < 0.0) & (swing[1:] >= 0.0)) + 1
         self.lengths = np.diff(self.starts).astype(np.float64)
 
-    def amplitudes(self, record: Array) -> Array:
+    def amplitudes(self, record: Floats) -> Floats:
         """Amplitude of the first harmonic of each cycle in a record."""
         if not len(self.lengths):
             return np.zeros(0)
@@ -192,29 +193,29 @@ class _Cycles:
         return _regular(self.lengths) & (_mean(self.lengths) >= PER_CYCLE)
 
 
-def _windows(values: Array) -> Array:
+def _windows(values: Floats) -> Floats:
     """Windows of `CYCLES` values, none where there are fewer."""
     if len(values) < CYCLES:
         return np.zeros((0, CYCLES))
     return sliding_window_view(values, CYCLES)
 
 
-def _mean(values: Array) -> Any:
+def _mean(values: Floats) -> Any:
     return _windows(values).mean(axis=1)
 
 
-def _regular(values: Array) -> Any:
+def _regular(values: Floats) -> Any:
     """Whether the values of each window scatter by a share `REGULAR` of their mean at most."""
     return _windows(values).std(axis=1) <= REGULAR * _mean(values)
 
 
-def _same_waves(forced: Array, swing: Array) -> Any:
+def _same_waves(forced: Floats, swing: Floats) -> Any:
     """Whether irregularities of `forced` have waves of one amplitude in most of each window."""
     low, middle, high = np.percentile(_windows(forced), (25.0, 50.0, 75.0), axis=1)
     return (high - low <= SAME_WAVES * middle) & (middle > OF_SWING * _mean(swing))
 
 
-def _lasting(swing: Array) -> Any:
+def _lasting(swing: Floats) -> Any:
     """Whether the amplitude is large enough in each window, and does not fade."""
     windows = _windows(swing)
     before, after = windows[:, : CYCLES // 2].mean(axis=1), windows[:, CYCLES // 2 :].mean(axis=1)

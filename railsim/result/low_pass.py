@@ -13,8 +13,9 @@ from functools import cache
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.notation import Quantity
-from railsim.result.data import Array, Attributes
+from railsim.result.data import Attributes
 from railsim.result.sinks import ALWAYS, Sink, SinkBefore
 
 ATTENUATION = 80.0  # dB
@@ -59,7 +60,7 @@ class LowPassSink(SinkBefore):
         self._names = tuple(q.name for q in wanted if "time" in q.dims)
         super().begin(coordinates, wanted)
 
-    def append(self, chunk: Mapping[str, Array]) -> None:
+    def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`."""
         time = chunk["time"]
         if self._last is not None and time[-1] - (time[-2] if len(time) > 1 else self._last) < (
@@ -76,13 +77,13 @@ class LowPassSink(SinkBefore):
         self._hand_on(self._filter.end())
         return attributes
 
-    def _needed(self, chunk: Mapping[str, Array]) -> dict[str, Array]:
+    def _needed(self, chunk: Mapping[str, Floats]) -> dict[str, Floats]:
         names = set(self._names)
         if "Y_over_Q" in names:
             names = names - {"Y_over_Q"} | {"Y", "Q"}
         return {name: np.asarray(chunk[name]) for name in names}
 
-    def _hand_on(self, filtered: dict[str, Array]) -> None:
+    def _hand_on(self, filtered: dict[str, Floats]) -> None:
         if not filtered or not len(filtered["time"]):
             return
         if "Y_over_Q" in self._names:
@@ -104,11 +105,11 @@ class _Symmetric:
         taps = signal.firwin(2 * self._half + 1, corner, window=("kaiser", beta), fs=rate)
         self._taps = np.asarray(taps)
         self._every = every
-        self._window: dict[str, Array] = {}
+        self._window: dict[str, Floats] = {}
         self._started = False
         self._skip = 0  # rows before the middle of the next window
 
-    def take(self, chunk: dict[str, Array]) -> dict[str, Array]:
+    def take(self, chunk: dict[str, Floats]) -> dict[str, Floats]:
         """Filtered instants that are known with a further chunk."""
         self._window = {
             name: np.concatenate([self._window[name], array]) if self._window else array
@@ -121,7 +122,7 @@ class _Symmetric:
             self._started = True
         return self._filtered_windows()
 
-    def end(self) -> dict[str, Array]:
+    def end(self) -> dict[str, Floats]:
         """Filtered instants up to the end of the stream."""
         if not self._window or len(self._window["time"]) < 2:
             return {}
@@ -131,11 +132,11 @@ class _Symmetric:
         self._window = {name: self._before(array[::-1])[::-1] for name, array in last.items()}
         return self._filtered_windows()
 
-    def _before(self, array: Array) -> Array:
+    def _before(self, array: Floats) -> Floats:
         rows = np.minimum(np.arange(self._half, 0, -1), len(array) - 1)
         return np.concatenate([2.0 * array[0] - array[rows], array])
 
-    def _filtered_windows(self) -> dict[str, Array]:
+    def _filtered_windows(self) -> dict[str, Floats]:
         """Filter all whole windows and forget what no later one needs."""
         length = len(self._window["time"])
         count = (length - self._skip - 2 * self._half - 1) // self._every + 1
@@ -159,7 +160,7 @@ class _Symmetric:
 
 
 @cache
-def _banded(taps: bytes, count: int, every: int) -> Array:
+def _banded(taps: bytes, count: int, every: int) -> Floats:
     """Matrix that filters and thins out: row k holds the taps from column k `every` on."""
     values = np.frombuffer(taps)
     matrix = np.zeros((count, (count - 1) * every + len(values)))
@@ -177,10 +178,10 @@ class _Causal:
         self._signal = signal
         self._sections = signal.butter(4, corner, fs=rate, output="sos")
         self._every = every
-        self._states: dict[str, Array] = {}
+        self._states: dict[str, Floats] = {}
         self._skip = 0
 
-    def take(self, chunk: dict[str, Array]) -> dict[str, Array]:
+    def take(self, chunk: dict[str, Floats]) -> dict[str, Floats]:
         """Filtered instants of a further chunk."""
         found = {}
         for name, array in chunk.items():
@@ -198,6 +199,6 @@ class _Causal:
         self._skip = (self._skip - rows) % self._every
         return found
 
-    def end(self) -> dict[str, Array]:
+    def end(self) -> dict[str, Floats]:
         """Nothing is held back."""
         return {}

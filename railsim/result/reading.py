@@ -18,11 +18,12 @@ from urllib.parse import unquote
 import h5py
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError
 from railsim.files.access import is_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
-from railsim.result.data import Array, FrozenArrays, Result, frozen
+from railsim.result.data import FrozenArrays, Result, frozen
 from railsim.result.integrity import DIGEST, REMEDY, content_digest, sealed
 from railsim.result.sinks import FORMAT
 
@@ -148,18 +149,18 @@ class StoredArrays(FrozenArrays):
         self._shapes = dict(shapes)
         self._stamp = stamp
 
-    def __getitem__(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> Floats:
         if name not in self._loaded:
             if name not in self._shapes:
                 raise KeyError(name)
             self._loaded[name] = self._read(name)
         return self._loaded[name]
 
-    def part(self, name: str, rows: slice) -> Array:
+    def part(self, name: str, rows: slice) -> Floats:
         """Return some rows of an array; only these are read."""
         return self._loaded[name][rows] if name in self._loaded else self._read(name, rows)
 
-    def _read(self, name: str, rows: slice | tuple[()] = ()) -> Array:
+    def _read(self, name: str, rows: slice | tuple[()] = ()) -> Floats:
         with _readable(self._path, name), h5py.File(self._absolute, "r") as file:
             _refuse_another(self._path, file, self._stamp)
             return frozen(file[name][rows])
@@ -332,7 +333,7 @@ class _Reader:
 
     def _check_peaks(
         self,
-        arrays: Mapping[str, Array],
+        arrays: Mapping[str, Floats],
         quantities: Mapping[str, Quantity],
         coordinates: Mapping[str, tuple[str, ...]],
     ) -> None:
@@ -401,7 +402,7 @@ class _Reader:
             sign=str(facts.get("comment", "")),
         )
 
-    def _floats(self, name: str, dataset: h5py.Dataset) -> Array:
+    def _floats(self, name: str, dataset: h5py.Dataset) -> Floats:
         if dataset.dtype.kind == "S":
             raise self.fault(name, "names instead of numbers")
         with _readable(self._path, name):

@@ -9,14 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.constants import GRAVITY
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, flatten
 from railsim.track.alignment import Alignment
 
-Floats = NDArray[np.float64]
 BOX = 1.0
 """Distance of a sensor on an axlebox from the middle of the wheelset [m]."""
 NEAR = 3.0

@@ -19,9 +19,10 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.notation import COMPONENTS, QUANTITIES, SIDES, Quantity
 from railsim.profiles.profile import Profile
-from railsim.result.data import Array, Attributes, Result
+from railsim.result.data import Attributes, Result
 from railsim.version import __version__
 
 FORMAT = "railsim-result/2"
@@ -46,7 +47,7 @@ class Sink(Protocol):
             All quantities, those without time (for `close`) included.
         """
 
-    def append(self, chunk: Mapping[str, Array]) -> None:
+    def append(self, chunk: Mapping[str, Floats]) -> None:
         """Take consecutive instants: for every quantity with time an array, time first."""
 
     def close(
@@ -138,7 +139,7 @@ class MemorySink(SinkContext):
         self._only = only
         self._quantities: dict[str, Quantity] = {}
         self._coordinates: dict[str, tuple[str, ...]] = {}
-        self._chunks: dict[str, list[Array]] = {}
+        self._chunks: dict[str, list[Floats]] = {}
 
     def begin(
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
@@ -152,7 +153,7 @@ class MemorySink(SinkContext):
         self._coordinates = full_coordinates(coordinates)
         self._chunks = {name: [] for name in timed(self._quantities)}
 
-    def append(self, chunk: Mapping[str, Array]) -> None:
+    def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`."""
         for name, chunks in self._chunks.items():
             chunks.append(np.array(chunk[name], dtype=np.float64))

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.notation import QUANTITIES
-from railsim.result.data import Array, Attributes
+from railsim.result.data import Attributes
 from railsim.result.sinks import Sink, SinkBefore
 
 LOOKED_AT = ("Q", "Y", "sum_Y")
@@ -32,7 +33,7 @@ class StoredPeaks(SinkBefore):
         self.largest: dict[str, float] = {}
         self.remark: Callable[[], str] = str
 
-    def append(self, chunk: Mapping[str, Array]) -> None:
+    def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`."""
         for name in LOOKED_AT:
             if name in chunk and len(chunk[name]):
@@ -46,7 +47,7 @@ class StoredPeaks(SinkBefore):
 
 
 def lost_peak(
-    stored: Mapping[str, float], of_steps: Mapping[str, Array], outputs: str, *, filtered: bool
+    stored: Mapping[str, float], of_steps: Mapping[str, Floats], outputs: str, *, filtered: bool
 ) -> str:
     """Sentence on the peak of which most is lost in what is stored; empty where none loses much.
 

@@ -9,9 +9,8 @@ kept, and nan where a nest has no physical solution.  The formulas are those of 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Flags, Floats
 from railsim.definitions.spring import Search, TrailingArmSuspension
 from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
@@ -65,9 +64,9 @@ class Evaluation:
     deflection_error: Pair  # deviation from the mounting and the target deflection [m]
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
+    def feasible(self) -> Flags:
         """Whether every limit is kept (to round-off)."""
-        kept: NDArray[np.bool_] = np.all([slack >= -1e-9 for slack in self.slack.values()], axis=0)
+        kept: Flags = np.all([slack >= -1e-9 for slack in self.slack.values()], axis=0)
         return kept
 
 
