@@ -8,14 +8,10 @@ from railsim.constants import CANT_BASE, GRAVITY
 def cant_deficiency(speed: float, curvature: float, cant: float) -> float:
     """Return the cant deficiency, 2 b_0 V^2 kappa/g - cant [m].
 
-    Parameters
-    ----------
-    speed : float
-        [m/s]
-    curvature, cant : float
-        Signed [1/m], [m]: with a curvature positive to the right and a cant positive where the left
-        rail is higher the deficiency is positive towards the left rail; with the magnitude of the
-        curvature and the cant of its outer rail it is positive towards the outer rail.
+    `speed`: [m/s]. `curvature`, `cant`: Signed [1/m], [m]: with a curvature positive to the right
+    and a cant positive where the left rail is higher the deficiency is positive towards the left
+    rail; with the magnitude of the curvature and the cant of its outer rail it is positive towards
+    the outer rail.
 
     Examples
     --------
@@ -28,17 +24,8 @@ def cant_deficiency(speed: float, curvature: float, cant: float) -> float:
 def curve_speed(radius: float, height: float) -> float:
     """Return the speed at which cant and cant deficiency together are `height`.
 
-    Parameters
-    ----------
-    radius : float
-        Of either sign [m].
-    height : float
-        Cant of the outer rail plus cant deficiency, 2 b_0 V^2/(g R) [m].
-
-    Returns
-    -------
-    float
-        [m/s]; nan for a negative height.
+    `radius`: Of either sign [m]. `height`: Cant of the outer rail plus cant deficiency, 2 b_0
+    V^2/(g R) [m]. Returns: [m/s]; nan for a negative height.
 
     Examples
     --------

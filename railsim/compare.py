@@ -23,21 +23,11 @@ WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
 @dataclass(frozen=True)
 class Comparison:
-    """One value of all results.
+    """One value of all results."""
 
-    Attributes
-    ----------
-    quantity : Quantity
-        What is compared.
-    where : str
-        ``peak``, ``largest`` or ``smallest`` of the run, or ``full curve 1, median``.
-    peaks : mapping of str to Peak
-        The value of every result that has it, by the result's label.
-    """
-
-    quantity: Quantity
-    where: str
-    peaks: Mapping[str, Peak]
+    quantity: Quantity  # what is compared
+    where: str  # ``peak``, ``largest`` or ``smallest`` of the run, or ``full curve 1, median``
+    peaks: Mapping[str, Peak]  # the value of every result that has it, by the result's label
 
     @property
     def differences(self) -> dict[str, float]:
@@ -103,24 +93,15 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
 class Difference:
     """Difference of a result from the first one along the track, in one series of a quantity.
 
-    Attributes
-    ----------
-    quantity : Quantity
-    labels : mapping of str to str
-        Where on the vehicle: dimension to name.
-    result : str
-        What the result is called.
-    distance : float64[position]
-        Positions of the first result's reference body that both have passed [m].
-    values : float64[position]
-        Value of this result less that of the first [SI].
+    `distance` (float64[position]): Positions of the first result's reference body that both have
+    passed [m].
     """
 
     quantity: Quantity
-    labels: Mapping[str, str]
-    result: str
+    labels: Mapping[str, str]  # where on the vehicle: dimension to name
+    result: str  # what the result is called
     distance: Floats
-    values: Floats
+    values: Floats  # value of this result less that of the first [SI], float64[position]
 
     @property
     def largest(self) -> tuple[float, float]:
@@ -134,16 +115,8 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
 
     Values are interpolated linearly between outputs.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-        Results over one and the same plan.
-    names : sequence of str
-        Quantities of wheels or wheelsets.
-
-    Raises
-    ------
-    InputError : results over different plans, or that have no part of the track in common.
+    `results`: Results over one and the same plan. `names`: Quantities of wheels or wheelsets.
+    Raises InputError: results over different plans, or that have no part of the track in common.
     """
     (first, base), *others = results.items()
     faults = []

@@ -64,14 +64,8 @@ def argument_fault(
 ) -> Fault:
     """Return what is wrong with an argument of a function.
 
-    Parameters
-    ----------
-    parameter : str
-        Its name in Python.
-    key, found, allowed : str
-        As in `Fault`.
-    option : str, optional
-        The command line's option, where it is not called as the parameter.
+    `parameter`: Its name in Python. `key`, `found`, `allowed`: As in `Fault`. `option`: The
+    command line's option, where it is not called as the parameter.
 
     Examples
     --------
@@ -167,6 +161,18 @@ class InputError(RailsimError):
         self.faults = tuple(found)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
+    @classmethod
+    def of(cls, file: str, key: str, found: str, allowed: str, option: str = "") -> "InputError":
+        """Return the error of a single fault; arguments as of `Fault`."""
+        return cls([Fault(file, key, found, allowed, option)])
+
+
+def argument_error(
+    parameter: str, key: str, found: str, allowed: str, option: str | None = None
+) -> InputError:
+    """Return the error of a single `argument_fault`."""
+    return InputError([argument_fault(parameter, key, found, allowed, option)])
+
 
 def input_error(file: str, found: str, allowed: str = "", key: str = "") -> InputError:
     """Return the error of one fault, see `Fault`."""
@@ -213,9 +219,7 @@ class ModelError(RailsimError):
 def optional_package(name: str, method: str, install: str) -> Any:
     """Return a package that a method needs and that may not be installed.
 
-    Raises
-    ------
-    ImportError : it is not; with the command that installs it.
+    Raises ImportError: it is not; with the command that installs it.
     """
     try:
         return import_module(name)

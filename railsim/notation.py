@@ -49,38 +49,21 @@ Formula = Callable[[Mapping[str, Any]], Any]
 class Quantity:
     """A named quantity of a result.
 
-    Attributes
-    ----------
-    name, long_name : str
-        Name in files and in Python; words for axes and tables.
-    symbol : str
-        Symbol in mathtext, for plots.
-    unit : str
-        SI unit as stored; where the components differ, that of x, y, z and that of the angles,
-        separated by a comma.
-    dims : tuple of str
-        Dimensions in the result file.
-    shown_unit : str
-        Unit in printed tables and plots, the habit of the field.
-    scale : float
-        Shown value = stored value times `scale`.
-    sign : str
-        What a positive value means; empty for magnitudes and where the name says it.
-    request : str
-        Key of `settings.outputs` that asks for it; empty for the usual quantities.
-    formula : callable, optional
-        Its values from those of other quantities by name, `speed` of the vehicle among them (SI).
+    `name`, `long_name`: Name in files and in Python; words for axes and tables. `unit`: SI unit as
+    stored; where the components differ, that of x, y, z and that of the angles, separated by a
+    comma. `formula`: Its values from those of other quantities by name, `speed` of the vehicle
+    among them (SI).
     """
 
     name: str
     long_name: str
-    symbol: str
+    symbol: str  # symbol in mathtext, for plots
     unit: str
-    dims: tuple[str, ...]
-    shown_unit: str
-    scale: float
-    sign: str = ""
-    request: str = ""
+    dims: tuple[str, ...]  # dimensions in the result file
+    shown_unit: str  # unit in printed tables and plots, the habit of the field
+    scale: float  # shown value = stored value times `scale`
+    sign: str = ""  # what a positive value means; empty for magnitudes and where the name says it
+    request: str = ""  # key of `settings.outputs` that asks for it; empty for the usual quantities
     formula: Formula | None = field(default=None, compare=False, repr=False)
 
     def text(self, value: float) -> str:
@@ -151,12 +134,13 @@ def _row(
     symbol: str,
     shown: str,
     dims: tuple[str, ...],
-    sign: str = "",
     formula: Formula | None = None,
 ) -> Quantity:
     known = [SHOWN_UNITS.get(unit, (unit, 1.0)) for unit in shown.split(", ")]
     unit = ", ".join(stored for stored, _ in known)
-    return Quantity(name, words, symbol, unit, dims, shown, known[0][1], sign, "", formula)
+    return Quantity(
+        name, words, symbol, unit, dims, shown, known[0][1], SIGNS.get(name, ""), "", formula
+    )
 
 
 GREEK = {"Delta": "Δ", "Sigma": "Σ", "varphi": "φ", "phi": "φ", "psi": "ψ", "theta": "θ",
@@ -189,209 +173,101 @@ def _requested(key: str, *rows: Quantity) -> tuple[Quantity, ...]:
     return tuple(replace(row, request=key) for row in rows)
 
 
+SIGNS = {
+    "distance": "along the track; 0 at the start of the track",
+    "mileage": "as the track's file gives it; the distance where it does not",
+    "curvature": "positive to the right",
+    "cant": "positive with the left rail higher",
+    "Q": "on the rail, perpendicular to the track plane, positive pressing on the rail",
+    "Y": "on the rail, in the track plane, positive to the right",
+    "Y_over_Q": "positive when the wheel pushes its rail outwards",
+    "dQ_over_Q0": "positive when the wheel is loaded more than at rest on straight level track",
+    "sum_Y": "on the track, positive to the right",
+    "wheelset_lateral": "from the middle of the irregular, deflected rails under the "
+    "wheelset, along the line over their tops, positive to the right",
+    "wheelset_roll": "relative to the line over the tops of the irregular, deflected rails, "
+    "positive with the right wheel down",
+    "wheelset_yaw": "relative to the radial position, positive with the nose to the right",
+    "wheelset_distance": "along the track; 0 at the start of the track",
+    "xi_x": "of the most loaded patch: wheel minus rail, over the speed, positive forward",
+    "xi_y": "of the most loaded patch: wheel minus rail, over the speed, positive to the right",
+    "phi": "of the most loaded patch: about the normal into the rail",
+    "contact_y": "of the most loaded patch: from the wheelset's centre in track axes, to the right",
+    "contact_z": "of the most loaded patch: from the wheelset's centre in track axes, down",
+    "T_gamma": "T_x xi_x + T_y xi_y, summed over the patches, without the spin's part",
+    "T_gamma_spin": "M_z phi, summed over the patches",
+    "Q0": "at rest on straight level track",
+    "body_position": "relative to the track frame of the body; zero in the nominal position",
+    "body_velocity": "relative to the track frame of the body",
+    "body_acceleration": "absolute, in body axes",
+    "element_deflection": "body 2 against body 1, axes of body 1; a link's elongation stands "
+    "under x",
+    "element_force": "on body 1, its axes; a link's tension stands under x",
+    "element_power": "taken from the bodies",
+    "element_command": "behind its delay, before its lag; 0 where nothing is commanded",
+    "frictional_power": "turned into heat in the contact, with spin and the flange back on "
+    "check rails",
+    "axle_torque": "forwards positive",
+    "patch_pressure": "Hertz: 3 N / (2 pi a b)",
+    "patch_angle": "positive where the normal into the rail leans to the right",
+    "patch_x": "from the wheelset's centre, forwards",
+    "patch_y": "from the wheelset's centre, to the right",
+    "patch_z": "from the wheelset's centre, down",
+    "patch_T_x": "on the rail, forwards",
+    "patch_T_y": "on the rail, in the contact plane to the right",
+    "patch_T_gamma": "T_x xi_x + T_y xi_y, without the spin's part",
+    "check_rail_force": "on the back of the flange, lateral; not part of Y",
+    "check_rail_T_gamma": "friction work at the back of the flange per metre of the vehicle's way",
+    "sensor_acceleration": "absolute acceleration minus gravity, in body axes; zero at rest "
+    "on level track",
+    "sensor_roll_rate": "absolute, positive with the right side going down",
+    "sensor_absolute_acceleration": "absolute, in body axes, gravity not taken off",
+    "sensor_velocity": "relative to the moving track frame of its body, in its axes",
+    "sensor_displacement": "from its position in the nominal vehicle, in the track frame of "
+    "its body",
+    "wheelset_lateral_on_track": "of the wheelset's centre in the track frame, positive to "
+    "the right",
+    "wheelset_roll_on_track": "relative to the canted track plane, positive with the right "
+    "wheel down",
+    "track_curvature": "positive to the right",
+    "track_cant": "positive with the left rail higher",
+    "track_gradient": "positive uphill",
+    "rail_lateral": "irregularity at the wheelset's position, to the right",
+    "rail_vertical": "irregularity at the wheelset's position, down",
+    "rail_deflection_lateral": "of the elastic rail under the wheel, to the right",
+    "rail_deflection_vertical": "of the elastic rail under the wheel, down",
+}
+"""What a positive value means, or against what it is measured, by the quantity's name."""
+
 QUANTITIES = {
     row.name: row
     for row in (
         _row("time", "time", "t", "s", _RUN),
-        _row(
-            "distance",
-            "distance of the reference body",
-            "s",
-            "m",
-            _RUN,
-            "along the track; 0 at the start of the track",
-        ),
-        _row(
-            "mileage",
-            "mileage of the reference body",
-            "s_m",
-            "m",
-            _RUN,
-            "as the track's file gives it; the distance where it does not",
-        ),
-        _row(
-            "curvature",
-            "curvature at the reference body",
-            r"\kappa",
-            "1/km",
-            _RUN,
-            "positive to the right",
-        ),
-        _row(
-            "cant",
-            "cant at the reference body",
-            "h",
-            "mm",
-            _RUN,
-            "positive with the left rail higher",
-        ),
-        _row(
-            "Q",
-            "vertical wheel force",
-            "Q",
-            "kN",
-            _WHEEL,
-            "on the rail, perpendicular to the track plane, positive pressing on the rail",
-        ),
-        _row(
-            "Y",
-            "guiding force",
-            "Y",
-            "kN",
-            _WHEEL,
-            "on the rail, in the track plane, positive to the right",
-        ),
-        _row(
-            "Y_over_Q",
-            "derailment quotient",
-            "Y/Q",
-            "-",
-            _WHEEL,
-            "positive when the wheel pushes its rail outwards",
-        ),
-        _row(
-            "dQ_over_Q0",
-            "wheel load change",
-            r"\Delta Q/Q_0",
-            "%",
-            _WHEEL,
-            "positive when the wheel is loaded more than at rest on straight level track",
-        ),
-        _row(
-            "sum_Y",
-            "track shift force",
-            r"\Sigma Y",
-            "kN",
-            _AXLE,
-            "on the track, positive to the right",
-        ),
+        _row("distance", "distance of the reference body", "s", "m", _RUN),
+        _row("mileage", "mileage of the reference body", "s_m", "m", _RUN),
+        _row("curvature", "curvature at the reference body", r"\kappa", "1/km", _RUN),
+        _row("cant", "cant at the reference body", "h", "mm", _RUN),
+        _row("Q", "vertical wheel force", "Q", "kN", _WHEEL),
+        _row("Y", "guiding force", "Y", "kN", _WHEEL),
+        _row("Y_over_Q", "derailment quotient", "Y/Q", "-", _WHEEL),
+        _row("dQ_over_Q0", "wheel load change", r"\Delta Q/Q_0", "%", _WHEEL),
+        _row("sum_Y", "track shift force", r"\Sigma Y", "kN", _AXLE),
         _row("sum_abs_Y", "sum of guiding-force magnitudes", r"\Sigma |Y|", "kN", _AXLE),
-        _row(
-            "wheelset_lateral",
-            "wheelset lateral displacement",
-            "y",
-            "mm",
-            _AXLE,
-            (
-                "from the middle of the irregular, deflected rails under the wheelset, along the "
-                "line over their tops, positive to the right"
-            ),
-        ),
-        _row(
-            "wheelset_roll",
-            "wheelset roll angle",
-            r"\varphi",
-            "mrad",
-            _AXLE,
-            (
-                "relative to the line over the tops of the irregular, deflected rails, positive "
-                "with the right wheel down"
-            ),
-        ),
-        _row(
-            "wheelset_yaw",
-            "wheelset yaw angle",
-            r"\psi",
-            "mrad",
-            _AXLE,
-            "relative to the radial position, positive with the nose to the right",
-        ),
-        _row(
-            "wheelset_distance",
-            "distance of the wheelset",
-            "s",
-            "m",
-            _AXLE,
-            "along the track; 0 at the start of the track",
-        ),
-        _row(
-            "xi_x",
-            "longitudinal creepage",
-            r"\xi_x",
-            "1e-3",
-            _WHEEL,
-            "of the most loaded patch: wheel minus rail, over the speed, positive forward",
-        ),
-        _row(
-            "xi_y",
-            "lateral creepage",
-            r"\xi_y",
-            "1e-3",
-            _WHEEL,
-            "of the most loaded patch: wheel minus rail, over the speed, positive to the right",
-        ),
-        _row(
-            "phi",
-            "spin creepage",
-            r"\phi",
-            "1/m",
-            _WHEEL,
-            "of the most loaded patch: about the normal into the rail",
-        ),
-        _row(
-            "contact_y",
-            "lateral position of contact",
-            "y_c",
-            "mm",
-            _WHEEL,
-            "of the most loaded patch: from the wheelset's centre in track axes, to the right",
-        ),
-        _row(
-            "contact_z",
-            "depth of contact",
-            "z_c",
-            "mm",
-            _WHEEL,
-            "of the most loaded patch: from the wheelset's centre in track axes, down",
-        ),
-        _row(
-            "T_gamma",
-            "wear number",
-            r"T\gamma",
-            "N",
-            _WHEEL,
-            "T_x xi_x + T_y xi_y, summed over the patches, without the spin's part",
-        ),
-        _row(
-            "T_gamma_spin",
-            "wear number of spin",
-            r"T\gamma_\phi",
-            "N",
-            _WHEEL,
-            "M_z phi, summed over the patches",
-        ),
-        _row(
-            "Q0",
-            "static wheel load",
-            "Q_0",
-            "kN",
-            ("wheelset", "side"),
-            "at rest on straight level track",
-        ),
-        _row(
-            "body_position",
-            "position of the body",
-            "q",
-            "mm, mrad",
-            _BODY,
-            "relative to the track frame of the body; zero in the nominal position",
-        ),
-        _row(
-            "body_velocity",
-            "velocity of the body",
-            r"\dot q",
-            "m/s, rad/s",
-            _BODY,
-            "relative to the track frame of the body",
-        ),
-        _row(
-            "body_acceleration",
-            "acceleration of the body",
-            "a",
-            "m/s2, rad/s2",
-            _BODY,
-            "absolute, in body axes",
-        ),
+        _row("wheelset_lateral", "wheelset lateral displacement", "y", "mm", _AXLE),
+        _row("wheelset_roll", "wheelset roll angle", r"\varphi", "mrad", _AXLE),
+        _row("wheelset_yaw", "wheelset yaw angle", r"\psi", "mrad", _AXLE),
+        _row("wheelset_distance", "distance of the wheelset", "s", "m", _AXLE),
+        _row("xi_x", "longitudinal creepage", r"\xi_x", "1e-3", _WHEEL),
+        _row("xi_y", "lateral creepage", r"\xi_y", "1e-3", _WHEEL),
+        _row("phi", "spin creepage", r"\phi", "1/m", _WHEEL),
+        _row("contact_y", "lateral position of contact", "y_c", "mm", _WHEEL),
+        _row("contact_z", "depth of contact", "z_c", "mm", _WHEEL),
+        _row("T_gamma", "wear number", r"T\gamma", "N", _WHEEL),
+        _row("T_gamma_spin", "wear number of spin", r"T\gamma_\phi", "N", _WHEEL),
+        _row("Q0", "static wheel load", "Q_0", "kN", ("wheelset", "side")),
+        _row("body_position", "position of the body", "q", "mm, mrad", _BODY),
+        _row("body_velocity", "velocity of the body", r"\dot q", "m/s, rad/s", _BODY),
+        _row("body_acceleration", "acceleration of the body", "a", "m/s2, rad/s2", _BODY),
     )
 }
 """The usual quantities of a run, by name."""
@@ -401,38 +277,10 @@ REQUESTED = {
     for row in (
         *_requested(
             "elements",
-            _row(
-                "element_deflection",
-                "deflection of the element",
-                "d",
-                "mm, mrad",
-                _ELEMENT,
-                "body 2 against body 1, axes of body 1; a link's elongation stands under x",
-            ),
-            _row(
-                "element_force",
-                "force of the element",
-                "F",
-                "kN, kN m",
-                _ELEMENT,
-                "on body 1, its axes; a link's tension stands under x",
-            ),
-            _row(
-                "element_power",
-                "power of the element",
-                "P",
-                "kW",
-                ("time", "element"),
-                "taken from the bodies",
-            ),
-            _row(
-                "element_command",
-                "command of the element",
-                "u",
-                "SI",
-                ("time", "element"),
-                "behind its delay, before its lag; 0 where nothing is commanded",
-            ),
+            _row("element_deflection", "deflection of the element", "d", "mm, mrad", _ELEMENT),
+            _row("element_force", "force of the element", "F", "kN, kN m", _ELEMENT),
+            _row("element_power", "power of the element", "P", "kW", ("time", "element")),
+            _row("element_command", "command of the element", "u", "SI", ("time", "element")),
         ),
         *_requested(
             "frictional_power",
@@ -442,7 +290,6 @@ REQUESTED = {
                 "P_f",
                 "kW",
                 _WHEEL,
-                "turned into heat in the contact, with spin and the flange back on check rails",
                 frictional_power,
             ),
         ),
@@ -454,116 +301,39 @@ REQUESTED = {
                 "M_d",
                 "kN m",
                 _AXLE,
-                "forwards positive",
             ),
         ),
         *_requested(
             "contact_patches",
             _row("patch_N", "normal force of the patch", "N", "kN", _PATCH),
-            _row(
-                "patch_pressure",
-                "largest pressure of the patch",
-                "p_{max}",
-                "MPa",
-                _PATCH,
-                "Hertz: 3 N / (2 pi a b)",
-            ),
+            _row("patch_pressure", "largest pressure of the patch", "p_{max}", "MPa", _PATCH),
             _row("patch_a", "semi-axis of the patch along the rail", "a", "mm", _PATCH),
             _row("patch_b", "semi-axis of the patch across the rail", "b", "mm", _PATCH),
-            _row(
-                "patch_angle",
-                "contact angle",
-                r"\gamma",
-                "mrad",
-                _PATCH,
-                "positive where the normal into the rail leans to the right",
-            ),
-            _row(
-                "patch_x",
-                "position of the patch along the track",
-                "x_c",
-                "mm",
-                _PATCH,
-                "from the wheelset's centre, forwards",
-            ),
-            _row(
-                "patch_y",
-                "position of the patch across the track",
-                "y_c",
-                "mm",
-                _PATCH,
-                "from the wheelset's centre, to the right",
-            ),
-            _row(
-                "patch_z",
-                "depth of the patch",
-                "z_c",
-                "mm",
-                _PATCH,
-                "from the wheelset's centre, down",
-            ),
-            _row(
-                "patch_T_x",
-                "longitudinal creep force",
-                "T_x",
-                "kN",
-                _PATCH,
-                "on the rail, forwards",
-            ),
-            _row(
-                "patch_T_y",
-                "lateral creep force",
-                "T_y",
-                "kN",
-                _PATCH,
-                "on the rail, in the contact plane to the right",
-            ),
-            _row(
-                "patch_T_gamma",
-                "wear number of the patch",
-                r"T\gamma_c",
-                "N",
-                _PATCH,
-                "T_x xi_x + T_y xi_y, without the spin's part",
-            ),
+            _row("patch_angle", "contact angle", r"\gamma", "mrad", _PATCH),
+            _row("patch_x", "position of the patch along the track", "x_c", "mm", _PATCH),
+            _row("patch_y", "position of the patch across the track", "y_c", "mm", _PATCH),
+            _row("patch_z", "depth of the patch", "z_c", "mm", _PATCH),
+            _row("patch_T_x", "longitudinal creep force", "T_x", "kN", _PATCH),
+            _row("patch_T_y", "lateral creep force", "T_y", "kN", _PATCH),
+            _row("patch_T_gamma", "wear number of the patch", r"T\gamma_c", "N", _PATCH),
             _row("patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH),
         ),
         *_requested(
             "check_rail",
+            _row("check_rail_force", "force of the check rail", "F_c", "kN", _WHEEL),
             _row(
-                "check_rail_force",
-                "force of the check rail",
-                "F_c",
-                "kN",
-                _WHEEL,
-                "on the back of the flange, lateral; not part of Y",
-            ),
-            _row(
-                "check_rail_T_gamma",
-                "wear number of the check rail",
-                r"T\gamma_{cr}",
-                "N",
-                _WHEEL,
-                "friction work at the back of the flange per metre of the vehicle's way",
+                "check_rail_T_gamma", "wear number of the check rail", r"T\gamma_{cr}", "N", _WHEEL
             ),
         ),
         *_requested(
             "sensors",
-            _row(
-                "sensor_acceleration",
-                "reading of the accelerometer",
-                "a",
-                "m/s2",
-                _SENSOR,
-                "absolute acceleration minus gravity, in body axes; zero at rest on level track",
-            ),
+            _row("sensor_acceleration", "reading of the accelerometer", "a", "m/s2", _SENSOR),
             _row(
                 "sensor_roll_rate",
                 "roll velocity of the body",
                 r"\dot\varphi",
                 "rad/s",
                 ("time", "sensor"),
-                "absolute, positive with the right side going down",
             ),
             _row(
                 "sensor_absolute_acceleration",
@@ -571,24 +341,9 @@ REQUESTED = {
                 "a_{abs}",
                 "m/s2",
                 _SENSOR,
-                "absolute, in body axes, gravity not taken off",
             ),
-            _row(
-                "sensor_velocity",
-                "velocity of the point",
-                "v",
-                "m/s",
-                _SENSOR,
-                "relative to the moving track frame of its body, in its axes",
-            ),
-            _row(
-                "sensor_displacement",
-                "displacement of the point",
-                "u",
-                "mm",
-                _SENSOR,
-                "from its position in the nominal vehicle, in the track frame of its body",
-            ),
+            _row("sensor_velocity", "velocity of the point", "v", "m/s", _SENSOR),
+            _row("sensor_displacement", "displacement of the point", "u", "mm", _SENSOR),
         ),
         *_requested(
             "track",
@@ -598,7 +353,6 @@ REQUESTED = {
                 "y_0",
                 "mm",
                 _AXLE,
-                "of the wheelset's centre in the track frame, positive to the right",
             ),
             _row(
                 "wheelset_roll_on_track",
@@ -606,63 +360,15 @@ REQUESTED = {
                 r"\varphi_0",
                 "mrad",
                 _AXLE,
-                "relative to the canted track plane, positive with the right wheel down",
             ),
+            _row("track_curvature", "curvature at the wheelset", r"\kappa", "1/km", _AXLE),
+            _row("track_cant", "cant at the wheelset", "h", "mm", _AXLE),
+            _row("track_gradient", "gradient at the wheelset", "i", "per mille", _AXLE),
+            _row("rail_lateral", "lateral displacement of the rail", "y_r", "mm", _WHEEL),
+            _row("rail_vertical", "vertical displacement of the rail", "z_r", "mm", _WHEEL),
+            _row("rail_deflection_lateral", "lateral deflection of the rail", "u_y", "mm", _WHEEL),
             _row(
-                "track_curvature",
-                "curvature at the wheelset",
-                r"\kappa",
-                "1/km",
-                _AXLE,
-                "positive to the right",
-            ),
-            _row(
-                "track_cant",
-                "cant at the wheelset",
-                "h",
-                "mm",
-                _AXLE,
-                "positive with the left rail higher",
-            ),
-            _row(
-                "track_gradient",
-                "gradient at the wheelset",
-                "i",
-                "per mille",
-                _AXLE,
-                "positive uphill",
-            ),
-            _row(
-                "rail_lateral",
-                "lateral displacement of the rail",
-                "y_r",
-                "mm",
-                _WHEEL,
-                "irregularity at the wheelset's position, to the right",
-            ),
-            _row(
-                "rail_vertical",
-                "vertical displacement of the rail",
-                "z_r",
-                "mm",
-                _WHEEL,
-                "irregularity at the wheelset's position, down",
-            ),
-            _row(
-                "rail_deflection_lateral",
-                "lateral deflection of the rail",
-                "u_y",
-                "mm",
-                _WHEEL,
-                "of the elastic rail under the wheel, to the right",
-            ),
-            _row(
-                "rail_deflection_vertical",
-                "vertical deflection of the rail",
-                "u_z",
-                "mm",
-                _WHEEL,
-                "of the elastic rail under the wheel, down",
+                "rail_deflection_vertical", "vertical deflection of the rail", "u_z", "mm", _WHEEL
             ),
         ),
     )

@@ -55,21 +55,10 @@ def rendered(
 ) -> str:
     """Return a page as HTML.
 
-    Parameters
-    ----------
-    package : str
-        Where its files are.
-    template : str
-        File of the block ``body``; it extends ``base``.
-    title : str
-    styles, scripts : sequence of str
-        Files that become part of the page.
-    data : optional
-        Data of the scripts, in the element ``data``; no number may be infinite or undefined.
-    schemes : str
-        Colour schemes that the styles know.
-    **values
-        What the template refers to.
+    `package`: Where its files are. `template`: File of the block ``body``; it extends ``base``.
+    `styles`, `scripts`: Files that become part of the page. `data`: Data of the scripts, in the
+    element ``data``; no number may be infinite or undefined. `schemes`: Colour schemes that the
+    styles know. `**values`: What the template refers to.
     """
 
     def text(name: str) -> str:

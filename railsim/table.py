@@ -43,26 +43,15 @@ NARROWEST = 6
 class Column:
     """A quantity in a table.
 
-    Attributes
-    ----------
-    name : str
-        Key in `Table.records`, and heading in CSV.
-    words : str
-        Heading where people read; `name` by default.
-    unit : str
-        Unit in which values are shown; those of `SHOWN_UNITS` are converted from SI.
-    format : str
-        Format of shown numbers (``.2f``), ``>`` for texts aligned to the right, or empty for
-        texts.
-    symbol : str
-        Symbol of the quantity, in mathtext.
+    `format`: Format of shown numbers (``.2f``), ``>`` for texts aligned to the right, or empty for
+    texts.
     """
 
-    name: str
-    words: str = ""
-    unit: str = ""
+    name: str  # key in `Table.records`, and heading in CSV
+    words: str = ""  # heading where people read; `name` by default
+    unit: str = ""  # unit in which values are shown; those of `SHOWN_UNITS` are converted from SI
     format: str = ""
-    symbol: str = ""
+    symbol: str = ""  # symbol of the quantity, in mathtext
 
     @classmethod
     def of(cls, quantity: Quantity, words: str = "") -> "Column":

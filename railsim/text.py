@@ -72,10 +72,7 @@ _VARYING = re.compile(r"\w+(?:\.\w+)+|\d+(?:\.\d+)?(?:e[+-]?\d+)?|\b(?:left|righ
 def counted_remarks(remarks: Iterable[tuple[str, str]]) -> list[str]:
     """Return remarks on runs, those that differ in numbers and names alone as one with a count.
 
-    Parameters
-    ----------
-    remarks : iterable of (str, str)
-        Name of the run, or nothing; remark.
+    `remarks`: Name of the run, or nothing; remark.
 
     Examples
     --------

@@ -45,14 +45,12 @@ def speed_in_si(value: Any) -> Any:
 def range_values(text: str) -> list[float] | None:
     """Return the values of a range in SI; None where it is nothing of the kind.
 
+    Raises ValueError: fewer than one value or too many of them, or no ratio leads from end to end.
+
     Examples
     --------
     >>> range_values("10:20:3"), range_values("log:1e4:1e6:3"), range_values("36:72:2 km/h")
     ([10.0, 15.0, 20.0], [10000.0, 100000.0, 1000000.0], [10.0, 20.0])
-
-    Raises
-    ------
-    ValueError : fewer than one value or too many of them, or no ratio leads from end to end.
     """
     found = _RANGE.fullmatch(text.strip())
     if not found:

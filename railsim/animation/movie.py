@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from railsim.animation.scene import Drawn, Scene
 from railsim.arrays import Floats
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.files.access import check_file, whole_file
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
@@ -34,20 +34,9 @@ def write_movie(
 ) -> Path:
     """Write a scene as a film; the ending of the name says which kind.
 
-    Parameters
-    ----------
-    scene : Scene
-        One picture for each of its frames.
-    path : str or Path
-        ``.gif`` or ``.mp4``.
-    frames_per_second : int
-        Pictures a second when it is played.
-    gain : float
-        Factor on the motion of the bodies against their nominal positions.
-
-    Raises
-    ------
-    InputError : the name or the location; MP4 without ffmpeg.
+    `scene`: One picture for each of its frames. `path`: ``.gif`` or ``.mp4``. `frames_per_second`:
+    Pictures a second when it is played. `gain`: Factor on the motion of the bodies against their
+    nominal positions. Raises InputError: the name or the location; MP4 without ffmpeg.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
@@ -55,9 +44,7 @@ def write_movie(
     if path.suffix.lower() == ".mp4":
         if shutil.which("ffmpeg") is None:
             allowed = "install ffmpeg, or write a .gif or .html"
-            raise InputError(
-                [argument_fault("path", path.name, "MP4 needs ffmpeg", allowed, "--out")]
-            )
+            raise argument_error("path", path.name, "MP4 needs ffmpeg", allowed, "--out")
         writer = FFMpegWriter(fps=frames_per_second)
     else:
         writer = PillowWriter(fps=frames_per_second)

@@ -17,18 +17,9 @@ def write_page(
 ) -> Path:
     """Write a scene as an HTML page.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is shown at first.
-    path : str or Path
-    modes : sequence of Scene
-        Modes of the same vehicle to choose from, the scene among them.
-    overwrite : bool
-
-    Raises
-    ------
-    InputError : the file exists and may not be overwritten, or cannot be written.
+    `scene`: What is shown at first. `modes`: Modes of the same vehicle to choose from, the scene
+    among them. Raises InputError: the file exists and may not be overwritten, or cannot be
+    written.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=(".html", ".htm"))

@@ -14,7 +14,7 @@ from railsim.arrays import Floats
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import body_boxes
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import Fault, InputError, argument_error, nearest
 from railsim.result import Result
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
@@ -30,22 +30,15 @@ LARGEST = 0.05  # displacement of a mode over the vehicle's length
 class Drawn:
     """A body to draw.
 
-    Attributes
-    ----------
-    name, kind : str
-        Kind ``car``, ``frame`` or ``wheelset``.
-    offset : float
-        Arc length of its frame beyond that of the reference body [m].
-    y, z : float
-        Nominal position of its centre of gravity in the track frame [m].
-    box : tuple of float
-        Half length, half width and half height, and the middle of the box from the centre of
-        gravity, x, y, z [m]; of a wheelset its radius, half the wheels' distance, and zeros.
+    `name`, `kind`: Kind ``car``, ``frame`` or ``wheelset``. `y`, `z`: Nominal position of its
+    centre of gravity in the track frame [m]. `box`: Half length, half width and half height, and
+    the middle of the box from the centre of gravity, x, y, z [m]; of a wheelset its radius, half
+    the wheels' distance, and zeros.
     """
 
     name: str
     kind: str
-    offset: float
+    offset: float  # arc length of its frame beyond that of the reference body [m]
     y: float
     z: float
     box: tuple[float, float, float, float, float, float]
@@ -55,29 +48,17 @@ class Drawn:
 class Scene:
     """Everything that a page or a film shows.
 
-    Attributes
-    ----------
-    title : str
-    bodies : tuple of Drawn
-    time, distance : float64[frame]
-        [s], [m]
-    pose : float64[frame, body, 6]
-        Against the nominal position, as `body_position`; those of wheelsets in y, z and roll
-        against their rails, which are drawn without irregularities [m], [rad].
-    track : dict
-        ``s``, ``x``, ``y``, ``heading``, ``cant`` along the track [m], [rad].
-    Q, Y : float64[frame, wheelset, 2] or None
-        Wheel forces on the rail [N]; None for a mode.
-    contact : float64[frame, wheelset, 2, 3] or None
-        Where they act: of the most loaded patch, from the wheelset's centre, NaN without contact;
-        of results without it the nominal rolling circles [m].
-    sections : tuple of pairs of dict
-        Wheel and rail profiles of each wheelset, left and right, see `railsim.animation.wheels`.
-    seats : float64[frame, wheelset, 2] or None
-        Height of the wheelsets' centres, z, at which their wheels touch the drawn rails, and by how
-        much these stand further apart than the gauge [m].
-    patches : dict or None
-        ``y``, ``z`` [m] and ``N`` [N] of all patches, [frame, wheelset, side, patch].
+    `time`, `distance` (float64[frame]): [s], [m]. `pose` (float64[frame, body, 6]): Against the
+    nominal position, as `body_position`; those of wheelsets in y, z and roll against their rails,
+    which are drawn without irregularities [m], [rad]. `track`: ``s``, ``x``, ``y``, ``heading``,
+    ``cant`` along the track [m], [rad]. `Q`, `Y` (float64[frame, wheelset, 2]): Wheel forces on
+    the rail [N]; None for a mode. `contact` (float64[frame, wheelset, 2, 3]): Where they act: of
+    the most loaded patch, from the wheelset's centre, NaN without contact; of results without it
+    the nominal rolling circles [m]. `sections`: Wheel and rail profiles of each wheelset, left and
+    right, see `railsim.animation.wheels`. `seats` (float64[frame, wheelset, 2]): Height of the
+    wheelsets' centres, z, at which their wheels touch the drawn rails, and by how much these stand
+    further apart than the gauge [m]. `patches`: ``y``, ``z`` [m] and ``N`` [N] of all patches,
+    [frame, wheelset, side, patch].
     """
 
     title: str
@@ -99,18 +80,9 @@ def result_scene(
 ) -> Scene:
     """Scene of a run.
 
-    Parameters
-    ----------
-    result : Result
-        With `body_position`, Q and Y.
-    frames : int
-        Number of frames at most.
-    between : (float, float), optional
-        Distances of the reference body between which the run is shown [m].
-
-    Raises
-    ------
-    InputError : the result lacks something; nothing lies between.
+    `result`: With `body_position`, Q and Y. `frames`: Number of frames at most. `between`:
+    Distances of the reference body between which the run is shown [m]. Raises InputError: the
+    result lacks something; nothing lies between.
     """
     missing = [name for name in NEEDED if name not in result]
     if missing:
@@ -119,13 +91,13 @@ def result_scene(
     distance = result["distance"]
     if len(distance) < 2:
         found = f"{len(distance)} instants: {result.status}"
-        raise InputError([Fault("result", "time", found, "a run of some length")])
+        raise InputError.of("result", "time", found, "a run of some length")
     low, high = between or (float(distance[0]), float(distance[-1]))
     first, last = np.searchsorted(distance, [low, high])
     if last - first < 2:
         found = f"nothing between {low:g} and {high:g} m"
         allowed = f"the run goes from {distance[0]:.6g} to {distance[-1]:.6g} m"
-        raise InputError([argument_fault("between", "", found, allowed)])
+        raise argument_error("between", "", found, allowed)
     rows = np.unique(np.linspace(first, last - 1, min(frames, last - first)).astype(int))
     vehicle = result.vehicle()
     flat = flatten(vehicle)
@@ -176,15 +148,8 @@ def mode_scene(
 
     The largest displacement is 5 % of the vehicle's length.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    mode : mapping
-        With ``name``, ``frequency``, ``damping_ratio`` and ``shape`` {"body.component": [re, im]}.
-
-    Raises
-    ------
-    InputError : the shape names bodies that the vehicle does not have.
+    `mode`: With ``name``, ``frequency``, ``damping_ratio`` and ``shape`` {"body.component": [re,
+    im]}. Raises InputError: the shape names bodies that the vehicle does not have.
     """
     flat = flatten(vehicle)
     drawn = _drawn(flat)
@@ -195,14 +160,14 @@ def mode_scene(
     for key, (real, imaginary) in mode["shape"].items():
         body, _, component = key.rpartition(".")
         if body not in known or component not in components:
-            raise InputError([Fault("modes", key, "not of this vehicle", nearest(body, known))])
+            raise InputError.of("modes", key, "not of this vehicle", nearest(body, known))
         if body in names and not (component == "pitch" and drawn[names.index(body)].kind ==
                                   "wheelset"):  # fmt: skip
             shape[names.index(body), components.index(component)] = complex(real, imaginary)
     length = max(body.offset for body in drawn) - min(body.offset for body in drawn)
     largest = max(_largest(body, own) for body, own in zip(drawn, shape, strict=True))
     if largest == 0.0:
-        raise InputError([Fault("modes", "shape", "nothing moves", "another mode")])
+        raise InputError.of("modes", "shape", "nothing moves", "another mode")
     shape = shape * LARGEST * length / largest
     phase = np.linspace(0.0, 2.0 * np.pi * cycles, frames * cycles)
     frequency = float(mode["frequency"])
@@ -268,9 +233,7 @@ def chosen_mode(
 ) -> Mapping[str, Any]:
     """Mode by name or number (from 1); the first one by default; `option` asks for it.
 
-    Raises
-    ------
-    InputError : there is none of this name.
+    Raises InputError: there is none of this name.
     """
     names = [str(mode["name"]) for mode in modes]
     if wanted is None:
@@ -278,5 +241,5 @@ def chosen_mode(
     if wanted.isdigit() and 1 <= int(wanted) <= len(modes):
         return modes[int(wanted) - 1]
     if wanted not in names:
-        raise InputError([Fault(option, wanted, "no such mode", nearest(wanted, names))])
+        raise InputError.of(option, wanted, "no such mode", nearest(wanted, names))
     return modes[names.index(wanted)]

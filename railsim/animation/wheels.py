@@ -20,11 +20,8 @@ STEPS = 10  # of the search for it
 def sections(result: Result, flat: FlatVehicle) -> tuple[tuple[Section, ...], ...]:
     """Profiles of each wheelset, left and right.
 
-    Returns
-    -------
-    tuple of pairs of dict
-        ``wheel_y``, ``wheel_z`` in the wheelset's axes (y from its middle, z from its axis),
-        ``rail_y``, ``rail_z`` in track axes, y rising [m].
+    Returns: ``wheel_y``, ``wheel_z`` in the wheelset's axes (y from its middle, z from its axis),
+    ``rail_y``, ``rail_z`` in track axes, y rising [m].
     """
     track = result.track()
     found = []
@@ -58,11 +55,8 @@ def contact_points(
     A wheel that yaws touches ahead of its axle or behind it by -z dz/dy psi, with the slope of its
     profile at the point of contact; its axle is there at -y psi (to first order in the yaw psi).
 
-    Returns
-    -------
-    float64[frame, wheelset, side, 3]
-        NaN where a wheel does not touch; the nominal rolling circles where the result does not have
-        `contact_y` and `contact_z` [m].
+    Returns float64[frame, wheelset, side, 3]: NaN where a wheel does not touch; the nominal
+    rolling circles where the result does not have `contact_y` and `contact_z` [m].
     """
     found = np.zeros((len(rows), len(profiles), 2, 3))
     known = all(name in result for name in ("contact_y", "contact_z", "wheelset_yaw"))
@@ -92,15 +86,9 @@ def seats(
     A result gives the wheelset against the middle of its rails and the line over their tops.  The
     height follows from touching, and the distance of elastic rails from touching on both sides.
 
-    Parameters
-    ----------
-    pose : float64[frame, wheelset, 6]
-        Of which y and roll against the rails count [m], [rad].
-
-    Returns
-    -------
-    float64[frame, wheelset, 2]
-        z of the wheelset's centre, and by how much the rails stand further apart [m].
+    `pose` (float64[frame, wheelset, 6]): Of which y and roll against the rails count [m], [rad].
+    Returns float64[frame, wheelset, 2]: z of the wheelset's centre, and by how much the rails
+    stand further apart [m].
     """
     found = np.zeros((len(rows), len(profiles), 2))
     moved = shown_displacement(result.track())

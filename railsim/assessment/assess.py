@@ -21,7 +21,7 @@ from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits, load_running_limits
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_error
 from railsim.result import Result
 
 RUNNING = ("en14363", "uic518")
@@ -200,9 +200,7 @@ def assess(
     if isinstance(results, Result):
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
-        raise InputError(
-            [argument_fault("standard", "", standard, "one of " + ", ".join(STANDARDS))]
-        )
+        raise argument_error("standard", "", standard, "one of " + ", ".join(STANDARDS))
     groups: dict[str, dict[str, Result]] = {}
     for name, result in results.items():
         groups.setdefault(group_key(result), {})[name] = result

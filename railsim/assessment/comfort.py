@@ -29,18 +29,8 @@ BLOCKS = 60
 def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
     """Root mean squares of consecutive complete blocks.
 
-    Parameters
-    ----------
-    a : float64[time, ...]
-        Weighted acceleration [m/s2].
-    rate : float
-        Samples per second [1/s].
-    length : float
-        Length of a block [s].
-
-    Returns
-    -------
-    float64[block, ...]
+    `a` (float64[time, ...]): Weighted acceleration [m/s2]. `rate`: Samples per second [1/s].
+    `length`: Length of a block [s]. Returns float64[block, ...].
     """
     size = round(length * rate)
     whole = len(a) // size
@@ -52,21 +42,15 @@ def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
 class MeanComfort:
     """Mean comfort at one measuring point.
 
-    Attributes
-    ----------
-    N_MV, N_VA, N_VD : float
-        Index on the floor, seated, standing [1].
-    continuous : float64[block, 3]
-        Continuous comfort: the root mean squares over 5 s with Wd, Wd, Wb along x, y, z [m/s2].
-    blocks : int
-        Number of blocks of 5 s; the standard requires 60.
+    `N_MV`, `N_VA`, `N_VD`: Index on the floor, seated, standing [1]. `continuous` (float64[block,
+    3]): Continuous comfort: the root mean squares over 5 s with Wd, Wd, Wb along x, y, z [m/s2].
     """
 
     N_MV: float
     N_VA: float
     N_VD: float
     continuous: Floats
-    blocks: int
+    blocks: int  # number of blocks of 5 s; the standard requires 60
 
 
 def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
@@ -79,17 +63,8 @@ def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
     The accelerations of the seat surface (A) and back (D) are those of the floor: the model has no
     seat.
 
-    Parameters
-    ----------
-    a : float64[time, 3]
-        Acceleration along x, y, z [m/s2].
-    rate : float
-        Samples per second [1/s].
-
-    Returns
-    -------
-    MeanComfort
-        Values are nan where the record is shorter than a block.
+    `a` (float64[time, 3]): Acceleration along x, y, z [m/s2]. `rate`: Samples per second [1/s].
+    Returns: Values are nan where the record is shorter than a block.
     """
     floor, back = weighted_for_comfort(a, rate)
     return mean_comfort(block_rms(floor, rate), block_rms(back, rate))
@@ -106,12 +81,8 @@ def weighted_for_comfort(a: Floats, rate: float) -> tuple[Floats, Floats]:
 def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
     """Indices from the root mean squares of blocks, see `en12299_mean_comfort`.
 
-    Parameters
-    ----------
-    rms : float64[block, 3]
-        On the floor, weighted [m/s2].
-    back : float64[block]
-        Along x with Wc [m/s2].
+    `rms` (float64[block, 3]): On the floor, weighted [m/s2]. `back` (float64[block]): Along x with
+    Wc [m/s2].
     """
     if not len(rms):
         return MeanComfort(math.nan, math.nan, math.nan, rms, 0)
@@ -129,24 +100,12 @@ def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
 
 @dataclass(frozen=True)
 class Vibration:
-    """Evaluation after ISO 2631-1.
+    """Evaluation after ISO 2631-1."""
 
-    Attributes
-    ----------
-    rms : float64[3]
-        Weighted root mean squares along x, y, z [m/s2].
-    total : float
-        Vibration total value a_v [m/s2].
-    MTVV : float64[3]
-        Largest running root mean square over 1 s [m/s2].
-    VDV : float64[3]
-        Fourth power vibration dose value [m/s1.75].
-    """
-
-    rms: Floats
-    total: float
-    MTVV: Floats
-    VDV: Floats
+    rms: Floats  # weighted root mean squares along x, y, z [m/s2], float64[3]
+    total: float  # vibration total value a_v [m/s2]
+    MTVV: Floats  # largest running root mean square over 1 s [m/s2], float64[3]
+    VDV: Floats  # fourth power vibration dose value [m/s1.75], float64[3]
 
 
 def iso2631_vibration(a: Floats, rate: float) -> Vibration:
@@ -154,12 +113,7 @@ def iso2631_vibration(a: Floats, rate: float) -> Vibration:
 
     a_v = sqrt(awx^2 + awy^2 + awz^2); VDV = (integral of aw^4 dt)^(1/4).
 
-    Parameters
-    ----------
-    a : float64[time, 3]
-        Acceleration along x, y, z [m/s2].
-    rate : float
-        Samples per second [1/s].
+    `a` (float64[time, 3]): Acceleration along x, y, z [m/s2]. `rate`: Samples per second [1/s].
     """
     weighted = np.stack(
         [weighting.weighted(a[:, k], rate) for k, weighting in enumerate((WD, WD, WK))], axis=-1
@@ -199,17 +153,8 @@ def motion_sickness_dose(a: Floats, rate: float) -> float:
     Weighted with Wf; the percentage of people who may vomit is about a third of it (ISO 2631-1,
     annex D).
 
-    Parameters
-    ----------
-    a : float64[time]
-        Vertical acceleration [m/s2].
-    rate : float
-        Samples per second [1/s].
-
-    Returns
-    -------
-    float
-        [m/s1.5].
+    `a` (float64[time]): Vertical acceleration [m/s2]. `rate`: Samples per second [1/s]. Returns:
+    [m/s1.5].
 
     Examples
     --------
@@ -226,18 +171,9 @@ def p_ct(acceleration: float, jerk: float, roll_rate: float, posture: str) -> fl
 
     P_CT = max(A y'' + B y''' - C, 0) + D r^E.
 
-    Parameters
-    ----------
-    acceleration, jerk : float
-        Largest lateral acceleration [m/s2] and its largest change within 1 s [m/s3].
-    roll_rate : float
-        Largest roll velocity [deg/s].
-    posture : {'standing', 'seated'}
-
-    Returns
-    -------
-    float
-        [%].
+    `acceleration`, `jerk`: Largest lateral acceleration [m/s2] and its largest change within 1 s
+    [m/s3]. `roll_rate`: Largest roll velocity [deg/s]. `posture` ({'standing', 'seated'}).
+    Returns: [%].
 
     Examples
     --------
@@ -266,14 +202,9 @@ def p_de(peak_to_peak: float, mean: float, posture: str) -> float:
 class TransitionComfort:
     """Comfort on one curve transition.
 
-    Attributes
-    ----------
-    begin, end : float
-        Times at which the measuring point passes its beginning and end [s].
-    acceleration, jerk, roll_rate : float
-        Arguments of P_CT [m/s2], [m/s3], [deg/s].
-    standing, seated : float
-        P_CT [%].
+    `begin`, `end`: Times at which the measuring point passes its beginning and end [s].
+    `acceleration`, `jerk`, `roll_rate`: Arguments of P_CT [m/s2], [m/s3], [deg/s]. `standing`,
+    `seated`: P_CT [%].
     """
 
     begin: float
@@ -294,19 +225,9 @@ def transition_comfort(
     the largest difference of two such means 1 s apart, from 1 s before the beginning; both after a
     low-pass filter of 2 Hz.  The roll velocity is the largest 1 s mean within the transition.
 
-    Parameters
-    ----------
-    time : float64[time]
-        Equal steps [s].
-    lateral, roll_rate : float64[time]
-        Lateral acceleration [m/s2], roll velocity of the body [rad/s].
-    begin, end : float
-        Times [s].
-
-    Returns
-    -------
-    TransitionComfort or None
-        None where the record does not extend from 2 s before to 2.1 s after the transition.
+    `time` (float64[time]): Equal steps [s]. `lateral`, `roll_rate` (float64[time]): Lateral
+    acceleration [m/s2], roll velocity of the body [rad/s]. `begin`, `end`: Times [s]. Returns:
+    None where the record does not extend from 2 s before to 2.1 s after the transition.
     """
     if time[0] > begin - 2.0 or time[-1] < end + 2.1:
         return None

@@ -20,7 +20,7 @@ from railsim.assessment.sperling import Direction, index_of_rms, sperling_mean_s
 from railsim.assessment.weighting import WK
 from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.definitions.track.layout import curvature_sections
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 from railsim.result.filters import band_passed
 
 NEAR = (0.85, 1.15)  # band around the frequency of hunting, over this frequency
@@ -31,32 +31,17 @@ MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz 
 class PointComfort:
     """Comfort at one point.
 
-    Attributes
-    ----------
-    sensor : str
-    place : float
-        Along the vehicle, from the reference body forwards [m].
-    mean : MeanComfort
-        N_MV, N_VA, N_VD and the root mean squares of 5 s.
-    iso_rms : float64[3]
-        Weighted root mean squares after ISO 2631-1 along x, y, z [m/s2].
-    sperling : dict
-        Wz ``lateral`` and ``vertical``.
-    transitions : tuple of TransitionComfort
-    events : dict
-        Largest P_DE by posture [%].
-    hunting : float
-        Share that the vehicle's hunting has in the mean square of the weighted lateral
-        acceleration; 0 where it does not hunt.
+    `hunting`: Share that the vehicle's hunting has in the mean square of the weighted lateral
+    acceleration; 0 where it does not hunt.
     """
 
     sensor: str
-    place: float
-    mean: MeanComfort
-    iso_rms: Floats
-    sperling: dict[str, float]
+    place: float  # along the vehicle, from the reference body forwards [m]
+    mean: MeanComfort  # N_MV, N_VA, N_VD and the root mean squares of 5 s
+    iso_rms: Floats  # weighted root mean squares after ISO 2631-1 along x, y, z [m/s2], float64[3]
+    sperling: dict[str, float]  # wz ``lateral`` and ``vertical``
     transitions: tuple[TransitionComfort, ...]
-    events: dict[str, float]
+    events: dict[str, float]  # largest P_DE by posture [%]
     hunting: float = 0.0
 
     def record(self, limits: ComfortLimits) -> dict[str, object]:
@@ -95,21 +80,17 @@ def class_of(classes: Classes, value: float) -> str:
 def comfort_report(record: Record) -> list[PointComfort]:
     """Comfort at all measuring points except those on bogie frames.
 
-    Parameters
-    ----------
-    record : Record
-        Run with sensor readings, or with the motion of the bodies.
-
-    Raises
-    ------
-    InputError : there are no measuring points, or the run is shorter than one block of 5 s.
+    `record`: Run with sensor readings, or with the motion of the bodies. Raises InputError: there
+    are no measuring points, or the run is shorter than one block of 5 s.
     """
     names = [name for name in record.sensors if not name.startswith("frame_")]
     if not names:
-        raise InputError([Fault(
-            record.name, "sensor_acceleration", "is not in the result",
+        raise InputError.of(
+            record.name,
+            "sensor_acceleration",
+            "is not in the result",
             "run it with settings.outputs.sensors=true",
-        )])  # fmt: skip
+        )
     columns = [list(record.sensors).index(name) for name in names]
     frequency = float(record.result.attributes.get("hunting_frequency", 0.0))
     gathered = [_Gathered(frequency) for _ in names]
@@ -119,7 +100,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
             into.add(a[:, column], counted, record.rate)
     if not gathered[0].blocks:
         allowed = "at least 5 s after the first 3 s"
-        raise InputError([Fault(record.name, "time", "too short for one block of 5 s", allowed)])
+        raise InputError.of(record.name, "time", "too short for one block of 5 s", allowed)
     transitions = _transitions(record, columns)
     return [
         PointComfort(
@@ -139,10 +120,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
 class _Gathered:
     """Sums and blocks of one measuring point over the parts of a run.
 
-    Parameters
-    ----------
-    frequency : float
-        At which the vehicle hunts; 0: it does not [Hz].
+    `frequency`: At which the vehicle hunts; 0: it does not [Hz].
     """
 
     def __init__(self, frequency: float) -> None:

@@ -25,27 +25,17 @@ SHARE = 90.0  # per cent of the sections, of the track's quality
 class Condition:
     """A condition of the test.
 
-    Attributes
-    ----------
-    name, place : str
-        What it is about; zone and population, empty for the whole test.
-    state : str
-        ``met``, ``not met`` or ``not checked``.
-    found, required : str
-        In words.
-    source : str
-        Source of the requirement.
-    checked : bool
-        Whether it has been compared with the printed standard.
+    `name`, `place`: What it is about; zone and population, empty for the whole test. `found`,
+    `required`: In words.
     """
 
     name: str
     place: str
-    state: str
+    state: str  # ``met``, ``not met`` or ``not checked``
     found: str
     required: str
-    source: str = ""
-    checked: bool = False
+    source: str = ""  # source of the requirement
+    checked: bool = False  # whether it has been compared with the printed standard
 
     @property
     def sentence(self) -> str:
@@ -62,19 +52,8 @@ class Condition:
 class SectionRow:
     """A section of a run, for the list of sections.
 
-    Attributes
-    ----------
-    run, population : str
-    section : TestSection
-    alignment, level : float
-        Standard deviations in D1 [m].
-    quality : str
-        Class after UIC 518.
-    conicity : float
-        Equivalent conicity of the leading wheelset for 3 mm; nan where it is not known [1].
-    realisation : str
-        What the track's irregularities are, seed included.
-    counts : bool
+    `alignment`, `level`: Standard deviations in D1 [m]. `conicity`: Equivalent conicity of the
+    leading wheelset for 3 mm; nan where it is not known [1].
     """
 
     run: str
@@ -82,9 +61,9 @@ class SectionRow:
     section: TestSection
     alignment: float
     level: float
-    quality: str
+    quality: str  # class after UIC 518
     conicity: float
-    realisation: str
+    realisation: str  # what the track's irregularities are, seed included
     counts: bool
 
     def record(self) -> dict[str, object]:

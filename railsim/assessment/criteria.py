@@ -107,29 +107,17 @@ def transferred(x: Floats, turn: int) -> list[float]:
 class Measured:
     """What is measured of a signal in a section.
 
-    Attributes
-    ----------
-    signal : callable
-        Forms the signal of the filtered quantities, see `railsim.assessment.signals`.
-    band : (float or None, float) or None
-        Filter [Hz].
-    value : callable
-        Values over time in a section, 1 in a right-hand curve, -1 in a left-hand one and 0 on
-        straight track, to the values of the section.
-    window : float
-        Means over this length are taken before [m]; 0: none.
-    wheels : tuple of str
-        Wheels that are assessed.
-    curves : bool
-        In curves only.
+    `signal`: Forms the signal of the filtered quantities, see `railsim.assessment.signals`.
+    `value`: Values over time in a section, 1 in a right-hand curve, -1 in a left-hand one and 0 on
+    straight track, to the values of the section.
     """
 
     signal: Callable[[Signals, Band | None], Signal | None]
-    band: Band | None
+    band: Band | None  # filter [Hz]
     value: Callable[[Floats, int], list[float]]
-    window: float = 0.0
-    wheels: tuple[str, ...] = OUTER
-    curves: bool = False
+    window: float = 0.0  # means over this length are taken before [m]; 0: none
+    wheels: tuple[str, ...] = OUTER  # wheels that are assessed
+    curves: bool = False  # in curves only
 
     def __call__(self, signals: Signals, section: TestSection) -> Values:
         """Values of a section by place."""
@@ -186,12 +174,8 @@ def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: flo
     the profiles offer before the flange makes contact: above 1 the wheelset cannot steer without
     its flange.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-        Contact functions of the leading wheelset.
-    radius, rolling_radius : float
-        Of the curve, unsigned, and of the wheels [m].
+    `geometry`: Contact functions of the leading wheelset. `radius`, `rolling_radius`: Of the
+    curve, unsigned, and of the wheels [m].
     """
     y, difference = geometry.lateral, np.asarray(geometry.delta_r)
     ahead = np.flatnonzero((y >= 0.0) & np.isfinite(difference))
@@ -205,32 +189,21 @@ def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: flo
 class Criterion:
     """An assessed quantity.
 
-    Attributes
-    ----------
-    name : str
-        Key of its limit in the limits file.
-    words, unit : str
-        Name and unit in tables.
-    group : str
-        ``safety``, ``loading`` or ``ride``: the verdict to which it belongs; ``information``: none.
-    kind : str
-        Statistics of the limits file; ``largest`` and ``smallest``: no estimate, the extreme value.
-    measure : callable
-        Signals of a part and a section to values by place.
-    methods : tuple of str
-        ``normal``, with wheel forces, and ``simplified``, with accelerations.
-    meaning : str
-        What its limit is about.
+    `words`, `unit`: Name and unit in tables. `group`: ``safety``, ``loading`` or ``ride``: the
+    verdict to which it belongs; ``information``: none. `kind`: Statistics of the limits file;
+    ``largest`` and ``smallest``: no estimate, the extreme value. `measure`: Signals of a part and
+    a section to values by place. `methods`: ``normal``, with wheel forces, and ``simplified``,
+    with accelerations.
     """
 
-    name: str
+    name: str  # key of its limit in the limits file
     words: str
     unit: str
     group: str
     kind: str
     measure: Callable[[Signals, TestSection], Values]
     methods: tuple[str, ...] = ("normal",)
-    meaning: str = ""
+    meaning: str = ""  # what its limit is about
 
     @property
     def scale(self) -> float:

@@ -27,19 +27,13 @@ NEEDED = ("Q", "Y", "wheelset_distance")
 class SectionValues:
     """Values of one section.
 
-    Attributes
-    ----------
-    section : TestSection
-    values : dict
-        By quantity and wheelset, wheel or sensor: one value, or both percentiles on straight track
-        [SI].
-    lifted : dict
-        Length without load by wheel [m].
+    `values`: By quantity and wheelset, wheel or sensor: one value, or both percentiles on straight
+    track [SI].
     """
 
     section: TestSection
     values: dict[tuple[str, str], list[float]] = field(default_factory=dict)
-    lifted: dict[str, float] = field(default_factory=dict)
+    lifted: dict[str, float] = field(default_factory=dict)  # length without load by wheel [m]
 
 
 def section_values(
@@ -51,16 +45,10 @@ def section_values(
 ) -> list[SectionValues]:
     """Values of the given sections of a run.
 
-    Parameters
-    ----------
-    record : Record
-        Run with all that is `NEEDED`, and accelerations or body motions.
-    sections : sequence of TestSection
-        In the order of the track.
-    f0 : float, optional
-        Frequency of the instability [Hz]; without it the instability is not judged.
-    causal : bool
-        Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
+    `record`: Run with all that is `NEEDED`, and accelerations or body motions. `sections`: In the
+    order of the track. `f0`: Frequency of the instability [Hz]; without it the instability is not
+    judged. `causal`: Use causal filters, as in a measuring amplifier, instead of zero-phase
+    filters.
     """
     found = []
     for group in _neighbours(sections):

@@ -22,12 +22,7 @@ FORCES = ("sum_Y", "Y_over_Q", "Q", "Q_qst", "Y_qst", "T_qst")
 class Influence:
     """Regression of one quantity at one place.
 
-    Attributes
-    ----------
-    population, place : str
-    criterion : Criterion
-    regression : Regression
-        Coefficients: constant, of the cant deficiency [1/m], of the curvature [m].
+    `regression`: Coefficients: constant, of the cant deficiency [1/m], of the curvature [m].
     """
 
     population: str

@@ -32,25 +32,16 @@ def _both(x: Floats, _: int) -> list[float]:
 class Compared:
     """A quantity that is compared.
 
-    Attributes
-    ----------
-    base : str
-        ``Q``, ``Y``, ``sum_Y``, ``Y_over_Q`` or ``body``, and ``y`` or ``z`` behind it.
-    band : (float or None, float)
-        Filter [Hz].
-    value : callable
-        Values in a section, outwards positive in curves, to one or two.
-    curves : bool
-        In curves only.
+    `value`: Values in a section, outwards positive in curves, to one or two.
     """
 
     name: str
     words: str
     unit: str
-    base: str
-    band: Band
+    base: str  # ``Q``, ``Y``, ``sum_Y``, ``Y_over_Q`` or ``body``, and ``y`` or ``z`` behind it
+    band: Band  # filter [Hz]
     value: Callable[[Floats, int], list[float]]
-    curves: bool = False
+    curves: bool = False  # in curves only
     window: float = 0.0
 
     @property

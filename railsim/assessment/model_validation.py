@@ -30,7 +30,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_error
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import Shift, shift_of
 from railsim.measurement.counterpart import amplified, check_channels, compared, series
@@ -83,13 +83,17 @@ def validate_model(
     found = [results] if isinstance(results, Result) else list(results)
     if len(found) != len(runs) or not runs:
         words = f"{len(found)} results for {len(runs)} measured runs"
-        raise InputError([argument_fault("results", "", words, "one for each")])
+        raise argument_error("results", "", words, "one for each")
     if not isinstance(limits, ValidationLimits):
         limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))
     if unknown:
-        raise InputError([Fault("limits", f"limits.{unknown[0]}", "unknown quantity",
-                                "allowed: " + ", ".join(QUANTITIES))])  # fmt: skip
+        raise InputError.of(
+            "limits",
+            f"limits.{unknown[0]}",
+            "unknown quantity",
+            "allowed: " + ", ".join(QUANTITIES),
+        )
     tests = load_running_limits(zones)
     pairs: list[Pair] = []
     overlays: list[Overlay] = []
@@ -100,8 +104,12 @@ def validate_model(
         overlays += one.overlays()
         pairs += one.pairs(tests, limits)
     if not pairs:
-        raise InputError([Fault(runs[0].name, "distance", "no section", "a longer run, or channels "
-                                "of Q, Y or the body's accelerations")])  # fmt: skip
+        raise InputError.of(
+            runs[0].name,
+            "distance",
+            "no section",
+            "a longer run, or channels of Q, Y or the body's accelerations",
+        )
     Q0 = float(np.mean([np.mean(result["Q0"]) for result in found]))
     comparisons = []
     for name, quantity in QUANTITIES.items():
@@ -122,15 +130,8 @@ def validate_model(
 def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> list[Result]:
     """Return for each measured run the result on its track, at its speed (2 %) and in its load.
 
-    Parameters
-    ----------
-    measured : sequence of Measurement
-    results : mapping of str to Result
-        By names, such as those of a study.
-
-    Raises
-    ------
-    InputError : runs without a result of this kind, or with several.
+    `results`: By names, such as those of a study. Raises InputError: runs without a result of this
+    kind, or with several.
     """
     found: list[Result] = []
     faults = []
@@ -227,7 +228,7 @@ class _Run:
         if len(part.time) < 10:
             found = f"{moved.distance[0]:.0f} to {moved.distance[-1]:.0f} m"
             allowed = f"measured between {begin:.0f} and {distance[-1]:.0f} m, as simulated"
-            raise InputError([Fault(run.name, "distance", found, allowed)])
+            raise InputError.of(run.name, "distance", found, allowed)
         rising = np.concatenate([[True], np.diff(distance) > 0.0])
         simulated: dict[str, Floats] = {
             name: np.interp(part.distance, distance[rising], x[rising])

@@ -30,17 +30,11 @@ PIECE = 60.0  # s that are read at once by default
 class _Readings:
     """What was read last: parts of a run overlap by the margins of their filters.
 
-    Attributes
-    ----------
-    first : int
-        First row.
-    speed : float64[row]
-        From which the readings were made: at the ends of a part it differs [m/s].
-    acceleration, roll : ndarray
-        See `Record.readings`.
+    `speed` (float64[row]): From which the readings were made: at the ends of a part it differs
+    [m/s]. `acceleration`, `roll`: See `Record.readings`.
     """
 
-    first: int
+    first: int  # first row
     speed: Floats
     acceleration: Floats
     roll: Floats
@@ -62,17 +56,8 @@ class _Readings:
 class Record:
     """A result as a measured record.
 
-    Parameters
-    ----------
-    result : Result
-    name : str
-        Name of the run in messages.
-    coarse : bool
-        Accept a result that is sampled too coarsely.
-
-    Raises
-    ------
-    InputError : unequal time steps, too few samples per second, too short.
+    `name`: Name of the run in messages. `coarse`: Accept a result that is sampled too coarsely.
+    Raises InputError: unequal time steps, too few samples per second, too short.
     """
 
     def __init__(self, result: Result, name: str, *, coarse: bool = False) -> None:
@@ -100,14 +85,12 @@ class Record:
 
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """Return the error for a property of the result that is not admissible."""
-        return InputError([Fault(self.name, key, found, allowed, option=self.name)])
+        return InputError.of(self.name, key, found, allowed, option=self.name)
 
     def need(self, names: Sequence[str], output: str) -> None:
         """Refuse a result that lacks quantities.
 
-        Raises
-        ------
-        InputError : some of `names` are missing; the message names the `output` to request.
+        Raises InputError: some of `names` are missing; the message names the `output` to request.
         """
         missing = [name for name in names if name not in self.result]
         if missing:

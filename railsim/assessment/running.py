@@ -110,17 +110,18 @@ def assessed_runs(
 ) -> Running:
     """Assess all runs of a vehicle.
 
-    Raises
-    ------
-    InputError : no service table; a run lacks a quantity, is sampled too coarsely or too short.
+    Raises InputError: no service table; a run lacks a quantity, is sampled too coarsely or too
+    short.
     """
     service = replacement or _service(runs)
     done = _read(runs, limits, service, options)
     if done and not any(run.sections for run in done):
-        raise InputError([Fault(
-            done[0].name, "distance", "too short for one section",
+        raise InputError.of(
+            done[0].name,
+            "distance",
+            "too short for one section",
             "a longer run, or other sections in the limits file (--limits)",
-        )])  # fmt: skip
+        )
     f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
     for run in done:
         run.values = section_values(run.record, run.counting, f0=f0, causal=options.causal)
@@ -154,9 +155,8 @@ def assessed_runs(
 def limits_checked(limits: RunningLimits, file: str) -> RunningLimits:
     """Return the limits, each of a known quantity.
 
-    Raises
-    ------
-    InputError : the limit of a quantity that decides is missing; the limit of an unknown one.
+    Raises InputError: the limit of a quantity that decides is missing; the limit of an unknown
+    one.
     """
     needed = [name for name, one in CRITERIA.items() if one.group != INFORMATION]
     faults = [Fault(file, f"limits.{name}", "unknown quantity", nearest(name, CRITERIA))
@@ -172,11 +172,14 @@ def _service(runs: Mapping[str, Result]) -> Service:
     name, first = next(iter(runs.items()))
     service = first.vehicle().service
     if service is None:
-        raise InputError([Fault(
-            name, "vehicle.service", "the vehicle has no service table",
+        raise InputError.of(
+            name,
+            "vehicle.service",
+            "the vehicle has no service table",
             "add [service] with admissible_speed and cant_deficiency to its file, or give "
-            "`admissible_speed` and `cant_deficiency`", name,
-        )])  # fmt: skip
+            "`admissible_speed` and `cant_deficiency`",
+            name,
+        )
     return service
 
 

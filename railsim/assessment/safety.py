@@ -15,12 +15,7 @@ from railsim.profiles import Profile
 def nadal(flange_angle: float, mu: float) -> float:
     """Limit of Y/Q (Nadal 1896, Annales des Mines).
 
-    Parameters
-    ----------
-    flange_angle : float
-        Largest contact angle of the flange [rad].
-    mu : float
-        Coefficient of friction [1].
+    `flange_angle`: Largest contact angle of the flange [rad]. `mu`: Coefficient of friction [1].
 
     Examples
     --------
@@ -54,21 +49,11 @@ def flange_angle(profile: Profile) -> float:
 
 @dataclass(frozen=True)
 class Climb:
-    """Longest distance over which Y/Q of one wheel exceeds a limit.
+    """Longest distance over which Y/Q of one wheel exceeds a limit."""
 
-    Attributes
-    ----------
-    length : float
-        Length [m]; 0 where the limit is not exceeded.
-    begin : float
-        Position of its beginning [m].
-    rise : float
-        Largest rise of the wheel above its rail since this position [m].
-    """
-
-    length: float
-    begin: float
-    rise: float
+    length: float  # length [m]; 0 where the limit is not exceeded
+    begin: float  # position of its beginning [m]
+    rise: float  # largest rise of the wheel above its rail since this position [m]
 
 
 def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) -> Climb:
@@ -76,16 +61,9 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) ->
 
     A wheel without load (nan) counts as above the limit.
 
-    Parameters
-    ----------
-    s : float64[time]
-        Position of the wheel, increasing [m].
-    Y_over_Q : float64[time]
-        Derailment quotient of one wheel [1].
-    limit : float
-        For example Nadal's limit [1].
-    height : float64[time]
-        Height of the wheel above its rail [m].
+    `s` (float64[time]): Position of the wheel, increasing [m]. `Y_over_Q` (float64[time]):
+    Derailment quotient of one wheel [1]. `limit`: For example Nadal's limit [1]. `height`
+    (float64[time]): Height of the wheel above its rail [m].
 
     Examples
     --------
@@ -107,10 +85,7 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) ->
 def overturning(Q: Floats) -> Floats:
     """Overturning coefficient of a bogie, (sum Q_left - sum Q_right)/(sum Q) [1].
 
-    Parameters
-    ----------
-    Q : float64[time, wheelset, side]
-        Vertical wheel forces of the bogie [N].
+    `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
     """
     left, right = np.sum(Q[..., 0], axis=-1), np.sum(Q[..., 1], axis=-1)
     return np.asarray((left - right) / (left + right))

@@ -16,19 +16,13 @@ HALF_BASE = 0.75  # m, from the middle of the axle to the nominal rolling circle
 class WheelSafety:
     """Nadal's limit and climb distance of one wheel.
 
-    Attributes
-    ----------
-    place : str
-        Wheelset, from 1, and side.
-    limit : float
-        Nadal's limit of Y/Q for the flange angle of the profile and the friction of the track [1].
-    Y_over_Q : float
-        Largest derailment quotient, unfiltered [1]; nan where the wheel was without load.
-    climb_distance, climb_begin, rise : float
-        Longest distance above the limit, position of its beginning, rise of the wheel on it [m].
+    `limit`: Nadal's limit of Y/Q for the flange angle of the profile and the friction of the track
+    [1]. `Y_over_Q`: Largest derailment quotient, unfiltered [1]; nan where the wheel was without
+    load. `climb_distance`, `climb_begin`, `rise`: Longest distance above the limit, position of
+    its beginning, rise of the wheel on it [m].
     """
 
-    place: str
+    place: str  # wheelset, from 1, and side
     limit: float
     Y_over_Q: float
     climb_distance: float
@@ -44,11 +38,7 @@ class WheelSafety:
 class SafetyReport:
     """Derailment and overturning of a run.
 
-    Attributes
-    ----------
-    wheels : tuple of WheelSafety
-    overturning : dict
-        Largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1].
+    `overturning`: Largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1].
     """
 
     wheels: tuple[WheelSafety, ...]
@@ -63,10 +53,7 @@ class SafetyReport:
 def safety_report(record: Record) -> SafetyReport:
     """Nadal, climb distance and overturning over a run.
 
-    Parameters
-    ----------
-    record : Record
-        Run with Q, Y_over_Q, wheelset_distance and body_position.
+    `record`: Run with Q, Y_over_Q, wheelset_distance and body_position.
     """
     needed = ["Q", "Y_over_Q", "wheelset_distance"]
     record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")

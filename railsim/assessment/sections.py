@@ -23,31 +23,18 @@ from railsim.notation import SIDES
 class TestSection:
     """A section of the track that a run covers.
 
-    Attributes
-    ----------
-    zone : str
-        1 to 4; empty where no zone has this radius.
-    begin, end : float
-        Arc lengths [m].
-    radius : float
-        Signed radius, infinite on straight track [m].
-    cant_deficiency : float
-        Positive where the cant is too small for the speed [m].
-    speed : float
-        Speed in the middle of the section [m/s].
-    reason : str
-        Reason why the section does not count; empty if it counts.
+    `begin`, `end`: Arc lengths [m].
     """
 
     __test__ = False  # pytest: not a test
 
-    zone: str
+    zone: str  # 1 to 4; empty where no zone has this radius
     begin: float
     end: float
-    radius: float
-    cant_deficiency: float
-    speed: float
-    reason: str = ""
+    radius: float  # signed radius, infinite on straight track [m]
+    cant_deficiency: float  # positive where the cant is too small for the speed [m]
+    speed: float  # speed in the middle of the section [m/s]
+    reason: str = ""  # reason why the section does not count; empty if it counts
 
     @property
     def turn(self) -> int:
@@ -66,12 +53,8 @@ class TestSection:
 def outer_deficiency(speed: float, radius: float, cant: float) -> float:
     """Return the cant deficiency towards the outer rail, the cant on straight track [m].
 
-    Parameters
-    ----------
-    speed : float
-        [m/s]
-    radius, cant : float
-        Signed: positive to the right, positive = left rail higher [m].
+    `speed`: [m/s]. `radius`, `cant`: Signed: positive to the right, positive = left rail higher
+    [m].
 
     Examples
     --------
@@ -92,17 +75,9 @@ def track_sections(
 ) -> list[TestSection]:
     """All full sections of the part of a track that a run covers.
 
-    Parameters
-    ----------
-    track : Track
-    limits : RunningLimits
-        Zones and lengths of sections.
-    service : Service
-        Admissible speed and cant deficiency.
-    covered : (float, float)
-        Range of arc length that the whole vehicle covered [m].
-    speed_at : callable
-        Speed at an arc length [m/s].
+    `limits`: Zones and lengths of sections. `service`: Admissible speed and cant deficiency.
+    `covered`: Range of arc length that the whole vehicle covered [m]. `speed_at`: Speed at an arc
+    length [m/s].
     """
     found: list[TestSection] = []
     for begin, end, radius, cant in _constant(track):

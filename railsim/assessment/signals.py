@@ -24,21 +24,11 @@ OUTWARDS = np.array([-1.0, 1.0])  # of the forces on the left and the right rail
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal at several places of the vehicle.
+    """A signal at several places of the vehicle."""
 
-    Attributes
-    ----------
-    values : float64[time, place]
-        nan where there is no value.
-    s : float64[time, place]
-        Arc length of the place [m].
-    places : sequence of (str, int or None)
-        Wheelset, bogie or sensor, and the side of a wheel.
-    """
-
-    values: Floats
-    s: Floats
-    places: Sequence[tuple[str, int | None]]
+    values: Floats  # nan where there is no value, float64[time, place]
+    s: Floats  # arc length of the place [m], float64[time, place]
+    places: Sequence[tuple[str, int | None]]  # wheelset, bogie or sensor, and the side of a wheel
 
     def rows(self, place: int, section: TestSection) -> slice:
         """Rows from the last before a section to the first after it."""
@@ -70,15 +60,9 @@ def between(s: Floats, begin: float, end: float) -> slice:
 class Signals:
     """Signals of a part of a run.
 
-    Parameters
-    ----------
-    record : Record
-    begin, end : float
-        Arc lengths of the part [m]; it is read with the margins of the filters.
-    f0 : float, optional
-        Frequency of the instability of the vehicle [Hz].
-    causal : bool
-        Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
+    `begin`, `end`: Arc lengths of the part [m]; it is read with the margins of the filters. `f0`:
+    Frequency of the instability of the vehicle [Hz]. `causal`: Use causal filters, as in a
+    measuring amplifier, instead of zero-phase filters.
     """
 
     def __init__(

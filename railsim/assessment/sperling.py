@@ -34,18 +34,8 @@ def sperling_gain(f: Floats, direction: Direction) -> Floats:
 def sperling_index(a: Floats, rate: float, direction: Direction) -> float:
     """Ride index of a record from 0.5 to 30 Hz.
 
-    Parameters
-    ----------
-    a : float64[time]
-        Acceleration [m/s2].
-    rate : float
-        Samples per second [1/s].
-    direction : {'vertical', 'lateral'}
-
-    Returns
-    -------
-    float
-        Wz [1].
+    `a` (float64[time]): Acceleration [m/s2]. `rate`: Samples per second [1/s]. `direction`
+    ({'vertical', 'lateral'}). Returns: Wz [1].
     """
     return index_of_rms(float(np.sqrt(sperling_mean_square(a, rate, direction))))
 

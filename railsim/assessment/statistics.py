@@ -17,28 +17,15 @@ from railsim.arrays import Floats
 class Line:
     """Regression line a + b x and its upper bound.
 
-    Attributes
-    ----------
-    level, slope : float
-        a and b.
-    error : float
-        Standard error of the regression.
-    target : float
-        x0, at which the bound is the estimate.
-    quantile : float
-        One-sided quantile of Student's distribution.
-    N : int
-        Number of values.
-    middle, squares : float
-        Mean of x and sum (x - mean)^2.
+    `level`, `slope`: a and b. `middle`, `squares`: Mean of x and sum (x - mean)^2.
     """
 
     level: float
     slope: float
-    error: float
-    target: float
-    quantile: float
-    N: int
+    error: float  # standard error of the regression
+    target: float  # x0, at which the bound is the estimate
+    quantile: float  # one-sided quantile of Student's distribution
+    N: int  # number of values
     middle: float
     squares: float
 
@@ -56,38 +43,24 @@ class Line:
 class Estimate:
     """Estimate of a quantity's largest value from its values in sections.
 
-    Attributes
-    ----------
-    N : int
-        Number of values.
-    mean, deviation : float
-        Mean and standard deviation (N - 1) of the values.
-    value : float
-        Estimate; nan where there are too few values.
-    method : {'one', 'two', 'largest', 'smallest'}
-        Dimensions, or that it is no estimate but a value of the sections.
-    line : Line or None
-        Of the two-dimensional method.
+    `mean`, `deviation`: Mean and standard deviation (N - 1) of the values. `method` ({'one',
+    'two', 'largest', 'smallest'}): Dimensions, or that it is no estimate but a value of the
+    sections.
     """
 
-    N: int
+    N: int  # number of values
     mean: float
     deviation: float
-    value: float
+    value: float  # estimate; nan where there are too few values
     method: str
-    line: Line | None = None
+    line: Line | None = None  # of the two-dimensional method
 
 
 def one_dimensional(x: Floats, k: float) -> Estimate:
     """Mean + k s of the values.
 
-    Parameters
-    ----------
-    x : float64[section]
-        Values.
-    k : float
-        Factor of the standard deviation: 3 for safety, 2.2 for track loading and ride
-        characteristics, 0 for quasi-static quantities.
+    `x` (float64[section]): Values. `k`: Factor of the standard deviation: 3 for safety, 2.2 for
+    track loading and ride characteristics, 0 for quasi-static quantities.
 
     Examples
     --------
@@ -108,14 +81,9 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     a + b x0 + t(N - 2, P) s_e sqrt(1 + 1/N + (x0 - mean)^2/sum (x - mean)^2) with the one-sided
     quantile t of Student's distribution.
 
-    Parameters
-    ----------
-    x, y : float64[section]
-        Influencing quantity, such as the cant deficiency, and values.
-    x0 : float
-        Target value of the influencing quantity.
-    probability : float
-        P: 0.99 for safety, otherwise 0.95; 0.5 gives the regression line itself.
+    `x`, `y` (float64[section]): Influencing quantity, such as the cant deficiency, and values.
+    `x0`: Target value of the influencing quantity. `probability`: P: 0.99 for safety, otherwise
+    0.95; 0.5 gives the regression line itself.
 
     Examples
     --------
@@ -138,38 +106,20 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
 
 @dataclass(frozen=True)
 class Regression:
-    """Linear regression over several influences.
+    """Linear regression over several influences."""
 
-    Attributes
-    ----------
-    N : int
-        Number of values.
-    coefficients : tuple of float
-        Constant, then one for each influence.
-    error : float
-        Standard error of the regression.
-    determination : float
-        Share of the variance that the influences explain, R^2 [1].
-    value : float
-        Value at the target conditions.
-    """
-
-    N: int
-    coefficients: tuple[float, ...]
-    error: float
-    determination: float
-    value: float
+    N: int  # number of values
+    coefficients: tuple[float, ...]  # constant, then one for each influence
+    error: float  # standard error of the regression
+    determination: float  # share of the variance that the influences explain, R^2 [1]
+    value: float  # value at the target conditions
 
 
 def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | None:
     """Least squares of y = a + b1 x1 + b2 x2 + ...; None where x does not determine it.
 
-    Parameters
-    ----------
-    x : float64[section, influence]
-    y : float64[section]
-    target : float64[influence]
-        Conditions at which the value is sought.
+    `x` (float64[section, influence]). `y` (float64[section]). `target` (float64[influence]):
+    Conditions at which the value is sought.
 
     Examples
     --------
@@ -196,10 +146,7 @@ def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | No
 def extreme(x: Floats, method: str) -> Estimate:
     """Largest or smallest value, with mean and deviation beside it; no estimate.
 
-    Parameters
-    ----------
-    x : float64[section]
-    method : {'largest', 'smallest'}
+    `x` (float64[section]). `method` ({'largest', 'smallest'}).
     """
     value = float(np.max(x) if method == "largest" else np.min(x))
     return replace(one_dimensional(x, 0.0), value=value, method=method)

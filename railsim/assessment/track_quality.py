@@ -31,13 +31,7 @@ QN = (
 class TrackQuality:
     """Standard deviations over any part of a track.
 
-    Parameters
-    ----------
-    track : Track
-    begin, end : float
-        Part of the track that is evaluated [m].
-    ranges : sequence of str
-        Of `RANGES`.
+    `begin`, `end`: Part of the track that is evaluated [m]. `ranges`: Of `RANGES`.
     """
 
     def __init__(
@@ -68,12 +62,8 @@ class TrackQuality:
 def quality_class(speed: float, alignment: float, level: float) -> str:
     """Class of a section after UIC 518: better than QN1, between QN1 and QN2, worse than QN2.
 
-    Parameters
-    ----------
-    speed : float
-        Admissible speed of the line [m/s].
-    alignment, level : float
-        Standard deviations in D1 [m].
+    `speed`: Admissible speed of the line [m/s]. `alignment`, `level`: Standard deviations in D1
+    [m].
 
     Examples
     --------

@@ -31,18 +31,10 @@ ORDER = (DERAILED, FAIL, NOT_ASSESSED, INCOMPLETE, PASS)
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict.
+    """A verdict."""
 
-    Attributes
-    ----------
-    value : str
-        ``pass``, ``fail``, ``incomplete``, ``not assessed`` or ``derailed``.
-    reasons : tuple of str
-        Why it is not a pass.
-    """
-
-    value: str
-    reasons: tuple[str, ...]
+    value: str  # ``pass``, ``fail``, ``incomplete``, ``not assessed`` or ``derailed``
+    reasons: tuple[str, ...]  # why it is not a pass
 
     def record(self) -> dict[str, object]:
         """Return it as plain strings."""
@@ -60,12 +52,7 @@ def all_verdicts(
 ) -> dict[str, Verdict]:
     """Return the verdicts by criterion.
 
-    Parameters
-    ----------
-    runs : mapping of str to Result
-        All runs of the vehicle, also those that did not reach their end.
-    reports : sequence of ZoneReport
-    conditions : sequence of Condition
+    `runs`: All runs of the vehicle, also those that did not reach their end.
     """
     derailed = [_ended(n, r) for n, r in runs.items() if r.status == "derailed"]
     stopped = [f"{_ended(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]

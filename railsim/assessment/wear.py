@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.loading import load_wear_law
 from railsim.definitions.wear_law import ArchardMap, FrictionWork
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 
 YIELD_IN_SHEAR = 300e6
 """Yield stress in shear k of rail steel, default value [Pa]."""
@@ -28,22 +28,13 @@ DENSITY = 7850.0
 class Patches:
     """Contact patches, arrays of one shape or that are broadcast to it.
 
-    Attributes
-    ----------
-    T_gamma : ndarray
-        Wear number of each patch [N].
-    area : ndarray
-        Its area, zero where it carries nothing [m2].
-    diameter : float or ndarray
-        Diameter of its wheel [m].
-    N, friction, speed : ndarray
-        Its normal force [N], coefficient of friction [1] and speed of travel [m/s]; only laws of
-        files need them.
+    `N`, `friction`, `speed`: Its normal force [N], coefficient of friction [1] and speed of travel
+    [m/s]; only laws of files need them.
     """
 
-    T_gamma: Floats
-    area: Floats
-    diameter: float | Floats
+    T_gamma: Floats  # wear number of each patch [N]
+    area: Floats  # its area, zero where it carries nothing [m2]
+    diameter: float | Floats  # diameter of its wheel [m]
     N: Floats | float = math.nan
     friction: Floats | float = math.nan
     speed: Floats | float = math.nan
@@ -72,10 +63,7 @@ def archard(patches: Patches, law: ArchardMap) -> Floats:
     k is that of the map (Jendel 2002, Wear 253) at the patch's largest pressure and at its sliding
     speed, mean over the load, V T_gamma/(mu N).
 
-    Returns
-    -------
-    ndarray
-        [m2/m]
+    Returns: [m2/m].
     """
     sliding = _over(np.maximum(patches.T_gamma, 0.0), patches.friction)
     speed = _over(patches.speed * sliding, patches.N)
@@ -92,10 +80,7 @@ def krause_poll(patches: Patches, law: FrictionWork) -> Floats:
     The mass is proportional to the work of friction, by a factor that changes from mild to severe
     wear at a power of friction over the area of the patch.
 
-    Returns
-    -------
-    ndarray
-        [m2/m]
+    Returns: [m2/m].
     """
     work = np.maximum(patches.T_gamma, 0.0)
     severe = _over(patches.speed * work, patches.area) > law.transition
@@ -107,20 +92,14 @@ def krause_poll(patches: Patches, law: FrictionWork) -> Floats:
 class WearLaw:
     """A law for the wear of a wheel.
 
-    Attributes
-    ----------
-    name, source : str
-        As in heads of columns; authors and year.
-    worn_area : callable
-        Patches to the worn area of the wheel profile per distance, patch by patch [m2/m].
-    constants : str
-        Text of its file.
+    `name`, `source`: As in heads of columns; authors and year. `worn_area`: Patches to the worn
+    area of the wheel profile per distance, patch by patch [m2/m].
     """
 
     name: str
     source: str
     worn_area: Callable[[Patches], Floats]
-    constants: str = ""
+    constants: str = ""  # text of its file
 
 
 LAWS = {
@@ -134,20 +113,14 @@ DEFAULT_LAW = "pearce_sherratt"
 def wear_law(name: str) -> WearLaw:
     """Law of the table, or of a file.
 
-    Parameters
-    ----------
-    name : str
-        A name of `LAWS`, or the path of a file `railsim-wear-law/1`.
-
-    Raises
-    ------
-    InputError : there is neither; the file is not one of a law.
+    `name`: A name of `LAWS`, or the path of a file `railsim-wear-law/1`. Raises InputError: there
+    is neither; the file is not one of a law.
     """
     if name in LAWS:
         return LAWS[name]
     if not name.endswith(".toml"):
         allowed = "one of " + ", ".join(LAWS) + ", or a file .toml"
-        raise InputError([Fault("wear", "law", f"found '{name}'", allowed)])
+        raise InputError.of("wear", "law", f"found '{name}'", allowed)
     file = load_wear_law(name)
     if file.archard is not None:
         law: Callable[[Patches], Floats] = partial(archard, law=file.archard)
@@ -164,17 +137,8 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:
     areas of several patches are added, not their wear numbers.  Where spin drives the force against
     the creepage, T_gamma below zero, there is no wear.
 
-    Parameters
-    ----------
-    T_gamma : ndarray
-        Wear number [N].
-    diameter : float or ndarray
-        Wheel diameter [m].
-
-    Returns
-    -------
-    ndarray, shape of T_gamma
-        Worn area per distance [m2/m].
+    `T_gamma`: Wear number [N]. `diameter`: Wheel diameter [m]. Returns: Worn area per distance
+    [m2/m].
 
     Examples
     --------
@@ -195,15 +159,8 @@ def usfd(T_gamma_over_A: Floats) -> Floats:
     In ug/(m mm2) over x = T_gamma/A in N/mm2, T_gamma and A of one patch: 5.3 x to 10.4; 55.0 to
     77.2; 55.0 + 61.9 (x - 77.2).  None below zero.
 
-    Parameters
-    ----------
-    T_gamma_over_A : ndarray
-        Wear number over the area of the patch [N/m2].
-
-    Returns
-    -------
-    ndarray
-        Mass loss per metre rolled and square metre of contact patch [kg/m/m2].
+    `T_gamma_over_A`: Wear number over the area of the patch [N/m2]. Returns: Mass loss per metre
+    rolled and square metre of contact patch [kg/m/m2].
 
     Examples
     --------
@@ -222,10 +179,7 @@ class WholeLifeRailModel:
     Zero up to `threshold`, linear to 10e-6 at 65 N, linear to 0 at 175 N and, on the same line,
     negative above: there wear is faster than crack growth.
 
-    Attributes
-    ----------
-    threshold : float
-        Wear number below which there is no damage [N]: 15 (from memory), 20 in later use.
+    `threshold`: Wear number below which there is no damage [N]: 15 (from memory), 20 in later use.
     """
 
     threshold: float = 15.0
@@ -258,14 +212,8 @@ def surface_fatigue_index(
     FI_surf = mu_u - 2 pi a b k/(3 N) = mu_u - k/p0, mu_u = T/N: above zero the shakedown limit of
     the surface is exceeded (Johnson 1989).
 
-    Parameters
-    ----------
-    traction, N : ndarray
-        Tangential and normal force of the patch [N].
-    a, b : ndarray
-        Semi-axes [m].
-    k : float
-        Yield stress in shear [Pa].
+    `traction`, `N`: Tangential and normal force of the patch [N]. `a`, `b`: Semi-axes [m]. `k`:
+    Yield stress in shear [Pa].
     """
     return np.asarray(traction / N - 2.0 * np.pi * a * b * k / (3.0 * N))
 

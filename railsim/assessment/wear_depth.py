@@ -54,24 +54,11 @@ def worn_depth(
 ) -> Floats:
     """Depth of wear of a wheel profile per distance, over `grid`.
 
-    Parameters
-    ----------
-    result : Result
-        Run with `outputs.contact_patches`.
-    wheelset, side : int
-        From 0; side 0 left, 1 right.
-    law : WearLaw
-        One of `railsim.assessment.wear.LAWS`, or of a file: `railsim.assessment.wear.wear_law`.
-
-    Returns
-    -------
-    float64[position]
-        Mean depth per metre run, in the direction z of the profile [m/m].  Its integral over the
-        grid is the worn area per distance.
-
-    Raises
-    ------
-    InputError : the result lacks a quantity.
+    `result`: Run with `outputs.contact_patches`. `wheelset`, `side`: From 0; side 0 left, 1 right.
+    `law`: One of `railsim.assessment.wear.LAWS`, or of a file: `railsim.assessment.wear.wear_law`.
+    Returns float64[position]: Mean depth per metre run, in the direction z of the profile [m/m].
+    Its integral over the grid is the worn area per distance. Raises InputError: the result lacks a
+    quantity.
     """
     areas, ways, across, widths, wheel = _patches(result, wheelset, side, law)
     centres = (-1.0, 1.0)[side] * across - tape_circle_position(wheel.back_to_back)
@@ -85,10 +72,7 @@ def rail_depth(
 
     Mean over the distance of the run.  Arguments and errors as of `worn_depth`.
 
-    Returns
-    -------
-    float64[position]
-        [m]; its integral over the grid is the worn area of a passage.
+    Returns float64[position]: [m]; its integral over the grid is the worn area of a passage.
     """
     areas, ways, _, widths, wheel = _patches(result, wheelset, side, law)
     at, track = (slice(None), wheelset, side), result.track()
@@ -115,7 +99,7 @@ def _patches(
         raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
-        raise InputError([Fault("result", "wheelset", f"no wheelset {wheelset}", "")])
+        raise InputError.of("result", "wheelset", f"no wheelset {wheelset}", "")
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
     size = np.pi * result["patch_a"][at] * result["patch_b"][at]
@@ -146,15 +130,8 @@ def upper_side(profile: Profile) -> slice:
 def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
     """Sum of half ellipses of given areas over `grid`.
 
-    Parameters
-    ----------
-    centres, widths, areas : ndarray, one shape
-        Centres, half widths [m] and areas [m2].
-
-    Returns
-    -------
-    float64[position]
-        Heights [m], whose integral over each cell is exact.
+    `centres`, `widths`, `areas`: Centres, half widths [m] and areas [m2]. Returns
+    float64[position]: Heights [m], whose integral over each cell is exact.
     """
     counted = areas > 0.0
     y, b, A = centres[counted], np.maximum(widths[counted], 1e-5), areas[counted]
@@ -174,17 +151,8 @@ def scattered(profile: Profile, depth: Floats) -> Floats:
     Gauge, rails and loads differ from place to place; without, a circle and its one rail would cut
     a groove narrower than any rail.  On the flank the same way along the contour is shorter in y.
 
-    Parameters
-    ----------
-    profile : Profile
-        A wheel or a rail.
-    depth : float64[position]
-        Depth in the direction z over `grid` [m].
-
-    Returns
-    -------
-    float64[position]
-        Depth with the same worn area [m].
+    `profile`: A wheel or a rail. `depth` (float64[position]): Depth in the direction z over `grid`
+    [m]. Returns float64[position]: Depth with the same worn area [m].
     """
     lengths = _lengths(profile)
     s = np.cumsum(lengths)
@@ -209,46 +177,31 @@ def parts_of_step(profile: Profile, depth: Floats, distance: float) -> int:
 
     Arguments as for `worn_profile`.
 
-    Raises
-    ------
-    InputError : more than `MOST_PARTS`.
+    Raises InputError: more than `MOST_PARTS`.
     """
     worn = deepest(profile, depth) * distance
     parts = max(math.ceil(worn / UPDATE), 1)
     if not parts <= MOST_PARTS:
         allowed = f"at most {1e3 * MOST_PARTS * UPDATE:g} mm in a step"
         found = f"{1e-3 * distance:g} km wear it {1e3 * worn:.3g} mm deep"
-        raise InputError([Fault(profile.name, "step", found, allowed)])
+        raise InputError.of(profile.name, "step", found, allowed)
     return parts
 
 
 def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     """Profile after a distance at a constant rate of wear.
 
-    Parameters
-    ----------
-    profile : Profile
-        A wheel; or a rail, whose amount of traffic stands for the distance.
-    depth : float64[position]
-        Depth per distance over `grid` [m/m].
-    distance : float
-        [m]
-
-    Returns
-    -------
-    Profile
-        The depth is that of `scattered`; the worn area is that of `depth` times `distance`.
-
-    Raises
-    ------
-    InputError : the wear is deeper than 1 mm; the points of the profile are too far apart.
+    `profile`: A wheel; or a rail, whose amount of traffic stands for the distance. `depth`
+    (float64[position]): Depth per distance over `grid` [m/m]. `distance`: [m]. Returns: The depth
+    is that of `scattered`; the worn area is that of `depth` times `distance`. Raises InputError:
+    the wear is deeper than 1 mm; the points of the profile are too far apart.
     """
     worn = depth * distance
     most = deepest(profile, worn)
     if most > DEEPEST:
         allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / most:.4g} km"
         found = f"{1e-3 * distance:g} km wear {1e3 * most:.3g} mm deep"
-        raise InputError([Fault("wear", "step", found, allowed)])
+        raise InputError.of("wear", "step", found, allowed)
     smooth = scattered(profile, worn)
     side, lost = upper_side(profile), np.zeros(len(profile.y))
     lost[side] = np.interp(profile.y[side], grid(), smooth, left=0.0, right=0.0)
@@ -256,7 +209,7 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     if area > 0.0:
         if abs(kept / area - 1.0) > ROUNDING:
             found = f"its points resolve {100.0 * kept / area:.0f} % of the worn area"
-            raise InputError([Fault(profile.name, "points", found, "points at most 1 mm apart")])
+            raise InputError.of(profile.name, "points", found, "points at most 1 mm apart")
         lost *= area / kept
     words = f"worn by {1e6 * area:.2f} mm2"
     name = f"{profile.name.removesuffix(WORN)}{WORN}"
@@ -270,24 +223,12 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
 
 @dataclass(frozen=True)
 class WheelDimensions:
-    """Dimensions of a wheel profile (EN 15313), in [m].
+    """Dimensions of a wheel profile (EN 15313), in [m]."""
 
-    Attributes
-    ----------
-    flange_height : float
-        Sh: tip of the flange below the nominal rolling circle.
-    flange_thickness : float
-        Sd: of the flange, 10 mm below the nominal rolling circle.
-    flange_slope : float
-        qR: along the axle, from there to 2 mm above the tip.
-    hollow : float
-        Deepest place of the tread above what is farther out.
-    """
-
-    flange_height: float
-    flange_thickness: float
-    flange_slope: float
-    hollow: float
+    flange_height: float  # sh: tip of the flange below the nominal rolling circle
+    flange_thickness: float  # sd: of the flange, 10 mm below the nominal rolling circle
+    flange_slope: float  # qR: along the axle, from there to 2 mm above the tip
+    hollow: float  # deepest place of the tread above what is farther out
 
 
 def wheel_dimensions(profile: Profile) -> WheelDimensions:

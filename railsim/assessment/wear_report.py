@@ -27,37 +27,23 @@ PATCHES = ("patch_N", "patch_a", "patch_b", "patch_T_x", "patch_T_y")
 class WheelWear:
     """Wear and fatigue at one wheel.
 
-    Attributes
-    ----------
-    place : str
-        Wheelset, from 1, and side.
-    T_gamma : float
-        Mean wear number over the distance [N].
-    percentiles : dict
-        Of the wear number over time [N], by per cent.
-    bound : float
-        Largest deviation of a percentile from that of the whole record [N].
-    worn_area : dict of str to float or None
-        Worn area of the wheel profile per distance by each law, by its name or file,
-        sum over the contact patches [m2/m].  Of a result without them that of Pearce and Sherratt
-        is the one of `T_gamma`, as if all forces acted in one patch, and the others are None.
-    rail_damage : float
-        Whole Life Rail Model, mean over the distance; only forces on the rail against the direction
-        of travel count.  With contact patches that of tread, flange root or flange, whichever has
-        the largest magnitude: what one part of the rail suffers, another does not repair [1].
-    fatigue_index : float or None
-        Largest FI_surf [1]; None without contact patches.
-    utilised_friction, pressure_ratio : float or None
-        T/N and p0/k of that patch, its coordinates in the shakedown map [1]; None likewise.
+    `worn_area`: Worn area of the wheel profile per distance by each law, by its name or file, sum
+    over the contact patches [m2/m].  Of a result without them that of Pearce and Sherratt is the
+    one of `T_gamma`, as if all forces acted in one patch, and the others are None. `rail_damage`:
+    Whole Life Rail Model, mean over the distance; only forces on the rail against the direction of
+    travel count.  With contact patches that of tread, flange root or flange, whichever has the
+    largest magnitude: what one part of the rail suffers, another does not repair [1].
+    `utilised_friction`, `pressure_ratio`: T/N and p0/k of that patch, its coordinates in the
+    shakedown map [1]; None likewise.
     """
 
-    place: str
-    T_gamma: float
-    percentiles: dict[str, float]
-    bound: float
+    place: str  # wheelset, from 1, and side
+    T_gamma: float  # mean wear number over the distance [N]
+    percentiles: dict[str, float]  # of the wear number over time [N], by per cent
+    bound: float  # largest deviation of a percentile from that of the whole record [N]
     worn_area: dict[str, float | None]
     rail_damage: float
-    fatigue_index: float | None
+    fatigue_index: float | None  # largest FI_surf [1]; None without contact patches
     utilised_friction: float | None
     pressure_ratio: float | None
 
@@ -77,17 +63,10 @@ def wear_report(
 ) -> list[WheelWear]:
     """Wear and fatigue at all wheels.
 
-    Parameters
-    ----------
-    record : Record
-        Run with `T_gamma`, `xi_x`; with `contact_patches` also USFD and the fatigue index.
-    law : str, optional
-        Only this law of `LAWS`, or that of a file, which needs `contact_patches`; by default all.
-    model : WholeLifeRailModel, optional
-    all_forces : bool
-        Include forces on the rail in the direction of travel.
-    yield_in_shear : float
-        k [Pa].
+    `record`: Run with `T_gamma`, `xi_x`; with `contact_patches` also USFD and the fatigue index.
+    `law`: Only this law of `LAWS`, or that of a file, which needs `contact_patches`; by default
+    all. `all_forces`: Include forces on the rail in the direction of travel. `yield_in_shear`: k
+    [Pa].
     """
     record.need(["T_gamma", "xi_x"], "settings.outputs.quantities with T_gamma, xi_x")
     model = model or WholeLifeRailModel()

@@ -29,21 +29,12 @@ Q1 = 1.0 / math.sqrt(2.0)
 class Weighting:
     """Parameters of a weighting.
 
-    Attributes
-    ----------
-    name : str
-        Wb, Wc, Wd or Wk.
-    f1, f2 : float
-        Band limits [Hz].
-    f3, f4, Q2 : float
-        Transition from acceleration-proportional to velocity-proportional [Hz, Hz, 1].
-    f5, Q3, f6, Q4 : float
-        Upward step [Hz, 1, Hz, 1]; f5 infinite: none.
-    K : float
-        Factor of the step.
+    `f1`, `f2`: Band limits [Hz]. `f3`, `f4`, `Q2`: Transition from acceleration-proportional to
+    velocity-proportional [Hz, Hz, 1]. `f5`, `Q3`, `f6`, `Q4`: Upward step [Hz, 1, Hz, 1]; f5
+    infinite: none.
     """
 
-    name: str
+    name: str  # wb, Wc, Wd or Wk
     f1: float
     f2: float
     f3: float
@@ -53,7 +44,7 @@ class Weighting:
     Q3: float = 1.0
     f6: float = math.inf
     Q4: float = 1.0
-    K: float = 1.0
+    K: float = 1.0  # factor of the step
 
     def response(self, f: Floats) -> Complexes:
         """Complex response at the frequencies `f` >= 0 [Hz]."""
@@ -82,12 +73,7 @@ class Weighting:
     def weighted(self, a: Floats, rate: float) -> Floats:
         """Weighted acceleration.
 
-        Parameters
-        ----------
-        a : float64[time, ...]
-            Acceleration [m/s2].
-        rate : float
-            Samples per second [1/s].
+        `a` (float64[time, ...]): Acceleration [m/s2]. `rate`: Samples per second [1/s].
         """
         return filtered(a, rate, self.response, 4.0 / self.f1)
 

@@ -34,28 +34,15 @@ METHODS = {"one": "one-dimensional", "two": "two-dimensional", "largest": "large
 class Assessed:
     """Estimate of one quantity at one wheelset, wheel or sensor, and its limit.
 
-    Attributes
-    ----------
-    criterion : Criterion
-    place : str
-        Wheelset, wheel or sensor; wheelsets count from 1.
-    estimate : Estimate
-    limit : float
-        nan for quantities without [SI].
-    source : str
-        Source of the limit.
-    checked : bool
-        Whether the limit has been compared with the printed standard.
-    uncorrected : Estimate or None
-        Estimate before the correction for high friction, where that was made.
+    `uncorrected`: Estimate before the correction for high friction, where that was made.
     """
 
     criterion: Criterion
-    place: str
+    place: str  # wheelset, wheel or sensor; wheelsets count from 1
     estimate: Estimate
-    limit: float = math.nan
-    source: str = ""
-    checked: bool = False
+    limit: float = math.nan  # nan for quantities without [SI]
+    source: str = ""  # source of the limit
+    checked: bool = False  # whether the limit has been compared with the printed standard
     uncorrected: Estimate | None = None
 
     @property
@@ -105,21 +92,11 @@ def nearest(rows: Sequence[Assessed]) -> list[Assessed]:
 
 @dataclass(frozen=True)
 class Population:
-    """Runs whose section values may be pooled.
+    """Runs whose section values may be pooled."""
 
-    Attributes
-    ----------
-    name : str
-        Empty where there is only one.
-    vehicle : Vehicle
-        In its condition.
-    Q0 : float64[wheelset, side]
-        Static wheel loads [N].
-    """
-
-    name: str
-    vehicle: Vehicle
-    Q0: Floats
+    name: str  # empty where there is only one
+    vehicle: Vehicle  # in its condition
+    Q0: Floats  # static wheel loads [N], float64[wheelset, side]
 
     @property
     def fault(self) -> bool:
@@ -129,31 +106,15 @@ class Population:
 
 @dataclass(frozen=True)
 class ZoneReport:
-    """A zone of a population: sections and quantities.
-
-    Attributes
-    ----------
-    zone : str
-    population : Population
-    values : tuple of SectionValues
-        Sections that count.
-    sections : tuple of TestSection
-        All sections of the zone, including those that do not count.
-    rows : tuple of Assessed
-        Quantities with limits.
-    information : tuple of Assessed
-        Quantities without.
-    needed : int
-        Number of sections that the standard requires.
-    """
+    """A zone of a population: sections and quantities."""
 
     zone: str
     population: Population
-    values: tuple[SectionValues, ...]
-    sections: tuple[TestSection, ...]
-    rows: tuple[Assessed, ...]
-    information: tuple[Assessed, ...]
-    needed: int
+    values: tuple[SectionValues, ...]  # sections that count
+    sections: tuple[TestSection, ...]  # all sections of the zone, including those that do not count
+    rows: tuple[Assessed, ...]  # quantities with limits
+    information: tuple[Assessed, ...]  # quantities without
+    needed: int  # number of sections that the standard requires
 
     @property
     def title(self) -> str:
@@ -215,14 +176,8 @@ def zone_reports(
 ) -> list[ZoneReport]:
     """Assess all zones in which a population has sections.
 
-    Parameters
-    ----------
-    population : Population
-    values : sequence of SectionValues
-        Of the sections that count, of all its runs.
-    sections : sequence of TestSection
-        All sections of all its runs.
-    method : {'normal', 'simplified'}
+    `values`: Of the sections that count, of all its runs. `sections`: All sections of all its
+    runs. `method` ({'normal', 'simplified'}).
     """
     judged = [c for c in CRITERIA.values() if method in c.methods and
               (c.group in (SAFETY, INFORMATION) or not population.fault)]  # fmt: skip

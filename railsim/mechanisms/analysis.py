@@ -8,7 +8,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
-from railsim.errors import InputError, argument_fault, nearest
+from railsim.errors import argument_error, nearest
 from railsim.mechanisms.cams import Transition, transitions
 from railsim.mechanisms.contact import Contact, Rest, contact_of, positions_of_rest
 from railsim.mechanisms.dynamics import FreeMotion, TimedMotion, driven_motion, free_motion
@@ -124,16 +124,14 @@ class Analysis:
         """
         if quantity not in self.output:
             found = f"no result '{quantity}'"
-            raise InputError(
-                [argument_fault("at", quantity, found, nearest(quantity, self.output))]
-            )
+            raise argument_error("at", quantity, found, nearest(quantity, self.output))
         known = self.output[quantity]
         gap = known - value
         crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
         if not len(crossed):
             low, high = np.nanmin(known), np.nanmax(known)
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
-            raise InputError([argument_fault("at", quantity, found, allowed)])
+            raise argument_error("at", quantity, found, allowed)
         k = crossed[0]
         s = zeros(
             solve(self.model, self.motion.s[k : k + 2]),

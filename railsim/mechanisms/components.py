@@ -29,8 +29,6 @@ def gas_spring_force(
     Linear: `F = F1 (1 + (p - 1) s/S)`; isothermal: `F = F1/(1 - (1 - 1/p) s/S)`; both `F1` extended
     and `p F1` compressed, F1 at 20 C.  Temperature [C]: `gas_temperature_factor`.
 
-    Notes
-    -----
     Source: makers' catalogues as collected by M. Merci (2017), ch. 3; the isothermal law is that of
     an ideal gas in a volume that the rod reduces linearly.
 
@@ -67,8 +65,6 @@ def lid_force(weight: float, D: float, b: float, n: float, alpha: float) -> floa
     Mass of the lid G [kg], levers of its centre of gravity D and of the springs b about the hinge,
     lid open [m], number of springs n, factor of safety alpha.
 
-    Notes
-    -----
     Source: makers' catalogues (Merci, 2017); the springs should stand at about two thirds of the
     centre of gravity's distance.
 

@@ -126,9 +126,7 @@ def inertia(motion: Motion) -> tuple[Any, Any]:
 def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
     """Push of an element between two points at every position [N].
 
-    Raises
-    ------
-    InputError : a gas spring beyond its stroke, a spring outside its table.
+    Raises InputError: a gas spring beyond its stroke, a spring outside its table.
     """
     model = motion.model
     element, n = model.definition.elements[name], model.number
@@ -155,9 +153,7 @@ def _spring_law(
 ) -> Any:
     """Push or torque of a spring at a length or angle, linear or by its table.
 
-    Raises
-    ------
-    InputError : outside the table.
+    Raises InputError: outside the table.
     """
     model, n = motion.model, motion.model.number
     if spring.table is None:
@@ -305,9 +301,8 @@ def actuator_force(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
 
     `F = (M s'' + M' s'^2/2 - Q)/w`, w the generalised force of its unit force.
 
-    Raises
-    ------
-    InputError : the actuator has a dead point within the motion: no finite force holds there.
+    Raises InputError: the actuator has a dead point within the motion: no finite force holds
+    there.
     """
     effect = check_dead_point(motion, name)
     needed = -generalised_force(motion, rates)
@@ -411,22 +406,11 @@ def reactions(
 ) -> tuple[dict[str, Any], Any]:
     """Reactions of the joints by Lagrange's multipliers, `Phi_q^T lambda = M q'' - Q`.
 
-    Parameters
-    ----------
-    motion : Motion
-        Positions of a real model.
-    forces : dict of str to ndarray, shape (position,)
-        Forces of the actuators by name.
-    rates : Rates
-        Motion, for the inertia forces.
-
-    Returns
-    -------
-    joints : dict of str to ndarray, shape (position, rows)
-        Multipliers by joint: components x, y on the first point of a revolute joint [N], push of a
-        link or a cam [N], side force of a slot [N], and its torque on a prismatic joint [N m].
-    driver : ndarray, shape (position,)
-        What the driver must add: zero where the actuators alone make the motion.
+    `motion`: Positions of a real model. `forces`: Forces of the actuators by name. `rates`:
+    Motion, for the inertia forces. Returns `joints` (shape (position, rows)): Multipliers by
+    joint: components x, y on the first point of a revolute joint [N], push of a link or a cam [N],
+    side force of a slot [N], and its torque on a prismatic joint [N m]. Returns `driver` (shape
+    (position,)): What the driver must add: zero where the actuators alone make the motion.
     """
     model = motion.model
     rows = 3 * model.linkage.n_bodies

@@ -70,21 +70,9 @@ class Judgement:
 class Judge:
     """Judges sets of parameters of a mechanism.
 
-    Parameters
-    ----------
-    definition : Mechanism
-        With a table [optimise].
-    every : int
-        Take every so many of the positions only, each with as much more weight.
-
-    Attributes
-    ----------
-    names : list of str
-        Parameters that may change.
-    lower, upper : ndarray, shape (parameter,)
-        Their bounds.
-    labels : list of (str, float)
-        Name of every constraint and its scale, in SI.
+    `names`: Parameters that may change. `lower`, `upper` (shape (parameter,)): Their bounds.
+    `labels`: Name of every constraint and its scale, in SI. `definition`: With a table [optimise].
+    `every`: Take every so many of the positions only, each with as much more weight.
     """
 
     def __init__(self, definition: Mechanism, every: int = 1) -> None:
@@ -159,9 +147,7 @@ class Judge:
     ) -> Judgement:
         """Judge values of the parameters.
 
-        Raises
-        ------
-        InputError : the links cannot be assembled over the whole travel.
+        Raises InputError: the links cannot be assembled over the whole travel.
         """
         moved = self.model(x, choice)
         model = moved.real()
@@ -186,12 +172,8 @@ class Judge:
     ) -> dict[str, tuple[float, float]]:
         """Least margin of every constraint over the travel, and the share of the travel there.
 
-        Parameters
-        ----------
-        x, choice
-            As when judging.
-        near : float
-            Margin above which the least known value is not refined.
+        `x`, `choice`: As when judging. `near`: Margin above which the least known value is not
+        refined.
         """
         model = self.real_model(x, choice)
         motion = solve(model, np.linspace(model.start, model.end, DENSE))

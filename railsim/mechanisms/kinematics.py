@@ -121,18 +121,9 @@ def folded(angle: Any) -> Any:
 def solve(model: Model, s: ArrayLike, near: Motion | None = None) -> Motion:
     """Positions for given values of the driver, continued from the start of the range.
 
-    Parameters
-    ----------
-    model : Model
-        A real model.
-    s : array_like, shape (position,)
-        Values of the driver [rad or m].
-    near : Motion, optional
-        Known positions of the same model, from the last of which to go on.
-
-    Raises
-    ------
-    InputError : lost assembly, dead point, jump of branch, roller off its cam: where, which joint.
+    `model`: A real model. `s` (shape (position,)): Values of the driver [rad or m]. `near`: Known
+    positions of the same model, from the last of which to go on. Raises InputError: lost assembly,
+    dead point, jump of branch, roller off its cam: where, which joint.
     """
     wanted = np.atleast_1d(np.asarray(s, dtype=float))
     start, pose, arc_start = model.start, model.pose, model.linkage.joint[:, 4].copy()
@@ -224,9 +215,7 @@ def driver_words(model: Model, value: float) -> str:
 def check_freedom(model: Model) -> None:
     """Refuse joints that hold the same freedom twice at the start.
 
-    Raises
-    ------
-    InputError : the joints concerned, and the degrees of freedom that are left.
+    Raises InputError: the joints concerned, and the degrees of freedom that are left.
     """
     arcs = model.linkage.joint[:, 4].copy()
     lost: InputError | None = None
@@ -253,7 +242,7 @@ def check_freedom(model: Model) -> None:
     names = [n for n, (a, b) in model.joint_rows.items() if weight[a:b].max() > 1e-6]
     words = f"hold the same freedom twice: {rows - rank} degrees of freedom left"
     where = f"joints {', '.join(names)} {words}"
-    raise InputError([Fault(model.definition.name, "joints", where, "1 is needed")])
+    raise InputError.of(model.definition.name, "joints", where, "1 is needed")
 
 
 def _held(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, int]:
@@ -265,15 +254,9 @@ def _held(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, in
 def tangents(motion: Motion, moved: Model, *, second: bool = True) -> Motion:
     """The same positions with derivatives by parameters in the imaginary parts.
 
-    Parameters
-    ----------
-    motion : Motion
-        Positions of a real model.
-    moved : Model
-        The model with a lane for each parameter (`Model.lanes`); an imaginary part of a result is
-        `STEP` times the derivative.
-    second : bool
-        Whether the second derivatives by the driver are wanted too.
+    `motion`: Positions of a real model. `moved`: The model with a lane for each parameter
+    (`Model.lanes`); an imaginary part of a result is `STEP` times the derivative. `second`:
+    Whether the second derivatives by the driver are wanted too.
     """
     count = moved.linkage.point.shape[0]
     s, q, q1, q2 = (

@@ -15,7 +15,7 @@ from railsim.arrays import Complexes, Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
 from railsim.definitions.mechanism.values import coordinates, number, parameter_values, point_names
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 
@@ -69,7 +69,7 @@ class Model:
 
     def refusal(self, key: str, found: str, allowed: str) -> InputError:
         """The error that refuses the mechanism at a key of its file."""
-        return InputError([Fault(self.definition.name, key, found, allowed)])
+        return InputError.of(self.definition.name, key, found, allowed)
 
     @property
     def axis(self) -> int:
@@ -96,9 +96,7 @@ class Model:
 def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Model:
     """Return the model of a mechanism; `changed` are values instead of the file's.
 
-    Raises
-    ------
-    InputError : an expression has no value with these parameters.
+    Raises InputError: an expression has no value with these parameters.
     """
     values = parameter_values(definition, changed)
     lanes = max((np.size(v) for v in values.values()), default=1)

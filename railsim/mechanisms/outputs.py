@@ -153,10 +153,7 @@ def check_pressure(motion: Motion, output: Mapping[str, Any]) -> None:
 def zone_drivers(dense: Motion) -> dict[str, float]:
     """Values of the driver at the zone's heights; none without a zone.
 
-    Raises
-    ------
-    InputError
-        A height is never reached.
+    Raises InputError: A height is never reached.
     """
     model = dense.model
     zone, output = model.definition.zone, model.definition.output

@@ -42,9 +42,7 @@ class Positions:
 def reference_of(definition: Mechanism) -> Mechanism | None:
     """The reference of a mechanism's optimisation, with the parameters that it shares.
 
-    Raises
-    ------
-    InputError : there is no such file, or it is wrong.
+    Raises InputError: there is no such file, or it is wrong.
     """
     optimise = definition.optimise
     if optimise is None or optimise.reference is None:
@@ -86,7 +84,7 @@ def positions(definition: Mechanism) -> Positions:
         return Positions(s, height, np.full(len(s), np.nan))
     if pair is None:
         found = f"{source.name} has no length of an actuator, or no output"
-        raise InputError([Fault(definition.name, "optimise", found, "both are needed")])
+        raise InputError.of(definition.name, "optimise", found, "both are needed")
     dense = solve(model, np.linspace(model.start, model.end, DENSE))
     edges = np.array([model.start, model.end])
     if optimise.range == "zone":
@@ -97,7 +95,7 @@ def positions(definition: Mechanism) -> Positions:
         if not np.all(np.isfinite(edges)):
             zone_drivers(dense)
             found = f"{source.name} never reaches it"
-            raise InputError([Fault(definition.name, "zone", found, "another zone")])
+            raise InputError.of(definition.name, "zone", found, "another zone")
     if optimise.sample == "travel":
         s = np.linspace(edges[0], edges[1], optimise.points)
     else:

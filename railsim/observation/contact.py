@@ -41,20 +41,13 @@ LEAST = 1e-12  # (m/s2)2, (rad/s2)2
 class Noise:
     """Spectra of what the linear contact leaves out.
 
-    Attributes
-    ----------
-    wave_numbers : float64[k]
-        [rad/m].
-    power : float64[k, component]
-        Two-sided, of samples at `STEP`: of white noise its variance.  Accelerations of a wheelset
-        in y, z, roll, yaw, the mean of all wheelsets.
-    amplitude : float
-        rms of the lateral displacement of the wheelsets against the rails [m].
+    `power` (float64[k, component]): Two-sided, of samples at `STEP`: of white noise its variance.
+    Accelerations of a wheelset in y, z, roll, yaw, the mean of all wheelsets.
     """
 
-    wave_numbers: Floats
+    wave_numbers: Floats  # [rad/m], float64[k]
     power: Floats
-    amplitude: float
+    amplitude: float  # rms of the lateral displacement of the wheelsets against the rails [m]
 
     def at(self, wave_numbers: Floats, step: float) -> Floats:
         """Power for samples at a step [m], float64[k, component]."""
@@ -71,19 +64,9 @@ def in_the_mean(
 ) -> tuple[TrackResponse, Noise]:
     """Return the response with the contact of a rough track, and the noise that remains.
 
-    Parameters
-    ----------
-    vehicle, track : Vehicle, Track
-        The track's rails and friction count.
-    linear, tangent : LinearVehicle, TrackResponse
-        About steady rolling, at the speed in question.
-    irregularity : dict
-        Of the type ``random``, as in a track file.
-
-    Raises
-    ------
-    ModelError
-        The vehicle does not complete the run.
+    `vehicle`, `track`: The track's rails and friction count. `linear`, `tangent`: About steady
+    rolling, at the speed in question. `irregularity`: Of the type ``random``, as in a track file.
+    Raises ModelError: The vehicle does not complete the run.
     """
     rough = track.replace(
         plan=[{"type": "STR", "length": LENGTH}],

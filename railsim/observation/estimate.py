@@ -26,36 +26,22 @@ FILES = ("recording.csv", "track.toml", "estimates.csv", "forces.csv")
 class Estimate:
     """Irregularities and forces of one piece of a run.
 
-    Attributes
-    ----------
-    s : float64[n]
-        Arc length, equal steps [m].
-    speed : float
-        [m/s].
-    values : float64[quantity, n]
-        Alignment, level, cross level, gauge [m], without what is not seen.
-    deviations : float64[quantity]
-        Standard deviations of their errors [m].
-    bands, band_deviations : mapping of str to float64[quantity, n], float64[quantity]
-        The same in D1 and D2.
-    wave_numbers, seen, power : float64[k], float64[quantity, k], float64[quantity, k]
-        Share of the variance that the channels explain; power assumed before.
-    outputs : tuple of str
-        ``Q.1.left``, ``Y.1.left``, ``sum_Y.1``, ``lateral.1``, ...
-    forces, force_deviations : float64[output, n], float64[output]
-        [N], lateral displacements [m].
+    `values` (float64[quantity, n]): Alignment, level, cross level, gauge [m], without what is not
+    seen. `bands`, `band_deviations` (float64[quantity, n]): The same in D1 and D2. `wave_numbers`,
+    `seen`, `power` (float64[k]): Share of the variance that the channels explain; power assumed
+    before. `forces`, `force_deviations` (float64[output, n]): [N], lateral displacements [m].
     """
 
-    s: Floats
-    speed: float
+    s: Floats  # arc length, equal steps [m], float64[n]
+    speed: float  # [m/s]
     values: Floats
-    deviations: Floats
+    deviations: Floats  # standard deviations of their errors [m], float64[quantity]
     bands: Mapping[str, Floats]
     band_deviations: Mapping[str, Floats]
     wave_numbers: Floats
     seen: Floats
     power: Floats
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # ``Q.1.left``, ``Y.1.left``, ``sum_Y.1``, ``lateral.1``,
     forces: Floats
     force_deviations: Floats
 
@@ -64,39 +50,24 @@ class Estimate:
 class Irregularity:
     """Irregularities of a track and wheel forces from a measured run.
 
-    Attributes
-    ----------
-    name, vehicle : str
-        Of the run; of the vehicle.
-    s : float64[n]
-        Arc length of the reference body, equal steps [m].
-    values, deviations : float64[quantity, n]
-        Alignment, level, cross level and gauge under the reference body, and the standard
-        deviations of their errors [m].
-    bands, band_deviations : mapping of str to float64[quantity, n]
-        The same in D1 and D2.
-    outputs : tuple of str
-        Names of the forces.
-    forces, force_deviations : float64[output, n]
-        [N], lateral displacements [m].
-    pieces : tuple of Estimate
-        What was put together.
-    flanges : tuple of (int, float, float)
-        Wheelset, begin and end of the places where its flange touches [m].
-    remarks : tuple of str
+    `name`, `vehicle`: Of the run; of the vehicle. `values`, `deviations` (float64[quantity, n]):
+    Alignment, level, cross level and gauge under the reference body, and the standard deviations
+    of their errors [m]. `bands`, `band_deviations` (float64[quantity, n]): The same in D1 and D2.
+    `forces`, `force_deviations` (float64[output, n]): [N], lateral displacements [m]. `flanges`:
+    Wheelset, begin and end of the places where its flange touches [m].
     """
 
     name: str
     vehicle: str
-    s: Floats
+    s: Floats  # arc length of the reference body, equal steps [m], float64[n]
     values: Floats
     deviations: Floats
     bands: Mapping[str, Floats]
     band_deviations: Mapping[str, Floats]
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # names of the forces
     forces: Floats
     force_deviations: Floats
-    pieces: tuple[Estimate, ...]
+    pieces: tuple[Estimate, ...]  # what was put together
     flanges: tuple[tuple[int, float, float], ...]
     remarks: tuple[str, ...]
 
@@ -239,15 +210,9 @@ def estimate_of(
 ) -> Estimate:
     """Return the estimate of a piece from spectra of fields and their covariance.
 
-    Parameters
-    ----------
-    piece : Piece
-    spectra, covariance : complex128[field, k], complex128[k, field, field]
-        Irregularities, then accelerations.
-    power : float64[k, quantity]
-        Assumed before.
-    forces : (str[output], complex128[k, output, field], float64[output, n])
-        Names, response, and what they have beyond it [N, m].
+    `spectra`, `covariance` (complex128[field, k]): Irregularities, then accelerations. `power`
+    (float64[k, quantity]): Assumed before. `forces` ([output]): Names, response, and what they
+    have beyond it [N, m].
     """
     n, number = len(piece.grid), power.shape[1]
     points = 2 * (len(covariance) - 1)

@@ -16,12 +16,8 @@ def on_grid(s: Floats, values: Floats, grid: Floats) -> Floats:
     A symmetric low pass with its corner at half the rate of the grid, then a cubic spline; at both
     ends signals are continued antisymmetrically.
 
-    Parameters
-    ----------
-    s, values : float64[n]
-        Rising arc lengths at nearly equal steps [m], and values there.
-    grid : float64[m]
-        Equal steps [m].
+    `s`, `values` (float64[n]): Rising arc lengths at nearly equal steps [m], and values there.
+    `grid` (float64[m]): Equal steps [m].
     """
     step, own = grid[1] - grid[0], float(np.median(np.diff(s)))
     if own < step:

@@ -36,17 +36,12 @@ FINEST, MOST_BINS = 1e-6, 1500  # least size; number of wave numbers that are lo
 class Sizes:
     """Sizes of errors.
 
-    Attributes
-    ----------
-    contact : float64[2]
-        Power of the unknown accelerations of wheelsets over that of `railsim.observation.contact`:
-        in y and yaw, in z and roll.
-    model : float64[channel]
-        Error of the response of a channel over its rms.
+    `contact` (float64[2]): Power of the unknown accelerations of wheelsets over that of
+    `railsim.observation.contact`: in y and yaw, in z and roll.
     """
 
     contact: Floats
-    model: Floats
+    model: Floats  # error of the response of a channel over its rms, float64[channel]
 
     @classmethod
     def assumed(cls, channels: int) -> "Sizes":
@@ -65,23 +60,15 @@ class Sizes:
 class Powers:
     """What the covariance of the data of a piece is made of.
 
-    Attributes
-    ----------
-    points : int
-    track : float64[k, quantity]
-        Of the irregularities.
-    unknown : float64[k, component of all wheelsets]
-        Of the accelerations that the linear contact leaves out.
-    response : complex128[k, channel, quantity and component]
-    white : float64[k, channel]
-        Noise and bias.
+    `unknown` (float64[k, component of all wheelsets]): Of the accelerations that the linear
+    contact leaves out.
     """
 
     points: int
-    track: Floats
+    track: Floats  # of the irregularities, float64[k, quantity]
     unknown: Floats
-    response: Complexes
-    white: Floats
+    response: Complexes  # complex128[k, channel, quantity and component]
+    white: Floats  # noise and bias, float64[k, channel]
 
     @property
     def own(self) -> Floats:

@@ -21,7 +21,7 @@ from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, ModelError, argument_fault, nearest
+from railsim.errors import InputError, ModelError, argument_fault, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
@@ -59,22 +59,13 @@ CANT = 1.5  # m, between the rails
 class Assumed:
     """What is known of the track before the measurement, and of the sensors.
 
-    Attributes
-    ----------
-    spectrum : str
-        Of `railsim.definitions.excitations.spectra.SPECTRA`.
-    scale : float
-        Factor on its displacements.
-    wavelengths : tuple of float
-        Shortest and longest wavelength that the track has [m].
-    noise : float
-        rms of a value of an accelerometer, of channels whose file does not say it [m/s2].
-    bias : float
-        Standard deviation of what accelerometers show at rest [m/s2].
+    `wavelengths`: Shortest and longest wavelength that the track has [m]. `noise`: rms of a value
+    of an accelerometer, of channels whose file does not say it [m/s2]. `bias`: Standard deviation
+    of what accelerometers show at rest [m/s2].
     """
 
-    spectrum: str = "erri_b176_low"
-    scale: float = 1.0
+    spectrum: str = "erri_b176_low"  # of `railsim.definitions.excitations.spectra.SPECTRA`
+    scale: float = 1.0  # factor on its displacements
     wavelengths: tuple[float, float] = (3.0, 100.0)
     noise: float = NOISE["sensor_acceleration"]
     bias: float = BIAS["sensor_acceleration"]
@@ -82,9 +73,7 @@ class Assumed:
     def check(self) -> None:
         """Refuse what cannot be.
 
-        Raises
-        ------
-        InputError
+        Raises InputError.
         """
         low, high = self.wavelengths
         checks = (
@@ -126,27 +115,14 @@ def irregularity(
 ) -> Irregularity:
     """Return the irregularities and wheel forces behind a measured run.
 
-    Parameters
-    ----------
-    measurement : Measurement
-        With channels ``sensor_acceleration:POINT:AXIS`` or ``sensor_roll_rate:POINT``.
-    vehicle, track : Vehicle, Track
-        The vehicle that measured; plan, rails, gauge, friction and support of the track.
-    assumed : Assumed, optional
-        Spectrum and noise.
-    simulations : int
-        Most simulated runs for a piece of at most 2 km, see `railsim.observation.simulated`; 0 for
-        the linear estimate, which knows neither curves nor speeds that change.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
-
-    Raises
-    ------
-    InputError
-        No channel that can be used, points that the vehicle does not have, a record too short or
-        too slow, channels that are all much larger or smaller than is assumed.
-    ModelError
-        The vehicle cannot be linearised, or does not complete the run that does so.
+    `measurement`: With channels ``sensor_acceleration:POINT:AXIS`` or ``sensor_roll_rate:POINT``.
+    `vehicle`, `track`: The vehicle that measured; plan, rails, gauge, friction and support of the
+    track. `assumed`: Spectrum and noise. `simulations`: Most simulated runs for a piece of at most
+    2 km, see `railsim.observation.simulated`; 0 for the linear estimate, which knows neither
+    curves nor speeds that change. `progress`: Called repeatedly with the finished fraction. Raises
+    InputError: No channel that can be used, points that the vehicle does not have, a record too
+    short or too slow, channels that are all much larger or smaller than is assumed. Raises
+    ModelError: The vehicle cannot be linearised, or does not complete the run that does so.
     """
     assumed = assumed or Assumed()
     assumed.check()
@@ -297,11 +273,9 @@ class _Smooth:
     ) -> tuple[Fields, Floats, Floats] | None:
         """Fields about the simulated run that agrees with the measured one.
 
-        Returns
-        -------
-        Fields, float64[field, points], float64[force, n], or None
-            With the sizes of errors that are left; their mean; what the forces have beyond the
-            linear ones.  None where the first simulated run was not complete.
+        Returns float64[field, points]: With the sizes of errors that are left; their mean; what
+        the forces have beyond the linear ones.  None where the first simulated run was not
+        complete.
         """
         n, points, count = len(piece.grid), powers.points, len(QUANTITIES)
         H = powers.response[:, :, :count]
@@ -339,7 +313,7 @@ class _Smooth:
             if not 1.0 / LEVEL < level < LEVEL:
                 found = f"{level:.3g} times what the vehicle reads on '{self.assumed.spectrum}'"
                 allowed = f"1/{LEVEL:g} to {LEVEL:g} times; the 'unit' of all channels, or 'scale'?"
-                raise InputError([Fault(self.name, "channels", found, allowed)])
+                raise InputError.of(self.name, "channels", found, allowed)
             self._wrong, said = disagreeing(powers, piece, read, self.channels)
             self.said += said
         there = piece.there.copy()

@@ -23,23 +23,14 @@ READ = ("sensor_acceleration", "sensor_roll_rate")
 class Piece:
     """Part of a run at a nearly constant speed.
 
-    Attributes
-    ----------
-    grid : float64[n]
-        Arc length of the reference body, equal steps [m].
-    signals, there : float64[channel, n], bool[channel, n]
-        What the channels read, and where they do.
-    speeds : float64[n]
-        [m/s].
-    rate : float
-        Values of the record per second [1/s].
+    `signals`, `there` (float64[channel, n]): What the channels read, and where they do.
     """
 
-    grid: Floats
+    grid: Floats  # arc length of the reference body, equal steps [m], float64[n]
     signals: Floats
     there: Flags
-    speeds: Floats
-    rate: float
+    speeds: Floats  # [m/s], float64[n]
+    rate: float  # values of the record per second [1/s]
 
     @property
     def speed(self) -> float:

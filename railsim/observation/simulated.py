@@ -54,35 +54,21 @@ class Reading:
 class Refined:
     """Irregularities that a simulated run agrees with.
 
-    Attributes
-    ----------
-    fields : float64[quantity, points]
-    reading : Reading
-        Of the run over them.
-    data : float64[channel, points]
-        y - h(r) + H r.
-    change : float
-        rms of what is left of (1), over the standard deviation assumed, the largest quantity.
+    `change`: rms of what is left of (1), over the standard deviation assumed, the largest
+    quantity.
     """
 
-    fields: Floats
-    reading: Reading
-    data: Floats
+    fields: Floats  # float64[quantity, points]
+    reading: Reading  # of the run over them
+    data: Floats  # y - h(r) + H r, float64[channel, points]
     change: float
 
 
 class SimulatedRun:
     """A vehicle that runs over irregularities as it did in a piece of a measured run.
 
-    Parameters
-    ----------
-    vehicle, track : Vehicle, Track
-        The track with its plan, without irregularities.
-    piece : Piece
-    outputs : sequence of str
-        Readings, such as ``axlebox_1_left.z``.
-    forces : sequence of str
-        Such as ``Q.1.left``, ``sum_Y.1``.
+    `vehicle`, `track`: The track with its plan, without irregularities. `outputs`: Readings, such
+    as ``axlebox_1_left.z``. `forces`: Such as ``Q.1.left``, ``sum_Y.1``.
     """
 
     def __init__(
@@ -105,10 +91,7 @@ class SimulatedRun:
     def __call__(self, fields: Floats) -> Reading | str:
         """Return what is read over irregularities at the grid, or why the run ended before.
 
-        Parameters
-        ----------
-        fields : float64[quantity, n]
-            [m].
+        `fields` (float64[quantity, n]): [m].
         """
         s = self.piece.grid - self._moved
         before = np.arange(self._start, s[0] - 0.5 * STEP, STEP)
@@ -175,23 +158,12 @@ def refined(
 ) -> Refined | str:
     """Solve (1), starting from the linear estimate.
 
-    Parameters
-    ----------
-    run : callable
-        float64[quantity, n] to what is read, n points of the grid.
-    gain, seen : callable
-        K and H: float64[channel, points] to float64[quantity, points] and back.
-    data : float64[channel, n], bool[channel, n]
-        y, and where it exists.  A constant in it is the channel's, not the track's.
-    first, deviations : float64[quantity, points], float64[quantity]
-        Irregularities to begin with, and what they are measured with [m].
-    most : int
-        Number of runs.
-
-    Returns
-    -------
-    Refined or str
-        The best step; why the first run was not complete.
+    `run`: float64[quantity, n] to what is read, n points of the grid. `gain`, `seen`: K and H:
+    float64[channel, points] to float64[quantity, points] and back. `data` (float64[channel, n]):
+    y, and where it exists.  A constant in it is the channel's, not the track's. `first`,
+    `deviations` (float64[quantity, points]): Irregularities to begin with, and what they are
+    measured with [m]. `most`: Number of runs. Returns: The best step; why the first run was not
+    complete.
     """
     y, there = data
     r, deviations = first

@@ -33,22 +33,14 @@ MOST_ITERATIONS = 2000
 class Fields:
     """Gaussian fields on a periodic grid, and how channels see them.
 
-    Attributes
-    ----------
-    points : int
-        M, points of the grid.
-    power : float64[bin, field]
-        Two-sided power: M times the share of each of the bins of `numpy.fft.rfft` in the variance
-        of a field.
-    response : complex128[bin, channel, field]
-        H.
-    errors : float64[bin, channel]
-        Power of the channels' errors; of white noise its variance in every bin.
+    `power` (float64[bin, field]): Two-sided power: M times the share of each of the bins of
+    `numpy.fft.rfft` in the variance of a field. `errors` (float64[bin, channel]): Power of the
+    channels' errors; of white noise its variance in every bin.
     """
 
-    points: int
+    points: int  # M, points of the grid
     power: Floats
-    response: Complexes
+    response: Complexes  # H, complex128[bin, channel, field]
     errors: Floats
 
     def covariance(self) -> Complexes:
@@ -70,19 +62,10 @@ class Fields:
     def mean(self, data: Floats, there: Flags | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].
 
-        Parameters
-        ----------
-        data : float64[channel, points]
-            Samples; those that do not exist do not count.
-        there : bool[channel, points], optional
-            Which samples exist; all by default.
-        residual : float
-            Of the equations, over the rms of the errors.
-
-        Raises
-        ------
-        ModelError
-            The equations are not solved after `MOST_ITERATIONS`.
+        `data` (float64[channel, points]): Samples; those that do not exist do not count. `there`
+        (bool[channel, points]): Which samples exist; all by default. `residual`: Of the equations,
+        over the rms of the errors. Raises ModelError: The equations are not solved after
+        `MOST_ITERATIONS`.
         """
         there = np.ones_like(data, dtype=bool) if there is None else there
         weights = self._weights(data, there, residual)

@@ -268,18 +268,9 @@ def patches_figure(
 ) -> Figure:
     """Contact patches of the right wheel, seen from above, one picture for each displacement.
 
-    Parameters
-    ----------
-    contacts : mapping of displacement [m] to LoadedContact
-        From the contact table.
-    load : float
-        Wheel load, for the title [N].
-    exact : mapping of displacement [m] to ExactContact, optional
-        Pressure by boundary elements, drawn beneath.
-    other : mapping of displacement [m] to LoadedContact, optional
-        From a second table, drawn dashed.
-    labels : tuple of str
-        What both tables are called.
+    `contacts` ([m]): From the contact table. `load`: Wheel load, for the title [N]. `exact` ([m]):
+    Pressure by boundary elements, drawn beneath. `other` ([m]): From a second table, drawn dashed.
+    `labels`: What both tables are called.
     """
     columns = 4
     rows = -(-len(contacts) // columns)

@@ -22,15 +22,8 @@ def front_figure(
 ) -> Figure:
     """All designs, the front and the chosen one, for each pair of objectives.
 
-    Parameters
-    ----------
-    values : float64[design, objective]
-    labels : sequence of str
-        Objectives with their units.
-    feasible : bool[design]
-    front : sequence of int
-        Designs of the front.
-    chosen : int or None
+    `values` (float64[design, objective]). `labels`: Objectives with their units. `feasible`
+    (bool[design]). `front`: Designs of the front.
     """
     single = values.shape[1] == 1
     if single:
@@ -89,12 +82,8 @@ def _ordered(values: Floats) -> bool:
 def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Figure:
     """Tornado about the chosen design, and Sobol indices over the whole range, for each quantity.
 
-    Parameters
-    ----------
-    found : sequence of mapping
-        Records of `railsim.studies.sensitivity.Sensitivity`.
-    labels : sequence of str
-        Quantities with their units.
+    `found`: Records of `railsim.studies.sensitivity.Sensitivity`. `labels`: Quantities with their
+    units.
     """
     count = len(found[0]["low"])
     figure = Picture(10.2, len(found) * (1.3 + 0.32 * count))

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import InputError, argument_error
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
 from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels
 from railsim.plot.style import (
@@ -82,7 +82,7 @@ def check_not_empty(result: Result, name: str = "") -> None:
     """Raise InputError where a run ended before its first instant: there is nothing to draw."""
     if not len(result["time"]):
         found = f"holds no instants: {result.status}, {result.attributes.get('status_reason', '')}"
-        raise InputError([Fault(name or "result", "time", found, "give a run of some length")])
+        raise InputError.of(name or "result", "time", found, "give a run of some length")
 
 
 def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
@@ -90,7 +90,7 @@ def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
     if stop - start < 2:
         found = f"nothing between {between[0]:g} and {between[1]:g}"
         allowed = f"the run goes from {horizontal[0]:.6g} to {horizontal[-1]:.6g}"
-        raise InputError([argument_fault("between", "", found, allowed)])
+        raise argument_error("between", "", found, allowed)
     return slice(int(start), int(stop))
 
 

@@ -21,14 +21,8 @@ LEADER = 10.0
 def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]) -> None:
     """Write names beside points.
 
-    Parameters
-    ----------
-    axes : Axes
-        With its limits as they stay.
-    named : mapping of str to ndarray, shape (2,)
-        Points by their names, in data.
-    drawn : sequence of ndarray, shape (point, 2)
-        Lines that are better not covered, in data.
+    `axes`: With its limits as they stay. `named` (shape (2,)): Points by their names, in data.
+    `drawn` (shape (point, 2)): Lines that are better not covered, in data.
     """
     figure: Any = axes.figure
     figure.draw_without_rendering()  # the layout settles, and with it the scale

@@ -34,19 +34,11 @@ LONGEST = 400.0  # m, of a segment
 def recording_figure(before: Floats, after: Floats, title: str) -> Figure:
     """Draw a recording as its file holds it and as its rows act, over the distance and as spectra.
 
-    Parameters
-    ----------
-    before, after : float64[n, 5]
-        Rows s, y_left, z_left, y_right, z_right [m].
-    title : str
-        What it is called.
-
-    Returns
-    -------
-    Figure
-        A row for each irregularity: over the arc length, and its one-sided power spectral density
-        (Welch 1967, Hann windows of at most 400 m) over the wavelength beside ERRI B176, formerly
-        ORE; in the titles the standard deviations in the bands D1 and D2 of EN 13848-1.
+    `before`, `after` (float64[n, 5]): Rows s, y_left, z_left, y_right, z_right [m]. `title`: What
+    it is called. Returns: A row for each irregularity: over the arc length, and its one-sided
+    power spectral density (Welch 1967, Hann windows of at most 400 m) over the wavelength beside
+    ERRI B176, formerly ORE; in the titles the standard deviations in the bands D1 and D2 of EN
+    13848-1.
     """
     figure = Picture(10.6, 9.6)
     figure.suptitle(unformatted(title), x=0.012, ha="left")

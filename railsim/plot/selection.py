@@ -35,18 +35,10 @@ def limit_of(name: str, results: Iterable[Result]) -> tuple[float, str] | None:
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a picture.
+    """One line of a picture."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (time,)
-        What to draw [SI].
-    labels : mapping of str to str
-        Where: dimension to name.
-    """
-
-    values: Floats
-    labels: Mapping[str, str]
+    values: Floats  # what to draw [SI], shape (time,)
+    labels: Mapping[str, str]  # where: dimension to name
 
 
 @dataclass(frozen=True)
@@ -60,9 +52,8 @@ class Panel:
 def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Panel]:
     """Return what to draw for each selection; components get a panel each.
 
-    Raises
-    ------
-    InputError : a quantity or label does not exist, or there are too many lines to tell apart.
+    Raises InputError: a quantity or label does not exist, or there are too many lines to tell
+    apart.
     """
     faults: list[Fault] = []
     found: list[Panel] = []
@@ -122,4 +113,4 @@ def _wanted(
 
 
 def _fault(selection: str, found: str, allowed: str) -> InputError:
-    return InputError([Fault("QUANTITY", selection, found, allowed)])
+    return InputError.of("QUANTITY", selection, found, allowed)

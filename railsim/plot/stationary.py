@@ -14,13 +14,7 @@ from railsim.plot.style import Picture, styled
 def twist_figure(loops: Mapping[str, TwistLoop], limit: float, title: str) -> Figure:
     """DQ/Q0 of the worst wheel of each twist over the twist, from both directions.
 
-    Parameters
-    ----------
-    loops : mapping of str to TwistLoop
-        By the name of the twist.
-    limit : float
-        Of dQ/Q0 [1].
-    title : str
+    `loops`: By the name of the twist. `limit`: Of dQ/Q0 [1].
     """
     figure = Picture(9.6, 3.8)
     figure.suptitle(title)

@@ -20,18 +20,10 @@ LONGEST = 60  # letters of a run's name in a ranking
 
 @dataclass(frozen=True)
 class Column:
-    """Something that runs have, one value for each.
+    """Something that runs have, one value for each."""
 
-    Attributes
-    ----------
-    words : str
-        For axes, with the unit.
-    values : list
-        Numbers or texts; None where a run has none.
-    """
-
-    words: str
-    values: list[Any]
+    words: str  # for axes, with the unit
+    values: list[Any]  # numbers or texts; None where a run has none
 
     @property
     def numeric(self) -> bool:

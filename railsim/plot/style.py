@@ -130,14 +130,9 @@ class Span:
 def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[Span]:
     """Return the transitions and curves that a run passed, on the axis of a picture.
 
-    Parameters
-    ----------
-    sections : sequence of Section
-        Elements of the plan.
-    distance : ndarray, shape (time,)
-        Distance of the reference body, increasing [m].
-    axis : ndarray, shape (time,)
-        What the picture shows horizontally: the distance itself, or time.
+    `sections`: Elements of the plan. `distance` (shape (time,)): Distance of the reference body,
+    increasing [m]. `axis` (shape (time,)): What the picture shows horizontally: the distance
+    itself, or time.
     """
     found = []
     for section in sections:

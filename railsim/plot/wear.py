@@ -17,14 +17,8 @@ def wear_figure(
 ) -> Figure:
     """New and worn profiles, depth of wear, equivalent conicity at 3 mm.
 
-    Parameters
-    ----------
-    wheels : sequence of (distance [m], Profile)
-        The new wheel, then the wheel after each step.
-    rows : sequence of mapping
-        Of `railsim.studies.wear_loop.wear_rows`.
-    title : str
-        What was analysed.
+    `wheels` ([m]): The new wheel, then the wheel after each step. `rows`: Of
+    `railsim.studies.wear_loop.wear_rows`. `title`: What was analysed.
     """
     new = wheels[0][1]
     figure = Picture(8.6, 7.6)

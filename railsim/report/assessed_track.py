@@ -5,7 +5,6 @@ from typing import Protocol
 from railsim.plot.assessed_track import Assessed, heat_strip
 from railsim.report.document import Section, as_png, document, pictures
 from railsim.table import Table
-from railsim.version import __version__
 
 MOST_ROWS = 200
 CAPTIONS = {"heat": "Largest share of each limit over the arc length; blank where no run came."}
@@ -34,12 +33,11 @@ def assessed_track_page(found: Judged) -> str:
     text = f"At {number} places a vehicle exceeds {found.share:g} of a limit."
     texts = [f"The first {MOST_ROWS} of {number}; all are in places.csv."]
     places.rows = places.rows[:MOST_ROWS]
+    heat = pictures({"heat": as_png(heat_strip(found))}, CAPTIONS)
     sections = [
         Section("Places", texts if number > MOST_ROWS else (), [places] if number else []),
-        Section("Along the track", figures=pictures({"heat": as_png(heat_strip(found))}, CAPTIONS,
-                                                    ["heat"])),
+        Section("Along the track", figures=heat),
         Section("Vehicles and geometry limits", found.notes, [found.sections]),
-    ]  # fmt: skip
-    return document("Track judged by vehicles", None, (), sections, METHOD,
-                    lead=f"Written by railsim {__version__}.",
-                    verdict={"text": text, "ok": number == 0}, remarks=())  # fmt: skip
+    ]
+    verdict = {"text": text, "ok": number == 0}
+    return document("Track judged by vehicles", sections, METHOD, verdict)

@@ -16,7 +16,6 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
-from railsim.definitions.track.section import Section
 from railsim.notation import plain_symbol
 from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result
@@ -30,18 +29,10 @@ STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
 
 @dataclass(frozen=True)
 class Group:
-    """Runs over the same alignment.
+    """Runs over the same alignment."""
 
-    Attributes
-    ----------
-    track : str
-        Name of the track.
-    results : dict
-        Results by the names of their runs.
-    """
-
-    track: str
-    results: dict[str, Result]
+    track: str  # name of the track
+    results: dict[str, Result]  # results by the names of their runs
 
 
 def groups(results: Mapping[str, Result]) -> list[Group]:
@@ -51,26 +42,22 @@ def groups(results: Mapping[str, Result]) -> list[Group]:
         if len(result["time"]) < 2:
             continue
         track = result.track()
-        key = (track.name, *((s.type, s.begin, s.end, s.start_value) for s in _plan(result)))
+        key = (
+            track.name,
+            *((s.type, s.begin, s.end, s.start_value) for s in curvature_sections(track)),
+        )
         found.setdefault(key, Group(track.name, {})).results[name] = result
     return list(found.values())
-
-
-def _plan(result: Result) -> list[Section]:
-    return curvature_sections(result.track())
 
 
 def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
     """Return the curves of a group as plain data for the page.
 
-    Parameters
-    ----------
-    group : Group
-    cells : int
-        Number of cells of the horizontal axis.
+    `cells`: Number of cells of the horizontal axis.
     """
     results = group.results
-    over = "distance" if all(map(_moves, results.values())) else "time"
+    moved = (np.ptp(result["distance"][[0, -1]]) > STANDS_STILL for result in results.values())
+    over = "distance" if all(moved) else "time"
     low = min(float(result[over][0]) for result in results.values())
     high = max(float(result[over][-1]) for result in results.values())
     shortest = min(len(result[over]) for result in results.values())
@@ -92,10 +79,6 @@ def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
     }
 
 
-def _moves(result: Result) -> bool:
-    return bool(result["distance"][-1] - result["distance"][0] > STANDS_STILL)
-
-
 def _sections(result: Result) -> list[dict[str, Any]]:
     return [
         {
@@ -104,7 +87,7 @@ def _sections(result: Result) -> list[dict[str, Any]]:
             "curve": section.type == "CIR",
             "words": f"R {1.0 / section.start_value:.6g}" if section.type == "CIR" else "",
         }
-        for section in _plan(result)
+        for section in curvature_sections(result.track())
         if section.type != "STR"
     ]
 
@@ -147,19 +130,9 @@ def _quantity(
 def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
     """Return the smallest and the largest value of every cell, in the order of their occurrence.
 
-    Parameters
-    ----------
-    axis : float64[n]
-        Positions of the values, not decreasing.
-    values : float64[n, m]
-        nan where there is none.
-    edges : float64[cells + 1]
-        Ends of the cells.
-
-    Returns
-    -------
-    float64[2 cells, m]
-        In a cell without instants, interpolated values; nan outside the run.
+    `axis` (float64[n]): Positions of the values, not decreasing. `values` (float64[n, m]): nan
+    where there is none. `edges` (float64[cells + 1]): Ends of the cells. Returns float64[2 cells,
+    m]: In a cell without instants, interpolated values; nan outside the run.
     """
     cells = len(edges) - 1
     starts = np.searchsorted(axis, edges)

@@ -45,11 +45,11 @@ def as_png(figure: Figure) -> bytes:
 
 
 def pictures(
-    drawn: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str]
+    drawn: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str] | None = None
 ) -> list[Drawn]:
-    """Return those of some pictures that were drawn, with their captions."""
+    """Return those of some pictures that were drawn, by default all, with their captions."""
     found = []
-    for name in names:
+    for name in drawn if names is None else names:
         if name in drawn:
             width = int.from_bytes(drawn[name][16:20], "big")  # the header of a PNG file
             caption = captions[name.rstrip("_0123456789")]
@@ -60,14 +60,13 @@ def pictures(
 
 def document(
     title: str,
-    source: str | None,
-    checks: Sequence[Check],
     sections: Iterable[Section],
     method: Sequence[str],
+    verdict: Mapping[str, Any],
+    source: str = "",
     **values: Any,
 ) -> str:
-    """Return the page as HTML; `values` go to the template, in place of lead and verdict too."""
-    lead = f"{source or 'no source given'}. Written by railsim {__version__}."
+    """Return the page as HTML; `values` go to the template."""
     return rendered(
         "railsim.report",
         "templates/document.html",
@@ -76,5 +75,20 @@ def document(
         schemes="light dark",
         sections=[s for s in sections if s.texts or s.tables or s.figures],
         method=method,
-        **{"lead": lead, "verdict": verdict(checks)} | values,
+        verdict=verdict,
+        lead=f"{source}Written by railsim {__version__}.",
+        **values,
     )
+
+
+def of_design(
+    title: str,
+    source: str | None,
+    checks: Sequence[Check],
+    sections: Iterable[Section],
+    method: Sequence[str],
+    **values: Any,
+) -> str:
+    """Return the page of a design tool: its verdict is that of its checks."""
+    lead = f"{source or 'no source given'}. "
+    return document(title, sections, method, verdict(checks), lead, **values)

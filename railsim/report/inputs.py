@@ -59,15 +59,10 @@ def _assumed(used: Sequence[Used]) -> Table:
     if all(own == next(iter(columns.values())) for own in columns.values()):
         columns = {"all runs": next(iter(columns.values()))}
     keys = dict.fromkeys(key for own in columns.values() for key in own)
-    rows = [[key, *(printable(own.get(key, "")) for own in columns.values())] for key in keys]
-    words = frozenset(range(len(columns) + 1))
-    return Table(
-        ["", *map(printable, columns)],
-        rows,
-        "Assumptions",
-        words=words,
-        note="Of the first run of each vehicle on each track, without what was varied.",
-    )
+    rows = [[key, *(own.get(key, "") for own in columns.values())] for key in keys]
+    note = "Of the first run of each vehicle on each track, without what was varied."
+    words = range(len(columns) + 1)
+    return Table(["", *map(printable, columns)], rows, "Assumptions", words, note=note)
 
 
 def what_was_run(
@@ -84,21 +79,14 @@ def what_was_run(
         section.texts.append("Vehicles and tracks as their files are now; results were not kept.")
     for name, vehicle in vehicles.items():
         words = f"{vehicle.name}. {vehicle.source or ''}"
-        section.drawings.append(
-            Drawing(
-                printable(name),
-                printable(words),
-                _svg(vehicle_svg(vehicle)),
-                [kind.replace("_", " ") for kind in element_kinds(vehicle)],
-            )
-        )
+        kinds = [kind.replace("_", " ") for kind in element_kinds(vehicle)]
+        section.drawings.append(Drawing(name, words, Markup(vehicle_svg(vehicle)), kinds))
     for name, variants in tracks.items():
         rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
         values = sorted({mu for track in variants for mu in track.friction})
         friction = ", ".join(f"{mu:g}" for mu in values)
         words = f"{variants[0].name}. Friction {friction}; rails {rails}."
-        drawing = _svg(track_svg(variants[0]))
-        section.drawings.append(Drawing(printable(name), printable(words), drawing))
+        section.drawings.append(Drawing(name, words, Markup(track_svg(variants[0]))))
     section.details += _at_rest(results)
     if len(vehicles) > 1:
         section.tables.append(_differences(vehicles))
@@ -142,17 +130,13 @@ def _inputs(inputs: Mapping[str, Any]) -> Table:
             words = ", ".join(in_words(v) for v in values[:MOST_SHOWN])
             more = len(values) - MOST_SHOWN
             words += f" and {more} more" if more > 0 else ""
-            rows.append([printable(f"{key} {name}".strip()), printable(words)])
-    return Table(["input", "value"], rows, "Inputs of the study", words=frozenset({0, 1}))
+            rows.append([f"{key} {name}".strip(), words])
+    return Table(["input", "value"], rows, "Inputs of the study", (0, 1))
 
 
 def _rails(track: Track) -> str:
     preset = track.support.preset
     return "rigid" if preset == "rigid" else f"elastic ({preset})"
-
-
-def _svg(text: str) -> Any:
-    return Markup(text)
 
 
 def _differences(vehicles: Mapping[str, Any]) -> Table:
@@ -168,17 +152,17 @@ def _differences(vehicles: Mapping[str, Any]) -> Table:
     more = len(rows) - MOST_DIFFERENCES
     return Table(
         ["key", *map(printable, vehicles)],
-        [[printable(cell) for cell in row] for row in rows[:MOST_DIFFERENCES]],
+        rows[:MOST_DIFFERENCES],
         "Differences between the vehicles (SI)",
-        words=frozenset(range(len(vehicles) + 1)),
+        range(len(vehicles) + 1),
         note=f"{more} more keys differ." if more > 0 else "",
     )
 
 
 def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
     if isinstance(node, dict):
-        return [row for name, value in node.items()
-                for row in _flat(value, f"{key}.{name}" if key else str(name))]  # fmt: skip
+        pairs = [(f"{key}.{name}" if key else str(name), value) for name, value in node.items()]
+        return [row for name, value in pairs for row in _flat(value, name)]
     if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
         return [(key, f"{len(node)} rows: {'; '.join(map(in_words, node))}"[:60])]
     return [(key, node)]
@@ -199,5 +183,4 @@ def _settings(results: Mapping[str, Result]) -> Table:
         changed = key != "step" and set(values) != {in_words(usual.get(key))}
         if key in always or changed:
             rows.append([key, ", ".join(values), "changed" if changed else ""])
-    words = frozenset({0, 1, 2})
-    return Table(["setting", "value", ""], rows, "Method of computation", words=words)
+    return Table(["setting", "value", ""], rows, "Method of computation", range(3))

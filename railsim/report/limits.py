@@ -40,12 +40,8 @@ MOST = 256  # runs that are assessed; more would take long
 class Assessed:
     """What a page says about limits.
 
-    Attributes
-    ----------
-    verdicts : list of (bool, str)
-        Whether it is a pass, and the verdict in a sentence.
-    tables, details : list of Table
-        Details are folded at first.
+    `verdicts`: Whether it is a pass, and the verdict in a sentence. `tables`, `details`: Details
+    are folded at first.
     """
 
     verdicts: list[tuple[bool, str]] = field(default_factory=list)
@@ -70,7 +66,7 @@ def assessed(results: Mapping[str, Result]) -> Assessed:
         parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
         edition = one.limits.edition if one.limits else ""
         words = f"{one.vehicle}, {edition}: {one.verdict} ({parts})."
-        found.verdicts.append((one.verdict == PASS, printable(words)))
+        found.verdicts.append((one.verdict == PASS, words))
         found.tables.append(_reasons(one))
         found.details += [_conditions(one), _sections(one), *_rows(one)]
         found.details += [_influences(one)] if one.influences else []
@@ -81,7 +77,7 @@ def assessed(results: Mapping[str, Result]) -> Assessed:
         table, above = _safety(derailment)
         found.tables.append(table)
         if above:
-            found.verdicts.append((False, printable(f"Limits exceeded: {'; '.join(above)}.")))
+            found.verdicts.append((False, f"Limits exceeded: {'; '.join(above)}."))
     if words_of := _gathered([*remarks, *more], runs):
         found.details.append(_remarks(words_of))
     return found
@@ -108,16 +104,13 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
 
 def _reasons(one: Assessment) -> Table:
     """Return the verdicts of a vehicle with their reasons."""
-    deciding = getattr(one.limits, "deciding", ())
-    rows: list[list[Cell]] = []
-    for name, verdict in one.verdicts.items():
+    deciding, rows, failed = getattr(one.limits, "deciding", ()), [], []
+    for k, (name, verdict) in enumerate(one.verdicts.items()):
         words = WORDS[name] + ("" if name in deciding else ", for information")
-        rows.append([words, verdict.value, "; ".join(map(printable, verdict.reasons))])
-    failed = [k for k, v in enumerate(one.verdicts.values()) if v.value in (FAIL, DERAILED)]
-    return Table(
-        ["verdict on", "", "reasons"], rows, f"Verdicts: {printable(one.vehicle)}",
-        words=frozenset({0, 1, 2}), failed=frozenset(failed),
-    )  # fmt: skip
+        rows.append([words, verdict.value, "; ".join(verdict.reasons)])
+        failed += [k] if verdict.value in (FAIL, DERAILED) else []
+    header, caption = ["verdict on", "", "reasons"], f"Verdicts: {one.vehicle}"
+    return Table(header, rows, caption, range(3), failed)
 
 
 def _conditions(one: Assessment) -> Table:
@@ -125,13 +118,9 @@ def _conditions(one: Assessment) -> Table:
         [c.place or "all runs", c.name, c.state, c.found, c.required, _origin(c.source, c.checked)]
         for c in one.conditions
     ]
-    return Table(
-        ["", "condition", "", "found", "required", "requirement from"],
-        [[printable(cell) for cell in row] for row in rows],
-        f"Conditions of the test: {printable(one.vehicle)}",
-        words=frozenset(range(6)),
-        failed=frozenset(k for k, c in enumerate(one.conditions) if c.state == "not met"),
-    )
+    header = ["", "condition", "", "found", "required", "requirement from"]
+    failed = [k for k, c in enumerate(one.conditions) if c.state == "not met"]
+    return Table(header, rows, f"Conditions of the test: {one.vehicle}", range(6), failed)
 
 
 def _sections(one: Assessment) -> Table:
@@ -139,21 +128,17 @@ def _sections(one: Assessment) -> Table:
               "alignment (mm)", "level (mm)", "conicity", "quality", "not counted"]  # fmt: skip
     rows = [
         [
-            printable(row.run), s.zone, f"{s.begin:.0f}", f"{s.end:.0f}",
+            row.run, s.zone, f"{s.begin:.0f}", f"{s.end:.0f}",
             "straight" if math.isinf(s.radius) else f"{s.radius:.0f}",
             f"{1e3 * s.cant_deficiency:.0f}", f"{s.speed:.2f}", f"{1e3 * row.alignment:.2f}",
-            f"{1e3 * row.level:.2f}", _number(row.conicity), row.quality,
+            f"{1e3 * row.level:.2f}", "" if math.isnan(row.conicity) else f"{row.conicity:.2f}",
+            row.quality,
             "" if row.counts else s.reason or "no zone",
         ]
         for row in one.sections
         for s in [row.section]
     ]  # fmt: skip
-    caption = f"Sections: {printable(one.vehicle)}"
-    return Table(header, rows, caption, words=frozenset({0, 1, 10, 11}))
-
-
-def _number(value: float) -> str:
-    return "" if math.isnan(value) else f"{value:.2f}"
+    return Table(header, rows, f"Sections: {one.vehicle}", (0, 1, 10, 11))
 
 
 def _rows(one: Assessment) -> list[Table]:
@@ -175,8 +160,7 @@ def _rows(one: Assessment) -> list[Table]:
                 _origin(row.source, row.checked) if bounded else "for information",
             ])  # fmt: skip
         tables.append(Table(
-            header, rows, f"All values: {printable(one.vehicle)}, {printable(zone.title)}",
-            words=frozenset({0, 1, 5, 11}),
+            header, rows, f"All values: {one.vehicle}, {zone.title}", (0, 1, 5, 11),
             note="line and s_e: regression over the cant deficiency at the admissible one, and its "
             "standard error.",
         ))  # fmt: skip
@@ -190,14 +174,14 @@ def _influences(one: Assessment) -> Table:
         rule, solved = found.criterion, found.regression
         constant, deficiency, curvature = (rule.scale * c for c in solved.coefficients)
         rows.append([
-            (rule.words, printable(", ".join(filter(None, [found.place, found.population])))),
+            (rule.words, ", ".join(filter(None, [found.place, found.population]))),
             rule.unit, str(solved.N), f"{constant:.3g}", f"{1e-3 * deficiency:.3g}",
             f"{1e-3 * curvature:.3g}", rule.text(solved.error), f"{solved.determination:.2f}",
             rule.text(solved.value),
         ])  # fmt: skip
     return Table(
         ["", "unit", "N", "constant", "per mm of I", "per 1/km", "s_e", "R2", "value"], rows,
-        f"Multiple regression, for information: {printable(one.vehicle)}", words=frozenset({0, 1}),
+        f"Multiple regression, for information: {one.vehicle}", (0, 1),
         note="All curves of zones 2 to 4 of a population over cant deficiency I and curvature; "
         f"value: at the admissible cant deficiency and R {RADIUS:.0f} m.",
     )  # fmt: skip
@@ -224,10 +208,8 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
     rows.append(("runs", f"{len(one.runs)}, {sum(_seconds(runs[n]) for n in one.runs):.0f} s"))
     if one.hunting_frequency is not None:
         rows.append(("frequency of the instability", f"{one.hunting_frequency:.2f} Hz"))
-    return Table(
-        ["", ""], [[printable(a), printable(b)] for a, b in rows],
-        f"Vehicle, measuring points, profiles: {printable(one.vehicle)}", words=frozenset({0, 1}),
-    )  # fmt: skip
+    caption = f"Vehicle, measuring points, profiles: {one.vehicle}"
+    return Table(["", ""], [[*row] for row in rows], caption, (0, 1))
 
 
 def _sources(limits: Any) -> Table:
@@ -237,8 +219,8 @@ def _sources(limits: Any) -> Table:
         for one in CRITERIA.values()
         if (law := limits.limits.get(one.name)) is not None
     ]
-    caption = f"Limits of {limits.edition}"
-    return Table(["", "verdict on", "", "limit from"], rows, caption, words=frozenset(range(4)))
+    header = ["", "verdict on", "", "limit from"]
+    return Table(header, rows, f"Limits of {limits.edition}", range(4))
 
 
 def _wheels(result: Result) -> list[str]:
@@ -284,29 +266,18 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
             own = [found.get(rule) for found in worst.values()]
             first = next(pair for pair in own if pair)[1]
             limits = dict.fromkeys(_limit(pair[1]) for pair in own if pair)
-            rows.append(
-                [
-                    (first.criterion.words, first.criterion.meaning),
-                    *map(_cell, own),
-                    _joined(limits),
-                ]
-            )
             if any(pair and pair[1].share > 1.0 for pair in own):
-                failed.append(len(rows) - 1)
+                failed.append(len(rows))
+            words = first.criterion.words, first.criterion.meaning
+            rows.append([words, *map(_cell, own), _joined(limits)])
         own_zones = [z for one in assessments for z in one.zones if z.zone == name]
         counts = sorted({len(zone.values) for zone in own_zones})
         number = " to ".join(dict.fromkeys(str(n) for n in (counts[0], counts[-1])))
         needed = own_zones[0].needed
         edition = next((one.limits.edition for one in assessments if one.limits), "")
-        tables.append(
-            Table(
-                ["", *map(printable, worst), "limit"],
-                rows,
-                f"{edition}, zone {name}: {number} of {needed} sections in each population",
-                failed=frozenset(failed),
-                note=NOTE,
-            )
-        )
+        caption = f"{edition}, zone {name}: {number} of {needed} sections in each population"
+        header = ["", *map(printable, worst), "limit"]
+        tables.append(Table(header, rows, caption, failed=failed, note=NOTE))
     return [*(replace(table, note="") for table in tables[:-1]), *tables[-1:]]
 
 
@@ -324,12 +295,10 @@ def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
     if row.uncorrected is not None:
         words.append(f"uncorrected {row.criterion.scale * row.uncorrected.value:.3g}")
     if math.isnan(row.share):
-        words = [
-            f"{row.estimate.N} value, mean {row.criterion.scale * row.estimate.mean:.3g}",
-            row.place,
-        ]
+        mean = f"{row.estimate.N} value, mean {row.criterion.scale * row.estimate.mean:.3g}"
+        words = [mean, row.place]
     small = ", ".join(filter(None, [*words, zone.population.name]))
-    return f"{row.criterion.scale * row.estimate.value:.3g}", printable(small)
+    return f"{row.criterion.scale * row.estimate.value:.3g}", small
 
 
 def _limit(row: Row) -> tuple[str, str]:
@@ -343,34 +312,25 @@ def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
     failed, above = [], []
     for run, report in [pair for one in found for pair in one.safety.items()]:
         # a wheel that has lifted has no quotient
-        worst = max(
-            report.wheels,
-            key=lambda w: float("-inf") if w.Y_over_Q != w.Y_over_Q else w.Y_over_Q / w.limit,
-        )
-        lifted = [w.place for w in report.wheels if w.Y_over_Q != w.Y_over_Q]
+        shares = [
+            -math.inf if math.isnan(w.Y_over_Q) else w.Y_over_Q / w.limit for w in report.wheels
+        ]
+        worst = report.wheels[shares.index(max(shares))]
+        lifted = [w.place for w in report.wheels if math.isnan(w.Y_over_Q)]
         share = worst.Y_over_Q / worst.limit
         if share > 1.0:
             failed.append(len(rows))
             above.append(f"{run}: Nadal's limit, {worst.place}")
-        rows.append(
-            [
-                run,
-                worst.place,
-                f"{worst.Y_over_Q:.3f}",
-                f"{worst.limit:.3f}",
-                f"{100.0 * share:.0f} %",
-                f"{max(w.climb_distance for w in report.wheels):.2f} m",
-                f"{max(report.overturning.values()):.2f}" if report.overturning else "",
-                ", ".join(lifted) or "none",
-            ]
+        climb = f"{max(w.climb_distance for w in report.wheels):.2f} m"
+        tilt = f"{max(report.overturning.values()):.2f}" if report.overturning else ""
+        values = (
+            f"{worst.Y_over_Q:.3f}",
+            f"{worst.limit:.3f}",
+            f"{100.0 * share:.0f} %",
+            climb,
+            tilt,
         )
+        rows.append([run, worst.place, *values, ", ".join(lifted) or "none"])
     header = ["run", "wheel", "largest Y/Q", "limit", "share", "climb", "overturning", "lifted"]
-    table = Table(
-        header,
-        rows,
-        "Derailment: the wheel nearest to Nadal's limit",
-        words=frozenset({0, 1, 7}),
-        failed=frozenset(failed),
-        note=NADAL,
-    )
-    return table, above
+    caption = "Derailment: the wheel nearest to Nadal's limit"
+    return Table(header, rows, caption, (0, 1, 7), failed, NADAL), above

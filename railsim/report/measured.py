@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.assessment.model_comparison import FAIL, INCOMPLETE, ModelValidation
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 from railsim.files.access import read_bytes
 from railsim.identification import Identified
 from railsim.identification.identified import correlation_table, parameter_table, residual_table
@@ -18,11 +18,11 @@ from railsim.plot import validation as plots
 from railsim.plot.style import styled
 from railsim.report import tables
 from railsim.report.document import Drawn, Section, as_png, document, pictures
-from railsim.version import __version__
 
 RECORDS = ("model_validation.json", "identified.json")
 LARGEST_RECORD, LARGEST_PICTURE = 200_000_000, 20_000_000  # bytes
 PNG = b"\x89PNG\r\n\x1a\n"
+IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 CAPTIONS = {
     "scatter": "Simulated over measured section values; dashed the limit of the mean, dotted twice "
     "that of the standard deviation.",
@@ -64,14 +64,14 @@ def measured_page(parts: Sequence[Part], title: str | None = None) -> str:
     for part in parts:
         head = [] if alone else [Section(part.title, [part.verdict, *part.remarks])]
         sections += [*head, *part.sections]
-    words = {"text": " ".join(p.verdict if alone else f"{p.title}: {p.verdict}" for p in parts),
-             "ok": all(part.ok for part in parts)}  # fmt: skip
+    words = " ".join(p.verdict if alone else f"{p.title}: {p.verdict}" for p in parts)
     return document(
-        title or "; ".join(part.title for part in parts), None, (), sections,
+        title or "; ".join(part.title for part in parts),
+        sections,
         list(dict.fromkeys(text for part in parts for text in part.method)),
-        lead=f"Written by railsim {__version__}.", verdict=words,
+        {"text": words, "ok": all(part.ok for part in parts)},
         remarks=parts[0].remarks if alone else (),
-    )  # fmt: skip
+    )
 
 
 def as_section(part: Part, number: int) -> tables.Section:
@@ -79,25 +79,16 @@ def as_section(part: Part, number: int) -> tables.Section:
     found = tables.Section(f"measured{number}", part.title, [part.verdict, *part.remarks])
     for section in part.sections:
         found.texts += section.texts
-        found.drawings += [
-            tables.Drawing(
-                "",
-                drawn.caption,
-                Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">').format(
-                    drawn.caption, drawn.width, drawn.png
-                ),
-            )
-            for drawn in section.figures
-        ]
+        for one in section.figures:
+            image = IMAGE.format(one.caption, one.width, one.png)
+            found.drawings.append(tables.Drawing("", one.caption, image))
         found.details += [tables.of_values(table, section.title) for table in section.tables]
     found.tables, found.details = found.details[:1], found.details[1:]
     return found
 
 
 def _drawn(figures: Mapping[str, Figure]) -> list[Drawn]:
-    with styled():
-        drawn = {name: as_png(figure) for name, figure in figures.items()}
-    return pictures(drawn, CAPTIONS, drawn)
+    return pictures({name: as_png(figure) for name, figure in figures.items()}, CAPTIONS)
 
 
 def validation_figures(found: ModelValidation) -> dict[str, Figure]:
@@ -119,8 +110,8 @@ def of_validation(found: ModelValidation, more: Sequence[Drawn] = ()) -> Part:
         Section("Values of the sections (SI)", tables=[found.section_table()]),
     ]
     title = f"{found.vehicle} against {', '.join(found.runs)}"
-    return Part(title, text, found.verdict != FAIL, found.remarks, sections,
-                (*VALIDATION, found.edition))  # fmt: skip
+    method = (*VALIDATION, found.edition)
+    return Part(title, text, found.verdict != FAIL, found.remarks, sections, method)
 
 
 def identification_figures(found: Identified) -> dict[str, Figure]:
@@ -173,13 +164,11 @@ def _record_of(path: Path) -> Path | None:
 def read_part(file: str | Path) -> Part:
     """Return what was found by `railsim validate-model` or `identify`, by the folder it wrote.
 
-    Raises
-    ------
-    InputError : a record that cannot be read, or is none.
+    Raises InputError: a record that cannot be read, or is none.
     """
     path = _record_of(Path(file))
     if path is None:
-        raise InputError([Fault(str(file), "", "no record", " or ".join(RECORDS))])
+        raise InputError.of(str(file), "", "no record", " or ".join(RECORDS))
     try:
         record = json.loads(read_bytes(path, LARGEST_RECORD))
         if path.name == RECORDS[0]:
@@ -188,7 +177,7 @@ def read_part(file: str | Path) -> Part:
     except (ValueError, KeyError, TypeError) as error:
         words = f"{type(error).__name__}: {error}"[:100]
         allowed = "the file as `validate-model` or `identify` has written it"
-        raise InputError([Fault(str(path), "", words, allowed)]) from None
+        raise InputError.of(str(path), "", words, allowed) from None
 
 
 def _pictures(folder: Path, *names: str) -> list[Drawn]:

@@ -4,8 +4,9 @@
 `positions` a table of all positions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,7 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 from railsim.plot import mechanisms as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawn, Section, document, pictures
+from railsim.report.document import Drawn, Section, of_design, pictures
 from railsim.table import Table
 
 if TYPE_CHECKING:
@@ -90,53 +91,60 @@ CAPTIONS = {
 }
 
 
+@styled()
 def figures(collected: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
-    result = collected.result
+    result, optimum = collected.result, collected.optimum
     definition, output = result.definition, result.output
-    others: dict[str, Figure] = {}
-    with styled():
-        drawn = {
-            "drawing": plots.drawing_figure(result),
-            "kinematics": plots.kinematics_figure(result),
-        }
-        if "height" in output:
-            drawn["path"] = plots.path_figure(result)
-        if actuators(result.motion):
-            drawn["actuators"] = plots.actuators_figure(result)
-        if definition.angles:
-            drawn["angles"] = plots.angles_figure(result)
-        if any(hasattr(joint, "cam") for joint in definition.joints.values()):
-            drawn["cam"] = plots.cam_figure(result)
-        if "force" in output or "ratio" in output:
-            drawn["ratio_force"] = plots.force_figure(result)
-        if "pressure" in output:
-            drawn["pressure"] = plots.pressure_figure(result)
-            assert definition.solve is not None
-            if isinstance(definition.actuators[definition.solve.unknown], AirSpring):
-                drawn["carpet"] = plots.carpet_figure(result)
-        if result.contact is not None:
-            drawn["contact"] = plots.contact_figure(result)
-        if any(name.endswith("_length") for name in output):
-            drawn["gas_springs"] = plots.gas_spring_figure(result)
-        if len(collected.cases) > 1 and "force" in output:
-            drawn["cases"] = plots.cases_figure(collected.cases)
-        if result.timed is not None:
-            drawn["time"] = plots.time_figure(result)
-        if (compared := _compared(collected)) and "ratio" in output:
-            drawn["comparison"] = plots.comparison_figure(compared)
-            if any("pressure" in one.output for one in compared.values()):
-                drawn["comparison_held"] = plots.held_figure(compared)
-            if result.zone:
-                drawn["comparison_zone"] = plots.comparison_figure(compared, zoom=True)
-        if collected.optimum is not None:
-            drawn["search"] = plots.search_figure(collected.optimum)
-        else:
-            others = {
-                f"drawing_{i}": plots.drawing_figure(other)
-                for i, other in enumerate(collected.results[1:], start=2)
-            }
-    return {name: drawn[name] for name in CAPTIONS if name in drawn} | others
+    compared = _compared(collected) if "ratio" in output or result.zone else {}
+    solved = definition.actuators[definition.solve.unknown] if definition.solve else None
+    compares = bool(compared) and "ratio" in output
+    held = any("pressure" in one.output for one in compared.values())
+    # whether there is something to draw, and what draws it
+    wanted: dict[str, tuple[object, Callable[..., Figure], Any]] = {
+        "drawing": (True, plots.drawing_figure, result),
+        "path": ("height" in output, plots.path_figure, result),
+        "kinematics": (True, plots.kinematics_figure, result),
+        "actuators": (actuators(result.motion), plots.actuators_figure, result),
+        "angles": (definition.angles, plots.angles_figure, result),
+        "cam": (
+            any(hasattr(j, "cam") for j in definition.joints.values()),
+            plots.cam_figure,
+            result,
+        ),
+        "ratio_force": ("force" in output or "ratio" in output, plots.force_figure, result),
+        "pressure": ("pressure" in output, plots.pressure_figure, result),
+        "contact": (result.contact, plots.contact_figure, result),
+        "carpet": (
+            "pressure" in output and isinstance(solved, AirSpring),
+            plots.carpet_figure,
+            result,
+        ),
+        "gas_springs": (
+            any(name.endswith("_length") for name in output),
+            plots.gas_spring_figure,
+            result,
+        ),
+        "cases": (
+            len(collected.cases) > 1 and "force" in output,
+            plots.cases_figure,
+            collected.cases,
+        ),
+        "time": (result.timed, plots.time_figure, result),
+        "comparison": (compares, plots.comparison_figure, compared),
+        "comparison_held": (compares and held, plots.held_figure, compared),
+        "comparison_zone": (
+            compares and result.zone,
+            partial(plots.comparison_figure, zoom=True),
+            compared,
+        ),
+        "search": (optimum, plots.search_figure, optimum),
+    }
+    drawn = {name: draw(what) for name, (there, draw, what) in wanted.items() if there}
+    others = collected.results[1:] if optimum is None else ()
+    return drawn | {
+        f"drawing_{i}": plots.drawing_figure(other) for i, other in enumerate(others, start=2)
+    }
 
 
 def _compared(collected: Collected) -> dict[str, Analysis]:
@@ -162,12 +170,8 @@ def positions(result: Analysis) -> bytes:
     }
     unit = quantity("travel", definition).si_unit
     for courses, value, of in _courses(result.motion):
-        columns |= _columns(
-            courses,
-            f"{value} [{of}]",
-            f"{value} first [{of}/{unit}]",
-            f"{value} second [{of}/{unit}2]",
-        )
+        rates = f"{value} first [{of}/{unit}]", f"{value} second [{of}/{unit}2]"
+        columns |= _columns(courses, f"{value} [{of}]", *rates)
     return _csv(columns)
 
 
@@ -179,12 +183,8 @@ def motion_table(result: Analysis) -> bytes:
     force = f"force [{force_unit(driving(result.definition), result.definition)}]"
     columns = {"time [s]": timed.time, f"travel [{unit}]": timed.motion.s, force: timed.force}
     for courses, value, of in _courses(timed.motion):
-        columns |= _columns(
-            timed.in_time(courses),
-            f"{value} [{of}]",
-            f"{value} speed [{of}/s]",
-            f"{value} acceleration [{of}/s2]",
-        )
+        rates = f"{value} speed [{of}/s]", f"{value} acceleration [{of}/s2]"
+        columns |= _columns(timed.in_time(courses), f"{value} [{of}]", *rates)
     if result.definition.output is not None:
         v, a = timed.point(result.definition.output.point)
         for k, axis in enumerate("xy"):
@@ -208,8 +208,7 @@ def _columns(courses: Mapping[str, Course], *headers: str) -> dict[str, Any]:
 
 def _csv(columns: Mapping[str, Any]) -> bytes:
     lists = (np.asarray(values, dtype=float).tolist() for values in columns.values())
-    rows = zip(*lists, strict=True)
-    return Table(columns, rows).csv().encode()
+    return Table(columns, zip(*lists, strict=True)).csv().encode()
 
 
 def animation(result: Analysis) -> bytes:
@@ -229,11 +228,8 @@ def animation(result: Analysis) -> bytes:
         canvas = FigureCanvasAgg(figure)
         axes = figure.subplots()
         made = plots.draw(axes, drawn, 0, "#1d2429", "")
-        axes.set_xlim(x0 - margin, x1 + margin)
-        axes.set_ylim(y0 - margin, y1 + margin)
-        axes.set_aspect("equal")
-        axes.set_xlabel("x (mm)")
-        axes.set_ylabel("y (mm)")
+        axes.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin))
+        axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
         title = axes.set_title(_position(result, motion.s[0]))
         moving: list[Any] = [*made, title]
         for artist in moving:
@@ -305,15 +301,11 @@ def _sentences(result: Analysis, s: Any) -> list[str]:
         np.interp(s, result.output["travel"][order], result.output[c.name][order]) * c.scale
         for c in columns
     ]
-    return [
-        ", ".join(
-            [
-                _position(result, value),
-                *(f"{c.name} {x[k]:.0f} {c.unit}" for c, x in zip(columns, known, strict=True)),
-            ]
-        )
-        for k, value in enumerate(s)
-    ]
+    found = []
+    for k, value in enumerate(s):
+        words = [f"{c.name} {x[k]:.0f} {c.unit}" for c, x in zip(columns, known, strict=True)]
+        found.append(", ".join([_position(result, value), *words]))
+    return found
 
 
 def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
@@ -324,11 +316,8 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     def shown(*names: str) -> list[Drawn]:
         return pictures(drawn, CAPTIONS, names)
 
-    rows = [tables.position_table(result)]
-    if len(published := tables.published_table(result)):
-        rows.append(published)
-    if made:
-        rows.append(check_table(made, notes=True))
+    rows = [tables.position_table(result), tables.published_table(result)]
+    rows = [table for table in (*rows, check_table(made, notes=True)) if len(table)]
     sections = [Section("Results", tables.sentences(result), rows, shown("drawing", "path"))]
     compared = shown("comparison", "comparison_held", "comparison_zone")
     if (optimum := collected.optimum) is not None:
@@ -354,15 +343,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         sections.append(Section("Tolerances", [TOLERANCES], rows))
     sections.append(Section("Parameters", [], [tables.parameter_table(result)]))
     box, data = player(result)
-    return document(
-        f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else ""),
-        definition.source,
-        made,
-        sections,
-        METHOD,
-        remarks=remarks(result),
-        scripts=["templates/player.js"],
-        data=data,
-        box=box,
-        last=FRAMES - 1,
-    )
+    title = f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else "")
+    play = {"scripts": ["templates/player.js"], "data": data, "box": box, "last": FRAMES - 1}
+    words = remarks(result)
+    return of_design(title, definition.source, made, sections, METHOD, remarks=words, **play)

@@ -17,24 +17,13 @@ from railsim.result import Result
 class Beside:
     """A published value and the value of a run.
 
-    Attributes
-    ----------
-    study : Published
-        Publication.
-    value : PublishedValue
-        Published value with its conditions.
-    run : str
-        Name of the run.
-    rails : str
-        Rails of the run: ``elastic`` or ``rigid``.
-    published, found : float
-        The two values [SI].
+    `published`, `found`: The two values [SI].
     """
 
-    study: Published
-    value: PublishedValue
-    run: str
-    rails: str
+    study: Published  # publication
+    value: PublishedValue  # published value with its conditions
+    run: str  # name of the run
+    rails: str  # rails of the run: ``elastic`` or ``rigid``
     published: float
     found: float
 

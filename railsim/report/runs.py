@@ -38,6 +38,10 @@ from railsim.text import printable
 from railsim.version import __version__
 
 Record = Mapping[str, Any]
+PEAKS = (
+    "Largest magnitudes over all steps after the start of the run, with their signs; wheelsets are "
+    "numbered from the leading end."
+)
 MOST_ROWS = 300  # of a table on the page
 
 
@@ -54,27 +58,14 @@ def page(
 ) -> str:
     """Return the page as HTML.
 
-    Parameters
-    ----------
-    title : str
-        Title of the page.
-    records : sequence of mapping
-        One for each run, as `railsim.result.facts.run_facts` with ``name`` and ``labels``,
-        including runs that failed or have not been done.
-    results : mapping of str to Result
-        Results, by the names of their runs, whose curves are shown.
-    remarks : sequence of str
-        Further notes for the reader.
-    assessable : mapping of str to Result, optional
-        All results, which are assessed together; by default `results`.
-    inputs : mapping, optional
-        Inputs of the study whose runs these are, as in its ``study.json``.
-    used : sequence of Used
-        What runs without results used, as the files are now.
-    assessments : sequence of Assessment
-        Those of a scenario; comfort, wear and safety are shown in sections of their own.
-    measured : sequence of Section
-        Comparisons with tests and identifications.
+    `title`: Title of the page. `records`: One for each run, as `railsim.result.facts.run_facts`
+    with ``name`` and ``labels``, including runs that failed or have not been done. `results`:
+    Results, by the names of their runs, whose curves are shown. `remarks`: Further notes for the
+    reader. `assessable`: All results, which are assessed together; by default `results`. `inputs`:
+    Inputs of the study whose runs these are, as in its ``study.json``. `used`: What runs without
+    results used, as the files are now. `assessments`: Those of a scenario; comfort, wear and
+    safety are shown in sections of their own. `measured`: Comparisons with tests and
+    identifications.
     """
     found = groups(results)
     cells = cells_of(found)
@@ -127,7 +118,7 @@ def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
     parts = [number]
     for kind, found in names.items():
         if len(found) <= 4 and all(found):
-            parts.append(f"{kind}{'s' * (len(found) > 1)} {', '.join(map(printable, found))}")
+            parts.append(f"{kind}{'s' * (len(found) > 1)} {', '.join(found)}")
         else:
             parts.append(f"{len(found)} {kind}s")
     versions = sorted({str(r.attributes.get("railsim_version", "")) for r in results.values()})
@@ -170,26 +161,27 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
         ["", *(printable(str(record["name"])) for record in shown)],
         [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
     )
-    texts = ["Largest magnitudes over all steps after the start of the run, with their "
-             "signs; wheelsets are numbered from the leading end."]  # fmt: skip
+    texts, done = [PEAKS], len(_done(records))
     if not shown:
         texts = ["The study kept no results of its runs (`--keep summary`); their values follow."]
-    elif len(shown) < len(_done(records)):
-        texts.append(f"{len(shown)} of {len(_done(records))} runs, those with the largest values; "
-                     "all others follow in the table of runs.")  # fmt: skip
+    elif len(shown) < done:
+        texts.append(f"{_largest(len(shown), done)}; all others follow in the table of runs.")
     return Section("peaks", "Peaks", texts, tables=[table] if shown else [])
 
 
 def _worst(records: Sequence[Record]) -> Section:
     """The runs with the largest values, and where the study has them."""
     done = _done(records)
-    ranks = [f"{k}." for k in range(1, WORST + 1)]
-    table = Table(["", *ranks], worst_rows(done))
+    table = Table(["", *(f"{k}." for k in range(1, WORST + 1))], worst_rows(done))
     text = (
         f"The largest of {len(done)} runs by magnitude, over all wheels; the table of runs below "
         "has the rest, and the command of each."
     )
     return Section("worst", "Worst runs", [text], tables=[table])
+
+
+def _largest(shown: int, done: int) -> str:
+    return f"{shown} of {done} runs, those with the largest values"
 
 
 def _assessed(assessment: Assessment) -> Section:
@@ -199,10 +191,10 @@ def _assessed(assessment: Assessment) -> Section:
     if figure is not None:
         code = b64encode(as_png(figure)).decode()
         image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format("assessment", code)
-        section.drawings.append(Drawing(printable(assessment.vehicle), "", image))
+        section.drawings.append(Drawing(assessment.vehicle, "", image))
     section.details = [of_values(one, str(one.columns[0].heading)) for one in tables(assessment)]
     if assessment.remarks:
-        rows = [[printable(remark)] for remark in assessment.remarks]
+        rows = [[remark] for remark in assessment.remarks]
         section.details.append(Table(["remark"], rows, "Remarks on these values"))
     return section
 
@@ -211,10 +203,9 @@ def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result
     if not number:
         text = "The results hold none of the quantities that are drawn here."
         return Section("curves", "Along the track", [text])
-    texts = []
-    if len(results) < len(_done(records)):
-        texts = [f"{len(results)} of {len(_done(records))} runs, those with the largest values."]
-    return Section("curves", "Along the track", texts, plots=[str(k) for k in range(number)])
+    done = len(_done(records))
+    texts = [f"{_largest(len(results), done)}."] if len(results) < done else []
+    return Section("curves", "Along the track", texts, plots=[*map(str, range(number))])
 
 
 def _spread(
@@ -238,16 +229,13 @@ def _spread(
             for record in records
         ],
     }
-    table = Table(
-        ["value", "smallest", "in run", "median", "largest", "in run"],
-        spread_rows(done),
-        f"Spread over {len(done)} runs",
-        words=frozenset({0, 2, 5}),
-        note="Peaks and medians over full curves by magnitude, over all wheels.",
-    )
+    header = ["value", "smallest", "in run", "median", "largest", "in run"]
+    note = "Peaks and medians over full curves by magnitude, over all wheels."
+    caption = f"Spread over {len(done)} runs"
+    table = Table(header, spread_rows(done), caption, (0, 2, 5), note=note)
     section = Section("spread", "Over the study", plots=["runs"], details=[table])
     if len(done) >= LEAST and varied:
-        section.texts = [f"Varied: {', '.join(map(printable, varied))}."]
+        section.texts = [f"Varied: {', '.join(varied)}."]
         section.plots.insert(0, "spread")
     return section
 
@@ -264,75 +252,55 @@ def _published(results: Mapping[str, Result]) -> Section | None:
             quantity = QUANTITIES[row.value.quantity]
             side = f" {row.value.side}" if row.value.side else ""
             at = row.value.read if isinstance(row.value.read, str) else f"t = {row.value.read:g} s"
-            cells.append(
-                [
-                    printable(row.run),
-                    quantity.words,
-                    f"wheelset {row.value.wheelset}{side}, {at}",
-                    quantity.text(row.published),
-                    quantity.text(row.found),
-                    f"{100.0 * row.difference:+.1f} %",
-                    row.rails,
-                ]
-            )
+            where = f"wheelset {row.value.wheelset}{side}, {at}"
+            numbers = quantity.text(row.published), quantity.text(row.found)
+            difference = f"{100.0 * row.difference:+.1f} %"
+            cells.append([row.run, quantity.words, where, *numbers, difference, row.rails])
         first = own[0].study
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
         header = ["run", "", "read", "published", "here", "difference", "rails of the run"]
-        words = frozenset({0, 1, 2, 6})
-        tables.append(Table(header, cells, first.name, words=words, note=note))
+        tables.append(Table(header, cells, first.name, (0, 1, 2, 6), note=note))
     return Section("published", "Comparison with published values", tables=tables)
 
 
 def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
     """Runs that failed or ended early, and remarks, equal ones once."""
-    section = Section("remarks", "Failures and remarks", list(map(printable, more)))
+    section = Section("remarks", "Failures and remarks", [*more])
     ended: dict[tuple[str, str], list[Record]] = {}
     for record in records:
         if record["status"] != "complete":  # one reason for whatever numbers it tells
             kind = re.sub(r"\d+(\.\d+)?", "#", str(record.get("status_reason", "")))
             ended.setdefault((str(record["status"]), kind), []).append(record)
-    rows = [
-        [
-            f"{len(group)}",
-            status,
-            printable(str(group[0].get("status_reason", ""))),
-            listed([str(record["name"]) for record in group]),
-        ]
-        for (status, _), group in sorted(ended.items(), key=lambda item: -len(item[1]))
-    ]
-    if rows:
-        short = sum(map(len, ended.values()))
-        left = len(rows) - MOST_ROWS
-        section.tables.append(
-            Table(
-                ["runs", "status", "reason, of the first", "which"],
-                rows[:MOST_ROWS],
-                f"{short} of {len(records)} runs did not reach the requested end",
-                words=frozenset({1, 2, 3}),
-                note=f"{left} more are in summary.csv." if left > 0 else "",
-            )
-        )
-    else:
-        section.texts.append("All runs reached the requested end.")
+    rows: list[list[Cell]] = []
+    for (status, _), group in sorted(ended.items(), key=lambda item: -len(item[1])):
+        names = listed([str(record["name"]) for record in group])
+        rows.append([f"{len(group)}", status, str(group[0].get("status_reason", "")), names])
     said: dict[str, list[str]] = {}
     for record in records:
         for remark in record.get("remarks", ()):
             said.setdefault(str(remark), []).append(str(record["name"]))
-    cells = []
-    for remark, names in list(said.items())[:MOST_ROWS]:
-        cells.append([printable(remark), listed(names)])
-    if cells:
-        section.tables.append(
-            Table(
-                ["remark", "runs"],
-                cells,
-                "Remarks",
-                words=frozenset({0, 1}),
-                note=f"{len(said) - MOST_ROWS} more are in summary.csv."
-                if len(said) > MOST_ROWS
-                else "",
-            )
-        )
-    else:
-        section.texts.append("There are no remarks on the runs.")
+    short = sum(map(len, ended.values()))
+    for header, words, cells, caption, none in (
+        (
+            ["runs", "status", "reason, of the first", "which"],
+            range(1, 4),
+            rows,
+            f"{short} of {len(records)} runs did not reach the requested end",
+            "All runs reached the requested end.",
+        ),
+        (
+            ["remark", "runs"],
+            range(2),
+            [[remark, listed(names)] for remark, names in said.items()],
+            "Remarks",
+            "There are no remarks on the runs.",
+        ),
+    ):
+        left = len(cells) - MOST_ROWS
+        note = f"{left} more are in summary.csv." if left > 0 else ""
+
+        if cells:
+            section.tables.append(Table(header, cells[:MOST_ROWS], caption, words, note=note))
+        else:
+            section.texts.append(none)
     return section

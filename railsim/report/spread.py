@@ -89,31 +89,23 @@ def command(record: Record, inputs: Mapping[str, Any]) -> str:
 def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
     """Return the values of all runs in the units of printed tables, by the keys of quantities.
 
-    Each column has ``words``, ``unit`` and ``values``, None where a run has no value.
+    Returns: each with ``words``, ``unit``, and one of ``values`` for each run, or None.
     """
     found: dict[str, dict[str, Any]] = {}
+
+    def add(run: int, key: str, words: str, unit: str, value: float) -> None:
+        empty = {"words": words, "unit": unit, "values": [None] * len(records)}
+        column = found.setdefault(key, empty)
+        if value == value:
+            column["values"][run] = float(f"{value:.6g}")
+
     for number, record in enumerate(records):
         for key, words, quantity, value in _values(record):
-            column = found.setdefault(
-                key,
-                {
-                    "words": words,
-                    "unit": quantity.shown_unit.replace("-", ""),
-                    "values": [None] * len(records),
-                },
-            )
-            if value == value:
-                column["values"][number] = float(f"{value * quantity.scale:.6g}")
+            add(number, key, words, quantity.shown_unit.replace("-", ""), value * quantity.scale)
         for key, value in record.get("quantities", {}).items():
-            if value is not None:
-                column = found.setdefault(key, _own(key, len(records)))
-                column["values"][number] = float(f"{value:.6g}")
+            if value is not None:  # of an analysis or of a user function, in SI
+                add(number, key, printable(key), unit_of_number(key), value)
     return found
-
-
-def _own(name: str, number: int) -> dict[str, Any]:
-    """A column of an analysis or of a user function, in SI."""
-    return {"words": printable(name), "unit": unit_of_number(name), "values": [None] * number}
 
 
 def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
@@ -146,17 +138,9 @@ def spread_rows(records: Sequence[Record]) -> list[list[str]]:
         if len(pairs) < LEAST:
             continue
         low, high = min(pairs), max(pairs)
-        unit = f" ({column['unit']})" if column["unit"] else ""
-        rows.append(
-            [
-                column["words"] + unit,
-                f"{low[0]:.4g}",
-                str(records[low[1]]["name"]),
-                f"{median(value for value, _ in pairs):.4g}",
-                f"{high[0]:.4g}",
-                str(records[high[1]]["name"]),
-            ]
-        )
+        middle = f"{median(value for value, _ in pairs):.4g}"
+        low_cells, high_cells = ([f"{v:.4g}", str(records[i]["name"])] for v, i in (low, high))
+        rows.append([_heading(column), *low_cells, middle, *high_cells])
     return rows
 
 
@@ -172,14 +156,17 @@ def worst_rows(records: Sequence[Record]) -> list[list[tuple[str, str] | str]]:
     for key in [name for name in RANKED if name in there] or own:
         column = there[key]
         pairs = [(-v, i) for i, v in enumerate(column["values"]) if v is not None]
-        unit = f" ({column['unit']})" if column["unit"] else ""
-        row: list[tuple[str, str] | str] = [column["words"] + unit]
+        row: list[tuple[str, str] | str] = [_heading(column)]
         for value, number in sorted(pairs)[:WORST]:
             told = (f"{own['words']} {_text(own['values'][number])}" for own in varied.values())
             where = ", ".join(told) or str(records[number]["name"])
-            row.append((f"{-value:.4g}", printable(where)))
+            row.append((f"{-value:.4g}", where))
         rows.append(row + [""] * (1 + WORST - len(row)))
     return rows
+
+
+def _heading(column: Mapping[str, str]) -> str:
+    return column["words"] + (f" ({column['unit']})" if column["unit"] else "")
 
 
 def _text(value: Any) -> str:

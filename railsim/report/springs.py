@@ -15,7 +15,7 @@ from railsim.design_checks import check_table
 from railsim.errors import InputError
 from railsim.plot import springs as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawn, Section, document, pictures
+from railsim.report.document import Drawn, Section, of_design, pictures
 from railsim.springs import tables
 from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import Design, design
@@ -84,9 +84,7 @@ class Collected:
 def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" = None) -> Collected:
     """Compute all results that a suspension file allows.
 
-    Raises
-    ------
-    InputError : the suspension cannot be verified.
+    Raises InputError: the suspension cannot be verified.
     """
     designed, remarks = None, []
     if suspension.target is not None and suspension.inner is not None:
@@ -105,24 +103,24 @@ def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" =
     )
 
 
+@styled()
 def figures(results: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
     suspension = results.suspension
-    with styled():
-        made = {
-            "stiffness": plots.stiffness_figure(results.verification),
-            "deflection": plots.deflection_figure(suspension, results.verification),
-            "arm": plots.arm_figure(suspension, results.verification),
-        }
-        if results.design is not None:
-            made["coils"] = plots.coils_figure(suspension, results.design)
-        if results.fatigue is not None:
-            made["goodman_smith"] = plots.goodman_figure(suspension, results.fatigue)
-        if results.ride_heights is not None:
-            tare = suspension.fatigue.tare if suspension.fatigue is not None else None
-            made["ride_height"] = plots.ride_height_figure(results.ride_heights, tare)
-        if results.search is not None:
-            made["search"] = plots.search_figure(results.search)
+    made = {
+        "stiffness": plots.stiffness_figure(results.verification),
+        "deflection": plots.deflection_figure(suspension, results.verification),
+        "arm": plots.arm_figure(suspension, results.verification),
+    }
+    if results.design is not None:
+        made["coils"] = plots.coils_figure(suspension, results.design)
+    if results.fatigue is not None:
+        made["goodman_smith"] = plots.goodman_figure(suspension, results.fatigue)
+    if results.ride_heights is not None:
+        tare = suspension.fatigue.tare if suspension.fatigue is not None else None
+        made["ride_height"] = plots.ride_height_figure(results.ride_heights, tare)
+    if results.search is not None:
+        made["search"] = plots.search_figure(results.search)
     return made
 
 
@@ -146,14 +144,11 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
         designed = [tables.design_table(suspension, results.design)]
         sections.append(Section("Design", [text], designed, shown("coils")))
     cases = [tables.load_table(suspension), tables.case_table(verification)]
+    listed = [tables.sheet_table(sheets), tables.loaded_table(sheets)]
     sections += [
         Section("Load cases", [], cases, shown("stiffness", "deflection", "arm")),
         Section("Checks", [], [check_table(verification.checks, notes=True)]),
-        Section(
-            "Data sheets of the springs",
-            [SHEETS],
-            [tables.sheet_table(sheets), tables.loaded_table(sheets)],
-        ),
+        Section("Data sheets of the springs", [SHEETS], listed),
     ]
     if results.fatigue is not None:
         loads = dynamic_loads(suspension)
@@ -175,10 +170,6 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
         )
         rows = [tables.search_table(found)]
         sections.append(Section("Feasible nests", [text], rows, shown("search")))
-    return document(
-        f"Primary suspension: {suspension.name}",
-        suspension.source,
-        verification.checks,
-        sections,
-        [*METHOD, FORMS[suspension.arm.equilibrium], *results.remarks],
-    )
+    method = [*METHOD, FORMS[suspension.arm.equilibrium], *results.remarks]
+    title = f"Primary suspension: {suspension.name}"
+    return of_design(title, suspension.source, verification.checks, sections, method)

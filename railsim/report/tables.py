@@ -1,13 +1,12 @@
 """Sections and tables of a page, and values in words."""
 
 from calendar import month_name
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
 from railsim import table as values
-from railsim.text import printable
 
 Cell = str | tuple[str, str]  # a value, or a value with small print below it
 
@@ -32,8 +31,8 @@ class Table:
     header: Sequence[str]
     rows: Sequence[Sequence[Cell]]
     caption: str = ""
-    words: frozenset[int] = frozenset({0})
-    failed: frozenset[int] = frozenset()
+    words: Collection[int] = (0,)
+    failed: Collection[int] = ()
     note: str = ""
 
 
@@ -51,16 +50,8 @@ class Drawing:
 class Section:
     """A section of the page.
 
-    Attributes
-    ----------
-    id, title : str
-    texts : list of str
-    drawings : list of Drawing
-    tables : list of Table
-    plots : list of str
-        Plots that the script of the page draws: the number of a group of curves, or ``spread``.
-    details : list of Table
-        Tables that are folded at first.
+    `plots`: Plots that the script of the page draws: the number of a group of curves, or
+    ``spread``.
     """
 
     id: str
@@ -69,7 +60,7 @@ class Section:
     drawings: list[Drawing] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     plots: list[str] = field(default_factory=list)
-    details: list[Table] = field(default_factory=list)
+    details: list[Table] = field(default_factory=list)  # tables that are folded at first
 
 
 def of_values(table: values.Table, subject: str) -> Table:
@@ -77,8 +68,8 @@ def of_values(table: values.Table, subject: str) -> Table:
     return Table(
         [column.heading for column in table.columns],
         table.texts(),
-        printable(f"{subject}: {table.caption}" if table.caption else subject),
-        words=frozenset(k for k, column in enumerate(table.columns) if not column.format),
+        f"{subject}: {table.caption}" if table.caption else subject,
+        words=[k for k, column in enumerate(table.columns) if not column.format],
     )
 
 
@@ -115,4 +106,4 @@ def in_words(value: Any) -> str:
 def listed(names: Sequence[str]) -> str:
     """The first names of a list, and how many more there are."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return printable(", ".join(names[:3]) + more)
+    return ", ".join(names[:3]) + more

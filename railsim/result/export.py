@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import InputError, argument_fault, nearest
+from railsim.errors import InputError, argument_error, argument_fault, nearest
 from railsim.files.access import check_file, whole_file
 from railsim.result.data import Result
 from railsim.result.filters import low_passed
@@ -28,10 +28,8 @@ POSITIONS = ("time", "distance", "mileage", "wheelset_distance")
 def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a result to a file whose ending says the format.
 
-    Raises
-    ------
-    InputError : the file exists and may not be overwritten, its ending is none of `ENDINGS`, or
-        what writes it is not installed.
+    Raises InputError: the file exists and may not be overwritten, its ending is none of `ENDINGS`,
+    or what writes it is not installed.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
@@ -51,24 +49,12 @@ def selected(
 ) -> Result:
     """Return a part of a result: some quantities over a section, in other units.
 
-    Parameters
-    ----------
-    result : Result
-    quantities : sequence of str
-        Names; by default all.  Time and distance are kept always.
-    between : (float, float), optional
-        Section of the track, by the distance of the reference body [m].
-    rate : float, optional
-        Values at equal times, as many per second, interpolated linearly; values that change
-        faster than half of it are filtered before (`low_passed`) [1/s].
-    shown_units : bool
-        In the units of tables and plots (kN, mm) instead of SI.
-
-    Raises
-    ------
-    InputError
-        A quantity that the result does not have; a section that was not run; a rate that is no
-        number above 0.
+    `quantities`: Names; by default all.  Time and distance are kept always. `between`: Section of
+    the track, by the distance of the reference body [m]. `rate`: Values at equal times, as many
+    per second, interpolated linearly; values that change faster than half of it are filtered
+    before (`low_passed`) [1/s]. `shown_units`: In the units of tables and plots (kN, mm) instead
+    of SI. Raises InputError: A quantity that the result does not have; a section that was not run;
+    a rate that is no number above 0.
     """
     faults = [
         argument_fault("quantities", name, "no such quantity", nearest(name, result), "QUANTITY")
@@ -154,7 +140,7 @@ def _parquet(result: Result, path: Path) -> None:
     except ImportError as error:
         found = f"the package '{error.name}' is not installed"
         allowed = "install it with: pip install pandas pyarrow"
-        raise InputError([argument_fault("path", "", found, allowed, "--out")]) from None
+        raise argument_error("path", "", found, allowed, "--out") from None
     frame = pandas.DataFrame({name: values for name, _, values in _columns(result)})
     frame.attrs = {"units": {name: unit for name, unit, _ in _columns(result)}}
     with open(path, "wb") as file:

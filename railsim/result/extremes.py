@@ -101,17 +101,10 @@ class Peak:
 def peak(result: Result, name: str, kind: str = "abs") -> Peak:
     """Return the extreme value of a quantity over the part of the run that is evaluated.
 
-    Parameters
-    ----------
-    result : Result
-        Result with at least one instant.
-    name : str
-        Quantity with time as its first dimension.
-    kind : {"abs", "max", "min"}
-        Largest magnitude, largest or smallest value; values that are not a number are left out.
+    `result`: Result with at least one instant. `name`: Quantity with time as its first dimension.
+    `kind` ({"abs", "max", "min"}): Largest magnitude, largest or smallest value; values that are
+    not a number are left out.
 
-    Notes
-    -----
     Of the quantities in the group ``peaks`` over all steps of the run, of others over its outputs;
     from the attribute ``evaluation_start`` on, in files without it over the whole run.
     """

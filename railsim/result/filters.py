@@ -32,18 +32,10 @@ REACH = 6.0
 def butterworth(low: float = 0.0, high: float = math.inf, order: int = 4) -> Response:
     """Magnitude of a Butterworth low pass, high pass or band pass.
 
-    Parameters
-    ----------
-    low, high : float
-        Lower and upper corner [Hz]; 0 and infinity: none.
-    order : int
-        Order; a band pass has it on either side, as the transformation of the low pass gives it.
-
-    Returns
-    -------
-    callable
-        Frequencies [Hz] to 1/sqrt(1 + x^(2 order)), x = f/high, low/f or, of a band pass,
-        (f^2 - low high)/(f (high - low)).
+    `low`, `high`: Lower and upper corner [Hz]; 0 and infinity: none. `order`: Order; a band pass
+    has it on either side, as the transformation of the low pass gives it. Returns: Frequencies
+    [Hz] to 1/sqrt(1 + x^(2 order)), x = f/high, low/f or, of a band pass, (f^2 - low high)/(f
+    (high - low)).
 
     Examples
     --------
@@ -75,22 +67,10 @@ def reach(low: float = 0.0, high: float = math.inf) -> float:
 def filtered(x: Floats, rate: float, response: Response, margin: float) -> Floats:
     """Filter a record in the frequency domain, in overlapping blocks.
 
-    Parameters
-    ----------
-    x : float64[time, ...]
-        Record.
-    rate : float
-        Samples per second [1/s].
-    response : callable
-        Frequencies [Hz] to the factor of the spectrum.
-    margin : float
-        Time that the filter looks around itself [s]; the record is continued at both ends by its
-        odd mirror image over this time.
-
-    Returns
-    -------
-    float64[time, ...]
-        Filtered record; within `margin` of its ends it depends on the continuation.
+    `x` (float64[time, ...]): Record. `rate`: Samples per second [1/s]. `response`: Frequencies
+    [Hz] to the factor of the spectrum. `margin`: Time that the filter looks around itself [s]; the
+    record is continued at both ends by its odd mirror image over this time. Returns float64[time,
+    ...]: Filtered record; within `margin` of its ends it depends on the continuation.
     """
     n = len(x)
     if n < 2:
@@ -146,16 +126,8 @@ def low_passed(x: Floats, rate: float, corner: float, *, causal: bool = False) -
 def band_passed(x: Floats, rate: float, low: float, high: float, *, causal: bool = False) -> Floats:
     """Butterworth band pass of order 4.
 
-    Parameters
-    ----------
-    x : float64[time, ...]
-        Record.
-    rate : float
-        Samples per second [1/s].
-    low, high : float
-        Corners [Hz]; `low` 0: a low pass.
-    causal : bool
-        As an amplifier does it, instead of without phase.
+    `x` (float64[time, ...]): Record. `rate`: Samples per second [1/s]. `low`, `high`: Corners
+    [Hz]; `low` 0: a low pass. `causal`: As an amplifier does it, instead of without phase.
     """
     if not causal:
         return filtered(x, rate, butterworth(low, high), reach(low, high))
@@ -190,20 +162,9 @@ def _integral_at(s: Floats, x: Floats, summed: Floats, at: Floats) -> Floats:
 def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floats:
     """Means of a record over windows of a given length of the distance.
 
-    Parameters
-    ----------
-    s : float64[time]
-        Distance, increasing [m].
-    x : float64[time, ...]
-        Record.
-    centres : float64[window]
-        Middles of the windows [m]; the windows lie within `s`.
-    length : float
-        Length of a window [m].
-
-    Returns
-    -------
-    float64[window, ...]
+    `s` (float64[time]): Distance, increasing [m]. `x` (float64[time, ...]): Record. `centres`
+    (float64[window]): Middles of the windows [m]; the windows lie within `s`. `length`: Length of
+    a window [m]. Returns float64[window, ...].
 
     Examples
     --------
@@ -238,17 +199,8 @@ class StreamingPercentiles:
     Counts values in cells of equal width; where a value falls outside, the cells are made twice as
     wide, so that there are never more than `cells` of them.
 
-    Parameters
-    ----------
-    width : float
-        Width of the cells at the start.
-    cells : int
-        Number of cells, even.
-
-    Attributes
-    ----------
-    width : float
-        Present width: no percentile is further than this from one of the whole record.
+    `width`: Present width: no percentile is further than this from one of the whole record.
+    `width`: Width of the cells at the start. `cells`: Number of cells, even.
 
     Examples
     --------

@@ -59,18 +59,10 @@ DOUBLE = ("time", "distance", "mileage")
 
 @dataclass(frozen=True)
 class Storage:
-    """How arrays over time are stored.
+    """How arrays over time are stored."""
 
-    Attributes
-    ----------
-    compress : bool
-        Compress without loss (deflate, bytes of numbers side by side).
-    single : bool
-        Numbers of 4 bytes, 7 digits, but for time and distance.
-    """
-
-    compress: bool = False
-    single: bool = False
+    compress: bool = False  # compress without loss (deflate, bytes of numbers side by side)
+    single: bool = False  # numbers of 4 bytes, 7 digits, but for time and distance
 
     def kind(self, name: str) -> type[np.floating[Any]]:
         """Return the type of the numbers of a quantity."""
@@ -86,23 +78,10 @@ class Hdf5Sink(SinkContext):
     The file is created at once beside its target under a hidden name, so that an output that
     cannot be written, or is being written by another process, is known before anything is computed.
 
-    Parameters
-    ----------
-    path : str or Path
-        Result file.
-    overwrite : bool
-        Replace an existing file.
-    attributes : mapping
-        Root attributes to add to those of the run.
-    option : str
-        What the user knows the path by, for messages.
-    storage : Storage
-        Compression and precision.
-
-    Raises
-    ------
-    InputError : the file exists and may not be overwritten, is being written by another process,
-        or cannot be written.
+    `path`: Result file. `overwrite`: Replace an existing file. `attributes`: Root attributes to
+    add to those of the run. `option`: What the user knows the path by, for messages. `storage`:
+    Compression and precision. Raises InputError: the file exists and may not be overwritten, is
+    being written by another process, or cannot be written.
     """
 
     def __init__(
@@ -320,12 +299,8 @@ def _create(
 ) -> h5py.Dataset:
     """Create an empty dataset for a quantity that is a function of time.
 
-    Parameters
-    ----------
-    inner : tuple of int
-        Its shape at an instant.
-    length : int or None
-        Number of instants: a chunk is never written in part, and a short run is a small file.
+    `inner`: Its shape at an instant. `length`: Number of instants: a chunk is never written in
+    part, and a short run is a small file.
     """
     # a power of two: whole chunks are written at once
     rows = 2 ** int(np.log2(max(1, min(1024, CHUNK_BYTES // (8 * max(1, int(np.prod(inner))))))))

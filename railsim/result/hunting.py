@@ -54,24 +54,17 @@ Rails = Callable[[Floats], tuple[Floats, Floats]]
 class Hunting:
     """A limit cycle.
 
-    Attributes
-    ----------
-    frequency, amplitude : float
-        Of the wheelset that swings farthest to the side, over its largest cycles [Hz], [m].
-    wheelsets : tuple of int
-        Which wheelsets swing, from 0.
-    begin, end : float
-        Where the reference body is when the first one begins and the last one ends [m].
-    lasts : bool
-        Whether they swing until the record ends.
+    `frequency`, `amplitude`: Of the wheelset that swings farthest to the side, over its largest
+    cycles [Hz], [m]. `begin`, `end`: Where the reference body is when the first one begins and the
+    last one ends [m].
     """
 
     frequency: float
     amplitude: float
-    wheelsets: tuple[int, ...]
+    wheelsets: tuple[int, ...]  # which wheelsets swing, from 0
     begin: float
     end: float
-    lasts: bool
+    lasts: bool  # whether they swing until the record ends
 
     @property
     def sentence(self) -> str:
@@ -106,12 +99,8 @@ def thinned(chunk: Mapping[str, Floats]) -> dict[str, Floats]:
 def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
     """Return the limit cycle of a vehicle; None where it does not hunt.
 
-    Parameters
-    ----------
-    record : Result
-        Result with the quantities `SEEN`.
-    rails : callable, optional
-        Irregularities of the track, see `railsim.track.irregularity.displacement`.
+    `record`: Result with the quantities `SEEN`. `rails`: Irregularities of the track, see
+    `railsim.track.irregularity.displacement`.
     """
     time = record["time"]
     duration = float(time[-1] - time[0]) if len(time) else 0.0
@@ -164,12 +153,8 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
 class _Cycles:
     """Cycles of a record between its rising zeros.
 
-    Attributes
-    ----------
-    starts : int64[n + 1]
-        Where they begin, and where the last one ends.
-    lengths : float64[n]
-        In samples.
+    `starts` (int64[n + 1]): Where they begin, and where the last one ends. `lengths` (float64[n]):
+    In samples.
     """
 
     def __init__(self, swing: Floats) -> None:

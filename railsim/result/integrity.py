@@ -24,7 +24,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 
 DIGEST = "digest"
 REMEDY = "it is damaged or was changed since it was written; run it again"
@@ -45,10 +45,7 @@ def seal(path: Path) -> None:
 def sealed(path: Path) -> bool:
     """Whether a file has a seal; then it is as it was written.
 
-    Raises
-    ------
-    InputError : what it holds is not what its seal says.
-    OSError : it cannot be read.
+    Raises InputError: what it holds is not what its seal says. Raises OSError: it cannot be read.
     """
     size = path.stat().st_size
     with open(path, "rb") as file:
@@ -58,7 +55,7 @@ def sealed(path: Path) -> bool:
         return False
     stated = int(found[1], 16), int(found[2])
     if stated != _crc_of(path, size - _SEAL_BYTES):
-        raise InputError([Fault(str(path), "", "its bytes are not those of its seal", REMEDY)])
+        raise InputError.of(str(path), "", "its bytes are not those of its seal", REMEDY)
     return True
 
 
@@ -74,12 +71,8 @@ def _crc_of(path: Path, length: int) -> tuple[int, int]:
 def content_digest(file: h5py.File, known: Mapping[str, int] = MappingProxyType({})) -> str:
     """Return the digest of everything in a result file.
 
-    Parameters
-    ----------
-    file : h5py.File
-        An open result file, all of whose links are its own.
-    known : mapping of str to int
-        CRC-32 of datasets that need not be read.
+    `file`: An open result file, all of whose links are its own. `known`: CRC-32 of datasets that
+    need not be read.
     """
     digest = hashlib.sha256(_attributes(file).encode())
     for name, dataset in sorted(_datasets(file)):

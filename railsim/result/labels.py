@@ -23,9 +23,7 @@ def known_labels(dim: str, names: Sequence[str]) -> dict[str, int]:
 def index_of(dim: str, names: Sequence[str], label: str | int) -> int:
     """Return the index of a label: a text, or an integer from 0.
 
-    Raises
-    ------
-    KeyError : there is no such label.
+    Raises KeyError: there is no such label.
     """
     if isinstance(label, str):
         known = known_labels(dim, names)
@@ -42,9 +40,7 @@ def chosen_names(
 ) -> dict[int, list[str]]:
     """Return the names that labels choose, by the number of their dimension.
 
-    Raises
-    ------
-    KeyError : a label that no dimension has.
+    Raises KeyError: a label that no dimension has.
     """
     known = {
         label: (k, coordinates[dim][index])

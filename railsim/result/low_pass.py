@@ -25,18 +25,10 @@ UNFILTERED = ("time", "distance", "mileage", "curvature", "cant")
 class LowPassSink(SinkBefore):
     """Filters chunks at equal time steps and hands on every n-th instant.
 
-    Parameters
-    ----------
-    sink : Sink
-        Where the filtered chunks go.
-    every : int
-        Instants of the input for each one of the output.
-    output_rate : float
-        Instants of the output per second [1/s].
-    frequency : float
-        End of the pass band, or the corner of the causal filter [Hz].
-    causal : bool
-        Butterworth of order 4 instead of the filter without phase.
+    `sink`: Where the filtered chunks go. `every`: Instants of the input for each one of the
+    output. `output_rate`: Instants of the output per second [1/s]. `frequency`: End of the pass
+    band, or the corner of the causal filter [Hz]. `causal`: Butterworth of order 4 instead of the
+    filter without phase.
     """
 
     def __init__(

@@ -69,10 +69,10 @@ def open_result(path: str | Path) -> Result:
     if not is_file(path):
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
         found = "a folder" if os.path.isdir(path) else found
-        raise InputError([Fault(str(path), "", found, "give a result file (.h5)")])
+        raise InputError.of(str(path), "", found, "give a result file (.h5)")
     with _readable(path):
         if path.stat().st_size == 0:
-            raise InputError([Fault(str(path), "", "the file is empty", AS_WRITTEN)])
+            raise InputError.of(str(path), "", "the file is empty", AS_WRITTEN)
         stamp = _stamp(os.stat(path))
         whole = sealed(path)
         with h5py.File(path, "r") as file:
@@ -83,10 +83,7 @@ def open_result(path: str | Path) -> Result:
 def open_run(path: str | Path) -> Result:
     """Open the result of a run, as `open_result`, and see that nothing is missing.
 
-    Raises
-    ------
-    InputError
-        As `open_result`; the file lacks what the result of every run holds.
+    Raises InputError: As `open_result`; the file lacks what the result of every run holds.
     """
     result = open_result(path)
     missing = [name for name in ATTRIBUTES if name not in result.attributes]
@@ -96,22 +93,19 @@ def open_run(path: str | Path) -> Result:
         raise InputError([Fault(str(path), name, "missing", AS_WRITTEN) for name in missing])
     if result.status not in STATES:
         found = f"'{result.status}'"
-        raise InputError([Fault(str(path), "status", found, f"allowed: {', '.join(STATES)}")])
+        raise InputError.of(str(path), "status", found, f"allowed: {', '.join(STATES)}")
     for name in ARRAYS:
         if not np.all(np.isfinite(result[name])):
-            raise InputError([Fault(str(path), name, "holds what is not finite", REMEDY)])
+            raise InputError.of(str(path), name, "holds what is not finite", REMEDY)
     if np.any(np.diff(result["time"]) <= 0.0):
-        raise InputError([Fault(str(path), "time", "does not increase", REMEDY)])
+        raise InputError.of(str(path), "time", "does not increase", REMEDY)
     return result
 
 
 def check_result(path: str | Path) -> Result:
     """Open the result of a run, as `open_run`, and read all of it.
 
-    Raises
-    ------
-    InputError
-        As `open_run`; every array and every input that cannot be used.
+    Raises InputError: As `open_run`; every array and every input that cannot be used.
     """
     result = open_run(path)
     faults: list[Fault] = []
@@ -130,14 +124,8 @@ def check_result(path: str | Path) -> Result:
 class StoredArrays(FrozenArrays):
     """Arrays of a result file, each read when it is first asked for.
 
-    Parameters
-    ----------
-    path : Path
-        The file; it is not kept open.
-    shapes : mapping of str to tuple of int
-        Shapes of the arrays by their names.
-    stamp : tuple of int
-        What tells the file from another of its name.
+    `path`: The file; it is not kept open. `shapes`: Shapes of the arrays by their names. `stamp`:
+    What tells the file from another of its name.
     """
 
     def __init__(
@@ -179,13 +167,11 @@ def _stamp(facts: os.stat_result) -> tuple[int, ...]:
 def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None:
     """Refuse a file that has taken the place of the one with the stamp, or was changed.
 
-    Raises
-    ------
-    InputError : it is another.
+    Raises InputError: it is another.
     """
     if _stamp(os.fstat(file.id.get_vfd_handle())) != stamp:
         found = "was replaced or changed after it was opened"
-        raise InputError([Fault(str(path), "", found, "open it again")])
+        raise InputError.of(str(path), "", found, "open it again")
 
 
 @contextmanager
@@ -203,7 +189,7 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
         is_hdf5 = isinstance(error, OSError) and "signature not found" in words
         found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
         allowed = "give a result of railsim; " + REMEDY
-        raise InputError([Fault(str(path), name, found, allowed)]) from None
+        raise InputError.of(str(path), name, found, allowed) from None
 
 
 class _Reader:
@@ -216,7 +202,7 @@ class _Reader:
         self._declared = 0  # bytes that arrays say they have
 
     def fault(self, name: str, found: str, allowed: str = AS_WRITTEN) -> InputError:
-        return InputError([Fault(str(self._path), name, found, allowed)])
+        return InputError.of(str(self._path), name, found, allowed)
 
     def result(self, *, whole: bool) -> Result:
         file = self._file

@@ -24,24 +24,12 @@ NEAR = 3.0
 
 @dataclass(frozen=True)
 class Sensor:
-    """A point of a body.
+    """A point of a body."""
 
-    Attributes
-    ----------
-    body : str
-        Full name of the body.
-    offset : float
-        Arc length of the body's frame beyond that of the reference body [m].
-    arm : tuple of float
-        Point from the centre of gravity, body axes [m].
-    axlebox : bool
-        On a wheelset: the sensor does not spin with it.
-    """
-
-    body: str
-    offset: float
-    arm: tuple[float, float, float]
-    axlebox: bool = False
+    body: str  # full name of the body
+    offset: float  # arc length of the body's frame beyond that of the reference body [m]
+    arm: tuple[float, float, float]  # point from the centre of gravity, body axes [m]
+    axlebox: bool = False  # on a wheelset: the sensor does not spin with it
 
 
 def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
@@ -147,25 +135,12 @@ def readings(
 ) -> tuple[Floats, Floats]:
     """Readings of sensors over time.
 
-    Parameters
-    ----------
-    placed : mapping of str to Sensor
-        Sensors.
-    motion : mapping of str to float64[time, ...]
-        ``distance``, ``body_position``, ``body_velocity``, ``body_acceleration`` of a result.
-    bodies : tuple of str
-        Names along the dimension ``body``.
-    alignment : Alignment
-        Of the track.
-    speed : float64[time]
-        Speed of the reference body along the track [m/s].
-
-    Returns
-    -------
-    acceleration : float64[time, sensor, 3]
-        Reading along x, y, z of the body [m/s2].
-    roll_rate : float64[time, sensor]
-        Absolute roll velocity of the body [rad/s].
+    `placed`: Sensors. `motion` (float64[time, ...]): ``distance``, ``body_position``,
+    ``body_velocity``, ``body_acceleration`` of a result. `bodies`: Names along the dimension
+    ``body``. `alignment`: Of the track. `speed` (float64[time]): Speed of the reference body along
+    the track [m/s]. Returns `acceleration` (float64[time, sensor, 3]): Reading along x, y, z of
+    the body [m/s2]. Returns `roll_rate` (float64[time, sensor]): Absolute roll velocity of the
+    body [rad/s].
     """
     named = tuple(dict.fromkeys((sensor.body, sensor.axlebox) for sensor in placed.values()))
     first = {key: next(s for s in placed.values() if (s.body, s.axlebox) == key) for key in named}

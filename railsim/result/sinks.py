@@ -38,13 +38,9 @@ class Sink(Protocol):
     ) -> None:
         """Say what will come.
 
-        Parameters
-        ----------
-        coordinates : mapping of str to sequence of str
-            Names along the dimensions ``wheelset`` and ``body``, and along any further one that
-            `quantities` use; ``side`` and ``component`` are known.
-        quantities : iterable of Quantity
-            All quantities, those without time (for `close`) included.
+        `coordinates`: Names along the dimensions ``wheelset`` and ``body``, and along any further
+        one that `quantities` use; ``side`` and ``component`` are known. `quantities`: All
+        quantities, those without time (for `close`) included.
         """
 
     def append(self, chunk: Mapping[str, Floats]) -> None:
@@ -59,18 +55,10 @@ class Sink(Protocol):
     ) -> Result:
         """End the run and return its result.
 
-        Parameters
-        ----------
-        attributes : mapping
-            Root attributes of the result file; ``format``, ``railsim_version`` and ``created``
-            are added.
-        statics : mapping of str to ndarray
-            The quantities without time.
-        profiles : mapping of str to Profile
-            Every profile that was used, by its name in the vehicle or track.
-        groups : mapping of str to mapping of str to ndarray
-            Further arrays: the states at start and end in ``state``, largest and smallest values
-            over all steps in ``peaks``.
+        `attributes`: Root attributes of the result file; ``format``, ``railsim_version`` and
+        ``created`` are added. `statics`: The quantities without time. `profiles`: Every profile
+        that was used, by its name in the vehicle or track. `groups`: Further arrays: the states at
+        start and end in ``state``, largest and smallest values over all steps in ``peaks``.
         """
 
     def abort(self) -> None:
@@ -124,12 +112,8 @@ class SinkBefore(SinkContext):
 class MemorySink(SinkContext):
     """Keeps all chunks in memory.
 
-    Parameters
-    ----------
-    attributes : mapping
-        Root attributes to add to those of the run.
-    only : collection of str, optional
-        Names of the quantities that are kept; by default all.
+    `attributes`: Root attributes to add to those of the run. `only`: Names of the quantities that
+    are kept; by default all.
     """
 
     def __init__(

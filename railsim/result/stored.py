@@ -20,12 +20,8 @@ LOST, LEAST = 0.05, 1e3  # share of a peak, and force [N], that are worth a rema
 class StoredPeaks(SinkBefore):
     """Hands everything on, and remembers the largest magnitudes.
 
-    Attributes
-    ----------
-    largest : dict of str to float
-        Largest magnitudes of the quantities in `LOOKED_AT` so far [SI].
-    remark : callable
-        Returns at the end what there is to remark on, or nothing.
+    `largest`: Largest magnitudes of the quantities in `LOOKED_AT` so far [SI]. `remark`: Returns
+    at the end what there is to remark on, or nothing.
     """
 
     def __init__(self, sink: Sink) -> None:
@@ -51,16 +47,9 @@ def lost_peak(
 ) -> str:
     """Sentence on the peak of which most is lost in what is stored; empty where none loses much.
 
-    Parameters
-    ----------
-    stored : mapping of str to float
-        Largest magnitudes in what is stored.
-    of_steps : mapping of str to ndarray
-        Largest and smallest values over all steps.
-    outputs : str
-        How often is stored, in words.
-    filtered : bool
-        Whether what is stored is filtered; then its peaks are those that tables list.
+    `stored`: Largest magnitudes in what is stored. `of_steps`: Largest and smallest values over
+    all steps. `outputs`: How often is stored, in words. `filtered`: Whether what is stored is
+    filtered; then its peaks are those that tables list.
 
     Examples
     --------

@@ -223,14 +223,8 @@ def rotation_range(arm: Arm) -> tuple[Values, Values]:
 def mounting_deflection(P: float, stiffnesses: Sequence[Values], engagement: float) -> Values:
     """Deflection of the first of the springs under `P` [N], arm horizontal [m].
 
-    Parameters
-    ----------
-    P : float
-        Load [N].
-    stiffnesses : sequence of float or ndarray
-        Vertical stiffnesses of one spring or two, first spring first [N/m].
-    engagement : float
-        Deflection of the first spring at which the second starts to work [m].
+    `P`: Load [N]. `stiffnesses`: Vertical stiffnesses of one spring or two, first spring first
+    [N/m]. `engagement`: Deflection of the first spring at which the second starts to work [m].
     """
     alone = P / stiffnesses[0]
     if len(stiffnesses) == 1:

@@ -30,17 +30,12 @@ class Loaded:
 class Sheet:
     """Data of one spring.
 
-    Attributes
-    ----------
-    values : dict of str to float
-        By name, SI: `d`, `D`, `D_outer`, `D_inner`, `index` (D/d), `n`, `n_total`, `H0`, `L_solid`,
-        `K_V`, `mass`, `surge_frequency`, `tau_solid`.
-    loads : dict of str to Loaded
-        By the name of the load.
+    `values`: By name, SI: `d`, `D`, `D_outer`, `D_inner`, `index` (D/d), `n`, `n_total`, `H0`,
+    `L_solid`, `K_V`, `mass`, `surge_frequency`, `tau_solid`.
     """
 
     values: Mapping[str, float]
-    loads: Mapping[str, Loaded]
+    loads: Mapping[str, Loaded]  # by the name of the load
 
 
 def data_sheets(suspension: TrailingArmSuspension, result: Verification) -> dict[str, Sheet]:

@@ -57,22 +57,11 @@ class Design:
 def stiffnesses(frame: Arm, engagement: float, wanted: Wanted) -> tuple[Values, Values, Values]:
     """Vertical stiffnesses of both springs and the arm's rotation at the target.
 
-    Parameters
-    ----------
-    frame : Arm
-        Arm with two springs at their deflections under the mounting load (`Coil.start`); their
-        `K_V` are not used.
-    engagement : float
-        Deflection of the outer spring at which the inner one starts to work [m].
-    wanted : Wanted
-        The two wanted deflections.
-
-    Returns
-    -------
-    K_outer, K_inner : float or ndarray
-        Vertical stiffnesses; negative where there is no physical solution [N/m].
-    phi : float or ndarray
-        Rotation at the target, nan where the arm does not reach so far [rad].
+    `frame`: Arm with two springs at their deflections under the mounting load (`Coil.start`);
+    their `K_V` are not used. `engagement`: Deflection of the outer spring at which the inner one
+    starts to work [m]. `wanted`: The two wanted deflections. Returns `K_outer`, `K_inner`:
+    Vertical stiffnesses; negative where there is no physical solution [N/m]. Returns `phi`:
+    Rotation at the target, nan where the arm does not reach so far [rad].
     """
     phi, m1, m2, alone, shared = _at_target(frame, engagement, wanted)
     balance = wanted.target_load * frame.length * np.cos(phi) - frame.bush * phi
@@ -150,10 +139,7 @@ def design(suspension: TrailingArmSuspension) -> Design:
 def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
     """Return the wanted deflections, and the arm with springs at their mounting deflection.
 
-    Raises
-    ------
-    InputError
-        No target, no inner spring, or deflections that springs or arm cannot reach.
+    Raises InputError: No target, no inner spring, or deflections that springs or arm cannot reach.
     """
     target, mounting, inner = suspension.target, suspension.mounting, suspension.inner
     if target is None or inner is None:

@@ -84,13 +84,8 @@ def beam_stiffnesses(
     `1 / (H0/S + H0^3/(12 B))` as dz -> 0; C_r, for seats not displaced sideways, then tends to the
     beam clamped at both ends, `E I/L (4 + p)/(1 + p)` with `p = 12 B/(S H0^2)`.
 
-    Raises
-    ------
-    ModelError
-        `dz` outside [0, H0): a compression spring does not pull, and has a height.
+    Raises ModelError: `dz` outside [0, H0): a compression spring does not pull, and has a height.
 
-    Notes
-    -----
     Source: Krettek and Sobczak, as quoted by Grossi (2025), ch. 2; C_q is the same as EN 13906-1's
     transverse spring rate R_Q.
     """

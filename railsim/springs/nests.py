@@ -73,9 +73,7 @@ class Evaluation:
 def task_of(suspension: TrailingArmSuspension) -> Task:
     """Collect what stays fixed during a search.
 
-    Raises
-    ------
-    InputError : a table that the search needs is missing.
+    Raises InputError: a table that the search needs is missing.
     """
     limits, target, inner = suspension.search, suspension.target, suspension.inner
     missing = [name for name in ("search", "target", "inner") if getattr(suspension, name) is None]

@@ -93,10 +93,8 @@ def solid_heights(suspension: TrailingArmSuspension) -> dict[str, float]:
 def mounted(suspension: TrailingArmSuspension) -> Arm:
     """Return the arm with the file's springs, horizontal under the mounting load.
 
-    Raises
-    ------
-    InputError
-        A wire diameter or a number of coils is missing, or a spring is solid unloaded.
+    Raises InputError: A wire diameter or a number of coils is missing, or a spring is solid
+    unloaded.
     """
     needed = {
         "wire_diameter": "the wire diameter [m]",
@@ -139,10 +137,8 @@ def load_cases(
 ) -> tuple[Arm, tuple[Case, ...]]:
     """Return the mounted arm and its state under each of some loads [N].
 
-    Raises
-    ------
-    InputError
-        The nest cannot carry a load; `key` is the table of the file that gives them.
+    Raises InputError: The nest cannot carry a load; `key` is the table of the file that gives
+    them.
     """
     frame = mounted(suspension)
     rotations = trailing_arm.rotation(frame, np.array(list(loads.values()))).tolist()
@@ -199,8 +195,8 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     1.327
     """
     if suspension.fatigue is None:
-        raise InputError(
-            [Fault(suspension.name, "fatigue", "missing", "needed: goodman = [[0, ...], ...]")]
+        raise InputError.of(
+            suspension.name, "fatigue", "missing", "needed: goodman = [[0, ...], ...]"
         )
     _, cases = load_cases(suspension, dynamic_loads(suspension), "fatigue")
     results = {}
