@@ -29,19 +29,11 @@ def heat_strip(found: Assessed) -> Figure:
     if names:
         cell = float(found.cells[1] - found.cells[0])
         edges = np.append(found.cells, found.cells[-1] + cell) / 1e3
-        mesh = axes.pcolormesh(
-            edges,
-            np.arange(len(names) + 1),
-            np.array([found.shares[name] for name in names]),
-            cmap="inferno_r",
-            vmin=0.0,
-            vmax=1.2,
-        )
+        shares, rows = np.array([found.shares[name] for name in names]), np.arange(len(names) + 1)
+        mesh = axes.pcolormesh(edges, rows, shares, cmap="inferno_r", vmin=0.0, vmax=1.2)
         figure.colorbar(mesh, ax=axes, label="share of the limit (1)")
-    axes.set_yticks(
-        np.arange(len(names)) + 0.5,
-        [f"{vehicle}, {3.6 * speed:.0f} km/h, {q}" for vehicle, speed, q in names],
-    )
+    words = [f"{vehicle}, {3.6 * speed:.0f} km/h, {q}" for vehicle, speed, q in names]
+    axes.set_yticks(np.arange(len(names)) + 0.5, words)
     axes.set(xlabel="s (km)")
     axes.invert_yaxis()
     return figure

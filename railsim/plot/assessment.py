@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
@@ -17,7 +16,7 @@ from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
-from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
 LEAST_SPEEDS = 3  # for curves over the speed
@@ -58,15 +57,8 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
             most = max(most, 1.1 * float(np.nanmax([0.0, *shares])))
             for row, share in zip(rows, shares, strict=True):
                 if share > LONGEST_BAR:
-                    ax.text(
-                        0.98 * LONGEST_BAR,
-                        row,
-                        f"{share:.0f} %",
-                        color="w",
-                        size=7,
-                        ha="right",
-                        va="center",
-                    )
+                    at = (0.98 * LONGEST_BAR, row)
+                    note(ax, f"{share:.0f} %", at, (0, 0), "right", "center", color="w")
         ax.axvline(100.0, color=LIMIT, lw=1.0)
         ax.set(title=f"Zone {zone}", xlabel="estimate / limit (%)")
         ax.grid(axis="y", visible=False)
@@ -98,13 +90,12 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
         return None
     zones = sorted({zone.zone for zone in reports})
     names = list(dict.fromkeys(row.criterion.name for zone in reports for row in zone.rows))
-    n = len(DISTINCT)
-    looks: dict[str, dict[str, Any]] = {
-        name: {"color": DISTINCT[k % n], "marker": "o^"[k // n % 2], "ls": "", "ms": 4}
-        for k, name in enumerate(names)
-    }
-    figure = Picture(max(6.8, 1.2 + 2.8 * len(zones)), 1.8 + 2.4 * len(assessments))
-    grid = figure.subplots(len(assessments), len(zones), sharex="col", squeeze=False)
+    looks: dict[str, dict[str, Any]] = {}
+    for k, name in enumerate(names):
+        marker = "o^"[k // len(DISTINCT) % 2]
+        looks[name] = {"color": distinct(k), "marker": marker, "ls": "", "ms": 4}
+    x, height = "middle of the section (km)", 1.8 + 2.4 * len(assessments)
+    figure, grid = _by_zone(assessments, zones, x, height, sharex="col")
     for axes, assessment in zip(grid, assessments, strict=True):
         for ax, zone in zip(axes, zones, strict=True):
             for report in assessment.zones:
@@ -113,29 +104,39 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
             ax.axhline(100.0, color=LIMIT, lw=1.0)
             ax.set_ylim(bottom=0.0)
             ax.set_title(f"zone {zone}", loc="right", fontsize=9)
-        # above the zones, and as wide as all of them
-        axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
         axes[0].set_ylabel("section value / limit (%)")
-    for ax in grid[-1]:
-        ax.set_xlabel("middle of the section (km)")
     words = {row.criterion.name: row.criterion.words for zone in reports for row in zone.rows}
-    handles = [Line2D([], [], label=words[name], **look) for name, look in looks.items()]
+    handles = [key(words[name], **look) for name, look in looks.items()]
     figure.legend(handles=handles, loc="outside lower left", ncols=2)
     return figure
+
+
+def _by_zone(
+    assessments: Sequence[Assessment], zones: Sequence[str], x: str, height: float, **how: Any
+) -> tuple[Picture, Any]:
+    """A row of axes for each vehicle, under its name, one for each zone."""
+    figure = Picture(max(6.8, 1.2 + 2.8 * len(zones)), height)
+    grid = figure.subplots(len(assessments), len(zones), squeeze=False, **how)
+    for axes, assessment in zip(grid, assessments, strict=True):
+        # above the zones, and as wide as all of them
+        axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
+    for ax in grid[-1]:
+        ax.set_xlabel(x)
+    return figure, grid
 
 
 def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any]]) -> None:
     """Largest share of its limit of every quantity in every section of a zone."""
     for name, look in looks.items():
         limits = {row.place: row.limit for row in report.rows if row.criterion.name == name}
-        points = [
-            (
-                5e-4 * (values.section.begin + values.section.end),
-                100.0 * max(max(values.values[name, label]) / limit for label, limit in there),
-            )
-            for values in report.values
-            if (there := [(p, limit) for p, limit in limits.items() if (name, p) in values.values])
-        ]
+        points = []
+        for own in report.values:
+            shares = [
+                max(own.values[name, p]) / limits[p] for p in limits if (name, p) in own.values
+            ]
+            if shares:
+                middle = 5e-4 * (own.section.begin + own.section.end)
+                points.append((middle, 100.0 * max(shares)))
         if points:
             ax.plot(*zip(*points, strict=True), **look)
 
@@ -152,8 +153,8 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
     if not zones:
         return None
     names = list(dict.fromkeys(z.population.name for a in assessments for z in a.zones))
-    figure = Picture(max(6.8, 1.2 + 2.8 * len(zones)), 1.4 + 2.6 * len(assessments))
-    grid = figure.subplots(len(assessments), len(zones), squeeze=False)
+    height = 1.4 + 2.6 * len(assessments)
+    figure, grid = _by_zone(assessments, zones, "cant deficiency (mm)", height)
     for axes, assessment, own in zip(grid, assessments, chosen, strict=True):
         for ax, zone in zip(axes, zones, strict=True):
             if zone not in own:
@@ -168,14 +169,8 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
             ax.set_title(f"zone {zone}", loc="right", fontsize=9)
             unit = row.criterion.unit.replace("-", "1")
             ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
-        axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
-    for ax in grid[-1]:
-        ax.set_xlabel("cant deficiency (mm)")
-    handles = [
-        Line2D([], [], marker="o", ls="", color=distinct(k), label=name)
-        for k, name in enumerate(names)
-    ]
     if any(names):  # beside the axes, where it hides no value
+        handles = [key(name, marker="o", ls="", color=distinct(k)) for k, name in enumerate(names)]
         figure.legend(handles=handles, loc="outside lower left", ncols=len(names))
     return figure
 
@@ -183,29 +178,20 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
 def _widest(assessment: Assessment, zone: str) -> Assessed | None:
     """Row with an upper bound, of the verdicts that decide, with the largest share in a zone."""
     deciding = getattr(assessment.limits, "deciding", ())
-    rows = [
-        row
-        for report in assessment.zones
-        if report.zone == zone
-        for row in report.rows
-        if row.estimate.line is not None
-        and row.estimate.line.quantile > 0.0
-        and row.criterion.group in deciding
-    ]
-    return max(rows, key=lambda row: row.share, default=None)
+    rows = [row for report in assessment.zones if report.zone == zone for row in report.rows]
+    bounded = [r for r in rows if r.estimate.line is not None and r.estimate.line.quantile > 0.0]
+    decides = (row for row in bounded if row.criterion.group in deciding)
+    return max(decides, key=lambda row: row.share, default=None)
 
 
 def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> None:
     """Draw the values of one quantity at one place in one population."""
-    key, scale = (like.criterion.name, like.place), like.criterion.scale
-    points = [
-        (1e3 * v.section.cant_deficiency, scale * max(v.values[key]))
-        for v in report.values
-        if key in v.values
-    ]
+    own, scale = (like.criterion.name, like.place), like.criterion.scale
+    there = [v for v in report.values if own in v.values]
+    points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[own])) for v in there]
     if points:
         ax.plot(*zip(*points, strict=True), "o", color=colour, ms=3.5)
-    row = next((r for r in report.rows if (r.criterion.name, r.place) == key), None)
+    row = next((r for r in report.rows if (r.criterion.name, r.place) == own), None)
     line = row.estimate.line if row else None
     if line is None or row is None:
         return
@@ -229,42 +215,35 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
         for run, points in a.comfort.items():
             speed, track, rails = a.driven[run]
             kinds.setdefault((a.vehicle, track, rails), []).append((3.6 * speed, points))
-    several = [len({key[k] for key in kinds}) > 1 for k in range(3)]  # vehicles, tracks, rails
-    for number, (key, runs) in enumerate(kinds.items()):
-        words = [word for word, differs in zip(key, several, strict=True) if differs]
+    several = [len({kind[k] for kind in kinds}) > 1 for k in range(3)]  # vehicles, tracks, rails
+    for number, (kind, runs) in enumerate(kinds.items()):
+        words = [word for word, differs in zip(kind, several, strict=True) if differs]
         colour = distinct(number)
         runs.sort(key=lambda run: run[0])
         label = unformatted(", ".join(words)) or "middle of the car"
         _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
         for way, line in (("lateral", "-"), ("vertical", "--")):
-
-            def index_of(point: PointComfort, way: str = way) -> float:
-                return point.sperling[way]
-
-            _over_speed(index, runs, index_of, line, color=colour)
+            _over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)  # type: ignore[misc]
     mean.set(xlabel="speed (km/h)", ylabel="$N_{MV}$", title="Mean comfort, EN 12299")
     index.set(xlabel="speed (km/h)", ylabel="$W_z$", title="Sperling")
     for ax in (mean, index):
         ax.set_ylim(bottom=0.0)
     _classes(mean, assessments)
-    handles = [
-        *mean.get_legend_handles_labels()[0],
-        Patch(color="0.3", alpha=0.2, label="all measuring points"),
-        Line2D([], [], color="0.3", label="$W_z$ lateral"),
-        Line2D([], [], color="0.3", ls="--", label="$W_z$ vertical"),
-    ]
+    band = Patch(color="0.3", alpha=0.2, label="all measuring points")
+    ways = key("$W_z$ lateral", color="0.3"), key("$W_z$ vertical", color="0.3", ls="--")
+    handles = [*mean.get_legend_handles_labels()[0], band, *ways]
     figure.legend(handles=handles, loc="outside right upper")
-    title = list(dict.fromkeys(key[k] for k in (0, 1) for key in kinds))
+    title = list(dict.fromkeys(kind[k] for k in (0, 1) for kind in kinds))
     figure.suptitle("\n".join(map(unformatted, title[:4])), x=0.012, ha="left")
     return figure
 
 
+Runs = Sequence[tuple[float, Sequence[PointComfort]]]
+"""Speeds with the comfort at every measuring point."""
+
+
 def _over_speed(
-    axes: Axes,
-    runs: Sequence[tuple[float, Sequence[PointComfort]]],
-    value: Callable[[PointComfort], float],
-    line: str,
-    **look: Any,
+    axes: Axes, runs: Runs, value: Callable[[PointComfort], float], line: str, **look: Any
 ) -> None:
     speeds = [speed for speed, _ in runs]
     middle = [value(min(points, key=lambda p: abs(p.place))) for _, points in runs]
@@ -283,15 +262,9 @@ def _classes(axes: Axes, assessments: Sequence[Assessment]) -> None:
     for number, (end, name) in enumerate(ends):
         if bottom < top:
             axes.axhspan(bottom, min(end, top), color="0.5", alpha=0.05 + 0.06 * number, lw=0)
-            axes.text(
-                0.99,
-                bottom + 0.02 * top,
-                name,
-                transform=axes.get_yaxis_transform(),
-                ha="right",
-                fontsize=7.5,
-                color="0.35",
-            )
+            at, look = (0.99, bottom + 0.02 * top), {"fontsize": 7.5, "color": "0.35"}
+            frame = ("axes fraction", "data")
+            note(axes, name, at, (0, 0), "right", frame=frame, **look)
         bottom = end
     axes.set_ylim(0.0, top)
 

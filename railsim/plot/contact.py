@@ -5,11 +5,11 @@ mm, degrees, MPa.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 
 from railsim.arrays import Floats
@@ -18,7 +18,7 @@ from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
 from railsim.contact.summary import Pair
-from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, styled
+from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, key, note, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
 
@@ -47,14 +47,7 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     rows = 1 + bool(unique)
     height = 3.0 + 2.4 * bool(unique)
     figure = Picture(9.6, height, layout=None)
-    figure.subplots_adjust(
-        left=0.06,
-        right=0.99,
-        bottom=0.45 / height,
-        top=1.0 - 0.3 / height,
-        wspace=0.14,
-        hspace=0.28,
-    )
+    figure.subplots_adjust(0.06, 0.45 / height, 0.99, 1.0 - 0.3 / height, 0.14, 0.28)
     grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
     for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
         axes = figure.add_subplot(grid[0, side])
@@ -94,16 +87,7 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
         if abs(x_wheel - last_label) < 2.0 + 1.8 * len(number):
             continue  # the number would lie on its neighbour
         last_label = x_wheel
-        axes.annotate(
-            number,
-            (x_wheel, -1e3 * heights[i] + LIFT),
-            (0, 3),
-            "data",
-            "offset points",
-            ha="center",
-            fontsize=6,
-            color="0.3",
-        )
+        note(axes, number, (x_wheel, -1e3 * heights[i] + LIFT), (0, 3), "center", fontsize=6)
     low, high = 1e3 * tape - 72.0, 1e3 * rail_y.max() + 12.0
     axes.set(xlim=sorted((sign * low, sign * high)), ylim=(-30.0, LIFT + 10.0), aspect="equal")
     axes.set(xlabel="lateral position $y$ (mm)", ylabel="height (mm)")
@@ -111,16 +95,12 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
 
 def _explain(axes: Axes) -> None:
     """Say within the rail's head what lines and numbers are."""
-    axes.annotate(
+    words = (
         "lines join points that touch,\nnumbers are the wheelset's\ndisplacement to the right (mm);"
-        f"\nthe wheel is raised by {LIFT:.0f} mm",
-        (0.5, 0.16),
-        xycoords="axes fraction",
-        ha="center",
-        va="center",
-        fontsize=6.5,
-        color="0.3",
+        f"\nthe wheel is raised by {LIFT:.0f} mm"
     )
+    look = {"fontsize": 6.5, "frame": "axes fraction"}
+    note(axes, words, (0.5, 0.16), (0, 0), "center", "center", **look)
 
 
 def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
@@ -144,7 +124,7 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
     """Rolling radius difference, radii, contact angles, positions and roll over displacement."""
     y = 1e3 * geometry.lateral
     figure = Picture(9.6, 5.4, layout=None)
-    figure.subplots_adjust(left=0.06, right=0.99, bottom=0.085, top=0.985, wspace=0.24, hspace=0.08)
+    figure.subplots_adjust(0.06, 0.085, 0.99, 0.985, 0.24, 0.08)
     axes = figure.subplots(2, 3, sharex=True)
     axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
     panels = (
@@ -164,12 +144,9 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
     axes[1, 2].plot(y, 1e3 * geometry.roll, color=DISTINCT[0])
     axes[1, 2].set_ylabel("roll (mrad)")
     # with a flange on its rail everything else would be a flat line
-    for panel, values in (
-        (axes[0, 0], 1e3 * geometry.delta_r),
-        (axes[0, 1], 1e3 * geometry.rolling_radius),
-        (axes[1, 2], 1e3 * geometry.roll),
-    ):
-        _limit(panel, values, geometry)
+    shown = geometry.delta_r, geometry.rolling_radius, geometry.roll
+    for panel, values in zip((axes[0, 0], axes[0, 1], axes[1, 2]), shown, strict=True):
+        _limit(panel, 1e3 * values, geometry)
     for panel in axes[1]:
         panel.set_xlabel("lateral displacement $y$ (mm)")
     for panel in axes.flat:
@@ -199,7 +176,7 @@ def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
         Curves by their name.
     """
     figure = Picture(5.6, 3.6, layout=None)
-    figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
+    figure.subplots_adjust(0.11, 0.13, 0.985, 0.975)
     axes = figure.subplots()
     for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
         words = unformatted(name)
@@ -224,7 +201,7 @@ def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Flo
         [1].
     """
     figure = Picture(5.6, 3.6, layout=None)
-    figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
+    figure.subplots_adjust(0.11, 0.13, 0.985, 0.975)
     axes = figure.subplots()
     # the flange's slopes beyond would hide the tread's
     levels = np.linspace(0.0, 0.8, 17)
@@ -276,14 +253,8 @@ def patches_figure(
     rows = -(-len(contacts) // columns)
     height = 1.75 * rows + 1.1
     figure = Picture(9.6, height, layout=None)
-    figure.subplots_adjust(
-        left=0.06,
-        right=0.90 if exact else 0.99,
-        bottom=0.45 / height,
-        top=1.0 - 0.85 / height,
-        wspace=0.08,
-        hspace=0.32,
-    )
+    right = 0.90 if exact else 0.99
+    figure.subplots_adjust(0.06, 0.45 / height, right, 1.0 - 0.85 / height, 0.08, 0.32)
     title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN"
     figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
     _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
@@ -317,12 +288,9 @@ def patches_figure(
 
 def _explain_lines(figure: Figure, top: float, labels: Sequence[str]) -> None:
     """One row of a legend: the zones' colours, and the line of each table."""
-    zones = [Line2D([], [], color=colour, label=zone) for zone, colour in ZONE_COLOURS.items()]
-    lines = [
-        Line2D([], [], color="0.3", ls=line, label=label)
-        for line, label in zip(TABLE_LINES, labels, strict=False)
-    ]
-    handles = [*zones, *lines]
+    handles = [key(zone, color=colour) for zone, colour in ZONE_COLOURS.items()]
+    tables = zip(labels, TABLE_LINES, strict=False)
+    handles += [key(label, color="0.3", ls=line) for label, line in tables]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.05, top), ncols=len(handles))
 
 
@@ -330,14 +298,5 @@ def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:
     for patch in contact.patches:
         # seen from above, the patch's width is foreshortened by its angle
         width = 2e3 * patch.b * np.cos(patch.angle)
-        axes.add_patch(
-            Ellipse(
-                (1e3 * patch.y, 0.0),
-                width,
-                2e3 * patch.a,
-                fill=False,
-                ls=line,
-                lw=1.2,
-                color=ZONE_COLOURS[patch.zone],
-            )
-        )
+        look: Any = {"fill": False, "ls": line, "lw": 1.2, "color": ZONE_COLOURS[patch.zone]}
+        axes.add_patch(Ellipse((1e3 * patch.y, 0.0), width, 2e3 * patch.a, **look))

@@ -4,6 +4,7 @@ Seen as the wheel looks at the rail from above: forward is up, right is right.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,7 +18,7 @@ from railsim.contact.creep import creep_force
 from railsim.contact.creep_curves import CASES, Patch, exact_force
 from railsim.contact.exact_creep import ExactCreepForce
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
-from railsim.plot.style import DISTINCT, Picture, styled
+from railsim.plot.style import DISTINCT, Picture, note, styled
 
 LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
 STICK, HELD = "#2a6f97", "stick; elsewhere slip"
@@ -47,10 +48,9 @@ def creep_curves_figure(
     scale = np.linspace(0.0, 1.0, 121) ** 1.5 * LARGEST
     figure = Picture(9.6, 6.2, layout=None)
     figure.subplots_adjust(left=0.06, right=0.99, bottom=0.13, top=0.90, wspace=0.18, hspace=0.36)
-    figure.suptitle(
-        f"Creep forces, a/b = {patch.a / patch.b:.3g}, N = {1e-3 * patch.N:.3g} kN, "
-        f"μ = {patch.mu:.3g}"
-    )
+    ratio = patch.a / patch.b
+    words = f"Creep forces, a/b = {ratio:.3g}, N = {1e-3 * patch.N:.3g} kN, μ = {patch.mu:.3g}"
+    figure.suptitle(words)
     panels: list[Axes] = list(figure.subplots(2, 3, sharex=True).flat)
     for panel, (name, direction) in zip(panels, CASES.items(), strict=True):
         _draw_curves(panel, patch, direction, scale, laws, (nx, ny))
@@ -64,12 +64,19 @@ def creep_curves_figure(
     for panel in panels[3:]:
         panel.set_xlabel("magnitude of the normalised creepage")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        [*handles], [*labels], loc="lower center", ncols=len(labels), bbox_to_anchor=(0.5, 0.0)
-    )
+    where: Any = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.0)}
+    figure.legend([*handles], [*labels], ncols=len(labels), **where)
     for panel in panels:
         _name_components(panel)
     return figure
+
+
+def _components(direction: Sequence[float]) -> list[tuple[int, str]]:
+    """Components of the force to draw for a direction of creepage, and their lines."""
+    lateral = direction[1] != 0.0 or direction[2] != 0.0
+    if direction[0] == 0.0:
+        return [(1, "-")]
+    return [(0, "-"), (1, "--")] if lateral else [(0, "-")]
 
 
 def _draw_curves(
@@ -86,57 +93,29 @@ def _draw_curves(
         force = creep_force(
             patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu, law, *grid
         )
-        colour, label = LAW_COLOURS[law], str(law)
-        for values, shown, line in (
-            (force.T_x, direction[0] != 0.0, "-"),
-            (force.T_y, direction[1] != 0.0 or direction[2] != 0.0, "--"),
-        ):
-            if shown:
-                dashed = line if direction[0] != 0.0 else "-"
-                panel.plot(
-                    scale, values / (patch.mu * patch.N), color=colour, ls=dashed, label=label
-                )
-                label = "_"
+        label = str(law)
+        for column, line in _components(direction):
+            values = (force.T_x, force.T_y)[column] / (patch.mu * patch.N)
+            panel.plot(scale, values, color=LAW_COLOURS[law], ls=line, label=label)
+            label = "_"
 
 
 def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: int) -> None:
     unit = patch.unit_creepages(direction)
     sizes = np.linspace(0.0, 1.0, count + 1)[1:] ** 1.5 * LARGEST
     forces = np.array([exact_force(patch, s * unit)[:2] for s in sizes])
+    look: Any = {"ms": 3.6, "mfc": "none", "mec": "0.1", "mew": 0.9, "clip_on": False}
     label = "full theory"
-    for column, shown in (
-        (0, direction[0] != 0.0),
-        (1, direction[1] != 0.0 or direction[2] != 0.0),
-    ):
-        if shown:
-            values = forces[:, column] / (patch.mu * patch.N)
-            panel.plot(
-                sizes,
-                values,
-                "o",
-                ms=3.6,
-                mfc="none",
-                mec="0.1",
-                mew=0.9,
-                label=label,
-                clip_on=False,
-            )
-            label = "_"
+    for column, _ in _components(direction):
+        panel.plot(sizes, forces[:, column] / (patch.mu * patch.N), "o", label=label, **look)
+        label = "_"
 
 
 def _name_components(panel: Axes) -> None:
     """Say which lines are longitudinal where a picture has both."""
     if any(line.get_linestyle() == "--" for line in panel.get_lines()):
-        panel.text(
-            0.985,
-            0.03,
-            "solid $T_x$, dashed $T_y$",
-            transform=panel.transAxes,
-            ha="right",
-            va="bottom",
-            fontsize=8,
-            color="0.3",
-        )
+        words, look = "solid $T_x$, dashed $T_y$", {"fontsize": 8, "frame": "axes fraction"}
+        note(panel, words, (0.985, 0.03), (0, 0), "right", "bottom", **look)
 
 
 @styled()
@@ -173,10 +152,8 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
         image = _draw_traction(panel, solution, top)
         panel.set(xlim=(-reach_y, reach_y), ylim=(-reach_x, reach_x), aspect="equal")
         panel.grid(False)
-        panel.set_title(
-            f"{title}\n$T_x$ {solution.T_x / friction_force:+.2f}, "
-            f"$T_y$ {solution.T_y / friction_force:+.2f} $\\mu N$".replace("-", "−")
-        )
+        T_x, T_y = (f"{T / friction_force:+.2f}" for T in (solution.T_x, solution.T_y))
+        panel.set_title(f"{title}\n$T_x$ {T_x}, $T_y$ {T_y} $\\mu N$".replace("-", "−"))
     for panel in axes[max(len(solutions) - columns, 0) : len(solutions)]:
         panel.set_xlabel("to the right (mm)")
     for panel in axes[len(solutions) :]:
@@ -204,40 +181,19 @@ def _draw_traction(panel: Axes, solution: ExactCreepForce, top: float) -> QuadMe
         x = solution.x[j]
         middle = 0.5 * (x[:-1] + x[1:])
         border = np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
-        image = panel.pcolormesh(
-            1e3 * np.array([strips[j] - half, strips[j] + half]),
-            1e3 * border,
-            size[j][:, None],
-            cmap="YlOrBr",
-            vmin=0.0,
-            vmax=top,
-            rasterized=True,
-        )
+        across, border = 1e3 * np.array([strips[j] - half, strips[j] + half]), 1e3 * border
+        colours: Any = {"cmap": "YlOrBr", "vmin": 0.0, "vmax": top, "rasterized": True}
+        image = panel.pcolormesh(across, border, size[j][:, None], **colours)
         held = np.flatnonzero(solution.sticks[j])
         if held.size:
-            panel.fill_between(
-                1e3 * np.array([strips[j] - half, strips[j] + half]),
-                1e3 * border[held[-1] + 1],
-                1e3 * border[held[0]],
-                facecolor="none",
-                edgecolor=STICK,
-                hatch="////",
-                lw=0.0,
-                alpha=0.6,
-            )
-    across = max(strips.size // 9, 1)
-    along = max(solution.x.shape[1] // 9, 1)
-    shown = (slice(across // 2, None, across), slice(along // 2, None, along))
-    panel.quiver(
-        1e3 * solution.y[shown],
-        1e3 * solution.x[shown],
-        solution.t_y[shown],
-        solution.t_x[shown],
-        color="0.1",
-        scale=12e6 * top,
-        width=0.006,
-        pivot="mid",
-    )
+            hatched: Any = {"facecolor": "none", "edgecolor": STICK, "hatch": "////", "lw": 0.0}
+            ends = border[held[-1] + 1], border[held[0]]
+            panel.fill_between(across, *ends, alpha=0.6, **hatched)
+    every = [max(count // 9, 1) for count in solution.x.shape]
+    shown = tuple(slice(step // 2, None, step) for step in every)
+    y, x, t_y, t_x = (v[shown] for v in (solution.y, solution.x, solution.t_y, solution.t_x))
+    look: Any = {"color": "0.1", "width": 0.006, "pivot": "mid"}
+    panel.quiver(1e3 * y, 1e3 * x, t_y, t_x, scale=12e6 * top, **look)
     a = float(solution.x.max()) / float(np.cos(np.pi / (2 * solution.x.shape[1])))
     b = float(strips[-1]) + half
     panel.add_patch(Ellipse((0.0, 0.0), 2e3 * b, 2e3 * a, fill=False, color="0.2", lw=1.0))

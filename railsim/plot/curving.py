@@ -7,17 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from railsim.arrays import Floats, Indices
-from railsim.plot.style import Picture, distinct, say, styled, wheelset_colours
+from railsim.plot.style import Picture, distinct, note, say, styled, wheelset_colours
 from railsim.stability.curving import Curving
 
 LEFT, RIGHT = 0, 1
 MAPS = 3  # maps of wear side by side at most
 NUMBERS = 80  # fields of a map in which numbers can be read
 EXAGGERATED = 30.0  # angles of attack and displacements of the drawn wheelsets
-HALF, WHEEL = (
-    0.75,
-    0.46,
-)  # m, half the distance of the nominal rolling circles, radius of a wheel, as drawn
+HALF, WHEEL = 0.75, 0.46  # m, half the distance of the rolling circles, radius of a wheel, as drawn
 WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 
 
@@ -34,7 +31,7 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
     heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
     figure = Picture(10.2, sum(heights))
-    figure.suptitle(title or found.title.replace(": ", "\n", 1), x=0.01, ha="left")
+    figure.suptitle(title or found.title.replace(": ", "\n", 1), x=0.012, ha="left")
     rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     _plan(figure.add_subfigure(rows[1]).subplots(), found)
     if mapped:
@@ -42,33 +39,13 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     axes = figure.add_subfigure(rows[0]).subplots(2, 2)
     order = np.argsort(found.radius)
     radius = found.radius[order]
-    outer = np.where(radius > 0.0, LEFT, RIGHT)
-    _lines(
-        axes[0, 0],
-        found,
-        order,
-        1e3 * found.attack[..., 0],
-        "angle of attack, leading wheelset (mrad)",
-    )
-    guiding = np.abs(
-        np.take_along_axis(found.Y[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[
-            ..., 0
-        ]
-    )
-    _lines(
-        axes[0, 1],
-        found,
-        order,
-        1e-3 * guiding[np.argsort(order)],
-        "guiding force Y of the leading outer wheel (kN)",
-    )
-    _lines(
-        axes[1, 0],
-        found,
-        order,
-        np.sum(found.T_gamma, axis=(-2, -1)),
-        r"wear number $T_\gamma$ of all wheels (N)",
-    )
+    attack, words = 1e3 * found.attack[..., 0], "angle of attack, leading wheelset (mrad)"
+    _lines(axes[0, 0], found, order, attack, words)
+    guiding = 1e-3 * np.abs(_leading_outer(found, found.Y))
+    words = "guiding force Y of the leading outer wheel (kN)"
+    _lines(axes[0, 1], found, order, guiding, words)
+    wear, words = np.sum(found.T_gamma, axis=(-2, -1)), r"wear number $T_\gamma$ of all wheels (N)"
+    _lines(axes[1, 0], found, order, wear, words)
     _steering(axes[1, 1], found, order)
     for one in axes.flat:
         if not found.converged.any():
@@ -82,27 +59,24 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     return figure
 
 
+def _leading_outer(found: Curving, values: Floats) -> Floats:
+    """Values of the leading wheelset's outer wheel, float64[radius, deficiency, friction]."""
+    outer = np.where(found.radius > 0.0, LEFT, RIGHT)[:, None, None, None]
+    own: Floats = np.take_along_axis(values[:, :, :, 0, :], outer, axis=-1)[..., 0]
+    return own
+
+
 def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
     """Wear number of the leading outer wheel over radius and cant deficiency for each friction."""
     number = min(len(found.friction), MAPS)
     radius, deficiency = found.radius[order], 1e3 * found.cant_deficiency
-    outer = np.where(radius > 0.0, LEFT, RIGHT)
-    wear = np.take_along_axis(
-        found.T_gamma[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1
-    )[..., 0]
+    wear = _leading_outer(found, found.T_gamma)[order]
     largest = float(np.nanmax(wear)) if np.isfinite(wear).any() else 1.0
     columns = np.arange(len(radius))
     for m, axes in enumerate(figure.subplots(1, number, squeeze=False)[0]):
         axes.grid(visible=False)
-        picture = axes.pcolormesh(
-            columns,
-            np.arange(len(deficiency)),
-            wear[:, :, m].T,
-            shading="nearest",
-            vmin=0.0,
-            vmax=largest,
-            cmap="viridis",
-        )
+        look: Any = {"shading": "nearest", "vmin": 0.0, "vmax": largest, "cmap": "viridis"}
+        picture = axes.pcolormesh(columns, np.arange(len(deficiency)), wear[:, :, m].T, **look)
         axes.set_xticks(columns, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
         axes.set_yticks(np.arange(len(deficiency)), [f"{value:g}" for value in deficiency])
         if wear[:, :, m].size <= NUMBERS:
@@ -116,15 +90,8 @@ def _numbers(axes: Axes, values: Floats, largest: float) -> None:
     """Values in their fields, readable on dark and on light."""
     for (r, i), value in np.ndenumerate(values):
         words = f"{value:.0f}" if np.isfinite(value) else "none"
-        axes.text(
-            r,
-            i,
-            words,
-            ha="center",
-            va="center",
-            fontsize=7,
-            color="black" if value > 0.6 * largest or not np.isfinite(value) else "white",
-        )
+        colour = "black" if value > 0.6 * largest or not np.isfinite(value) else "white"
+        note(axes, words, (r, i), (0, 0), "center", "center", color=colour)
 
 
 def _ticks(radius: Floats) -> list[float]:
@@ -139,25 +106,13 @@ def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: st
     for m, mu in enumerate(found.friction):
         for i, deficiency in enumerate(found.cant_deficiency):
             shown = np.where(found.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
-            axes.plot(
-                found.radius[order],
-                shown,
-                color=distinct(m),
-                ls=styles[i % len(styles)],
-                marker=".",
-                ms=4,
-                label=f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm",
-            )
+            label = f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm"
+            line = {"color": distinct(m), "ls": styles[i % len(styles)]}
+            axes.plot(found.radius[order], shown, marker=".", ms=4, label=label, **line)
             timed = found.converged[:, i, m][order] == 2
-            axes.plot(
-                found.radius[order][timed],
-                shown[timed],
-                "o",
-                ms=6,
-                mfc="none",
-                color=distinct(m),
-                label="by time integration" if timed.any() else None,
-            )
+            words_timed = "by time integration" if timed.any() else None
+            look: Any = {"ms": 6, "mfc": "none", "color": distinct(m), "label": words_timed}
+            axes.plot(found.radius[order][timed], shown[timed], "o", **look)
     axes.set_title(words)
 
 
@@ -198,13 +153,7 @@ def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
-        axes.plot(
-            found.radius[order],
-            1e3 * found.lateral[order, 0, 0, w],
-            color=colours[name],
-            marker=".",
-            ms=4,
-            label=name,
-        )
+        look: Any = {"color": colours[name], "marker": ".", "ms": 4, "label": name}
+        axes.plot(found.radius[order], 1e3 * found.lateral[order, 0, 0, w], **look)
     axes.set_title("lateral displacement (mm), first deficiency and friction")
     axes.legend(fontsize=7.5)

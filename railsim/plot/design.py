@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.arrays import Flags, Floats
-from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, note, styled
 
 MOST_PAIRS = 6
 NARROW = 0.05  # of the widest bar, below which its ends bear no words
@@ -59,15 +59,7 @@ def _pair(
         axes.plot(*values[chosen], "o", mfc="none", mec=LIMIT, mew=1.6, ms=11, label="chosen")
     if len(front) <= FEW:
         for number in front:
-            axes.annotate(
-                str(number + 1),
-                values[number],
-                (4, 4),
-                "data",
-                "offset points",
-                fontsize=7,
-                color="0.3",
-            )
+            note(axes, str(number + 1), values[number], (4, 4))
 
 
 def _ordered(values: Floats) -> bool:
@@ -107,18 +99,9 @@ def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
             continue
         for value, words in ((low, "low"), (high, "high")):
             outer = (value >= max(low, high)) if words == "high" else (value > min(low, high))
-            axes.annotate(
-                words,
-                (value, row),
-                (4 if outer else -4, 0),
-                "data",
-                "offset points",
-                va="center",
-                ha="left" if outer else "right",
-                fontsize=7,
-                color="0.3",
-            )
-    axes.set_yticks(range(len(names)), [_short(name) for name in names])
+            shift, ha = ((4, 0), "left") if outer else ((-4, 0), "right")
+            note(axes, words, (value, row), shift, ha, "center")
+    axes.set_yticks(range(len(names)), [name.removeprefix("vehicle.") for name in names])
     axes.set(xlabel=label, title="From bound to bound, the others as chosen")
     axes.margins(x=0.15)
 
@@ -130,10 +113,6 @@ def _indices(axes: Axes, one: Mapping[str, Any]) -> None:
     first = [one["first"][name] for name in names]
     axes.barh(rows + 0.17, total, height=0.3, color=DISTINCT[0], label="with interactions")
     axes.barh(rows - 0.17, first, height=0.3, color=DISTINCT[5], label="alone")
-    axes.set_yticks(rows, [_short(name) for name in names])
+    axes.set_yticks(rows, [name.removeprefix("vehicle.") for name in names])
     axes.set(xlim=(0.0, max(1.0, *total, *first)), xlabel="share of the variance")
     axes.set(title=f"Sobol indices (surrogate's error {100.0 * one['error']:.0f} %)")
-
-
-def _short(name: str) -> str:
-    return name.removeprefix("vehicle.")

@@ -5,6 +5,7 @@ lateral displacement and yaw, with the curve shaded and the limits of EN 14363 w
 """
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,7 +23,10 @@ from railsim.plot.style import (
     SIDE_LINES,
     Picture,
     distinct,
+    key,
+    note,
     shade,
+    side_keys,
     spans,
     styled,
     wheelset_colours,
@@ -153,16 +157,11 @@ def _draw(
             colour = wheelsets[line.labels["wheelset"]]
         else:
             colour = distinct(index)
-        above = 3.0 - 0.01 * index  # the leading wheelset stays visible
-        axes.plot(
-            horizontal,
-            line.values[window] * quantity.scale,
-            color=colour,
-            ls=SIDE_LINES[side],
-            zorder=above,
-        )
+        # the leading wheelset stays visible
+        look: Any = {"color": colour, "ls": SIDE_LINES[side], "zorder": 3.0 - 0.01 * index}
+        axes.plot(horizontal, line.values[window] * quantity.scale, **look)
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
-    heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
+    heading = capitalised(quantity)
     drawn = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
     if by == "wheelset" and len(drawn) == 1:
         wheelset = drawn.pop()
@@ -179,6 +178,11 @@ def _draw(
     axes.set(title=heading, ylabel=unit_label(quantity))
     axes.margins(x=0.0)
     draw_limit(axes, quantity, [result])
+
+
+def capitalised(quantity: Quantity) -> str:
+    """Return the words of a quantity as a title."""
+    return quantity.long_name[:1].upper() + quantity.long_name[1:]
 
 
 def unit_label(quantity: Quantity) -> str:
@@ -198,17 +202,9 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     value, words = limit
     shown = value * quantity.scale
     axes.axhline(shown, color=LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
-    axes.annotate(
-        words,
-        (1.0, shown),
-        (-3, 2.5 if value < 0 else -2.5),
-        ("axes fraction", "data"),
-        "offset points",
-        ha="right",
-        va="bottom" if value < 0 else "top",
-        fontsize=7.5,
-        color=LIMIT,
-    )
+    shift, va = ((-3, 2.5), "bottom") if value < 0 else ((-3, -2.5), "top")
+    look: Any = {"fontsize": 7.5, "color": LIMIT, "frame": ("axes fraction", "data")}
+    note(axes, words, (1.0, shown), shift, "right", va, **look)
 
 
 def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
@@ -221,11 +217,10 @@ def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
         for number, name in enumerate(result.wheelsets, start=1):
             if any(line.labels.get("wheelset") == name for line in lines):
                 words = f"{number} {unformatted(names[name])}"
-                handles.append(Line2D([], [], color=colours[name], lw=2.0, label=words))
-    for index, (side, style) in enumerate(SIDE_LINES.items()):
+                handles.append(key(words, color=colours[name], lw=2.0))
+    for side, colour in zip(SIDE_LINES, DISTINCT, strict=False):
         if any(line.labels.get("side") == side for line in lines):
-            colour = "0.25" if by == "wheel" else DISTINCT[index]
-            handles.append(Line2D([], [], color=colour, ls=style, label=f"{side} wheel"))
+            handles += side_keys([side], color="0.25" if by == "wheel" else colour)
     return handles
 
 

@@ -117,15 +117,8 @@ def search_figure(optimum: "Optimum") -> Figure:
         (lost, "s", "w", "not assembled"),
     ):
         if shown:
-            axes.plot(
-                [s.number for s in shown],
-                [s.objective for s in shown],
-                marker,
-                mfc=fill,
-                color="0.3",
-                ms=5,
-                label=label,
-            )
+            ends = zip(*((s.number, s.objective) for s in shown), strict=True)
+            axes.plot(*ends, marker, mfc=fill, color="0.3", ms=5, label=label)
     if optimum.objective > 0.0:
         axes.axhline(optimum.objective, color=MAIN, label=f"best {optimum.objective:.4g}")
     if optimum.objective_before > 0.0:

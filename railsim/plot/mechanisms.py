@@ -41,7 +41,7 @@ from railsim.plot.mechanism_comparison import (
     search_figure,
 )
 from railsim.plot.point_names import name_points
-from railsim.plot.style import LIMIT, Picture
+from railsim.plot.style import ABOVE, LIMIT, Picture, note
 
 # drawn beside this module, offered here
 __all__ = ["cases_figure", "comparison_figure", "held_figure", "search_figure"]
@@ -192,15 +192,8 @@ def angles_figure(result: Analysis) -> Figure:
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
         axes.axhline(limit, color=LIMIT, lw=0.9)
-        axes.annotate(
-            "limit",
-            (1.0, limit),
-            xycoords=("axes fraction", "data"),
-            fontsize=8,
-            color=LIMIT,
-            ha="right",
-            va="bottom",
-        )
+        look: Any = {"fontsize": 8, "color": LIMIT, "frame": ("axes fraction", "data")}
+        note(axes, "limit", (1.0, limit), (0, 0), "right", "bottom", **look)
     return figure
 
 
@@ -230,14 +223,8 @@ def cam_figure(result: Analysis) -> Figure:
     for change in result.transitions:
         at = change.travel * scale
         axes.axvline(at, color="0.4", lw=0.8)
-        axes.annotate(
-            f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm",
-            (at, 1.0),
-            (3, -10),
-            ("data", "axes fraction"),
-            "offset points",
-            fontsize=8,
-        )
+        value = f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm"
+        note(axes, value, (at, 1.0), (3, -10), frame=ABOVE, fontsize=8, color="k")
     mark_zone(axes, result, "travel")
     axes.set(xlabel=label_of("travel", result, "driver"), ylabel=words)
     axes.legend()
@@ -302,17 +289,8 @@ def carpet_figure(result: Analysis) -> Figure:
     heights = table.heights * 1e3
     for i, pressure in enumerate(table.pressures):
         axes.plot(heights, table.forces[:, i] / 1e3, color="0.55", lw=0.9, marker=".", ms=3)
-        point = (heights[0], table.forces[0, i] / 1e3)
-        axes.annotate(
-            f"{pressure / 1e6:g} MPa",
-            point,
-            (-4, 0),
-            "data",
-            "offset points",
-            fontsize=8,
-            ha="right",
-            va="center",
-        )
+        point, value = (heights[0], table.forces[0, i] / 1e3), f"{pressure / 1e6:g} MPa"
+        note(axes, value, point, (-4, 0), "right", "center", fontsize=8, color="k")
     length = values_of("length", result)
     axes.plot(length, result.output["force"] / 1e3, color=MAIN, lw=2.2, label="load")
     if result.zone:

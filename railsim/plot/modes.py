@@ -37,7 +37,7 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
         By default vehicle, track and contact.
     """
     figure = Picture(10.2, 7.4)
-    figure.suptitle(title or locus.title.replace(": ", "\n", 1), x=0.01, ha="left")
+    figure.suptitle(title or locus.title.replace(": ", "\n", 1), x=0.012, ha="left")
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
     damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
     plane = figure.add_subplot(grid[1, 1])
@@ -60,14 +60,8 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
         damping.plot(values, 100.0 * zeta, label=label, **style)
         frequency.plot(values, size / (2.0 * np.pi), **style)
         plane.plot(eigenvalues[:, k].real, eigenvalues[:, k].imag / (2.0 * np.pi), **style)
-        known = np.flatnonzero(np.isfinite(size))
-        plane.plot(
-            eigenvalues[known[-1], k].real,
-            eigenvalues[known[-1], k].imag / (2 * np.pi),
-            ">",
-            ms=3.5,
-            color=colour,
-        )
+        last = eigenvalues[np.flatnonzero(np.isfinite(size))[-1], k]
+        plane.plot(last.real, last.imag / (2 * np.pi), ">", ms=3.5, color=colour)
     _frame(damping, frequency, plane, locus)
     return figure
 
@@ -104,10 +98,8 @@ def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str
     for k in chosen:
         name = names[k]
         if "hunting" in name:
-            shade = (DISTINCT[1], "#f0a13c", "#8c2d19")[
-                min(2, sum("hunting" in names[j] for j in found))
-            ]
-            found[k] = (shade, 2.0)
+            before = sum("hunting" in names[j] for j in found)
+            found[k] = ((DISTINCT[1], "#f0a13c", "#8c2d19")[min(2, before)], 2.0)
         elif name.startswith(("car", "lower", "upper")):
             found[k] = (next(bright, "0.4"), 1.3)
         else:
@@ -130,7 +122,7 @@ def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
     drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
     rows = max(1, (len(drawn) + 1) // 2)
     figure = Picture(10.2, 0.9 + 2.1 * rows)
-    figure.suptitle(title or modes.title.replace(": ", "\n", 1), x=0.01, ha="left")
+    figure.suptitle(title or modes.title.replace(": ", "\n", 1), x=0.012, ha="left")
     grid = figure.add_gridspec(rows, 2)
     if not drawn:
         say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")
@@ -140,12 +132,8 @@ def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
         _shape(axes, mode)
         if k + 2 >= len(drawn):
             axes.set_xlabel("share of the kinetic energy (%)")
-    figure.legend(
-        handles=[Patch(color=colour, label=label) for colour, label in PHASES.items()],
-        loc="outside lower center",
-        ncol=len(PHASES),
-        fontsize=8,
-    )
+    handles = [Patch(color=colour, label=label) for colour, label in PHASES.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncol=len(PHASES), fontsize=8)
     return figure
 
 
@@ -168,7 +156,5 @@ def _shape(axes: Axes, mode: Mode) -> None:
     axes.set_yticks(rows, names, fontsize=6.5)
     axes.set(ylim=(max(len(names), LEAST_BARS) - 0.5, -0.5), xlim=(0.0, None))
     axes.grid(visible=False, axis="y")
-    axes.set_title(
-        f"{mode.name}: {mode.natural_frequency:.3g} Hz, damping {100.0 * mode.damping_ratio:.2f} %",
-        fontsize=8.5,
-    )
+    damping = f"damping {100.0 * mode.damping_ratio:.2f} %"
+    axes.set_title(f"{mode.name}: {mode.natural_frequency:.3g} Hz, {damping}", fontsize=8.5)

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from railsim.arrays import Floats
+from railsim.plot.style import note
 
 SIZE = 7.0
 """Of the letters [points]."""
@@ -76,15 +77,5 @@ def _cost(box: Floats, boxes: Sequence[Floats], frame: Floats, ink: Floats, mark
 def _write(axes: Axes, name: str, xy: Floats, offset: Floats) -> None:
     far = np.hypot(*offset) > LEADER + 0.29 * SIZE * len(name)
     line = {"arrowstyle": "-", "lw": 0.5, "color": "0.4", "shrinkA": 0.0, "shrinkB": 2.0}
-    text = axes.annotate(
-        name,
-        (float(xy[0]), float(xy[1])),
-        (float(offset[0]), float(offset[1])),
-        "data",
-        "offset points",
-        ha="center",
-        va="center",
-        fontsize=SIZE,
-        arrowprops=line if far else None,
-    )
-    text.set_in_layout(False)
+    look: Any = {"fontsize": SIZE, "color": "k", "arrowprops": line if far else None}
+    note(axes, name, xy, offset, "center", "center", **look).set_in_layout(False)

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 
 from railsim.arrays import Floats
 from railsim.definitions.spring import TrailingArmSuspension
-from railsim.plot.style import DISTINCT, LIMIT, Picture
+from railsim.plot.style import ABOVE, DISTINCT, LIMIT, Picture, note
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks
 from railsim.springs.arm import Arm
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
+NAMES: Any = {"fontsize": 7.5, "color": "0.25"}
 SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 
@@ -67,15 +68,14 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     curve = _curve(result)
     load = curve["load"] * 1e-3
     deflection.plot(load, curve["deflection"] * 1e3, color=MAIN)
+    marks = [(case.load * 1e-3, case.name) for case in result.cases]
     _mark(
-        deflection, [(case.load * 1e-3, case.deflection * 1e3, case.name) for case in result.cases]
+        deflection,
+        [(P, 1e3 * c.deflection, n) for (P, n), c in zip(marks, result.cases, strict=True)],
     )
     deflection.set_ylabel("deflection $\\Delta z$ (mm)")
     rotation.plot(load, np.degrees(curve["rotation"]), color=MAIN)
-    _mark(
-        rotation,
-        [(case.load * 1e-3, np.degrees(case.rotation), case.name) for case in result.cases],
-    )
+    _mark(rotation, [(c.load * 1e-3, np.degrees(c.rotation), c.name) for c in result.cases])
     rotation.axhline(0.0, color=FAINT, lw=0.8)
     rotation.set_ylabel("rotation of the arm (°)")
     solid = solid_heights(suspension)
@@ -87,16 +87,8 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     heights.plot([], [], color="0.4", lw=0.9, ls=":", label="solid height")
     for case in result.cases:
         heights.axvline(case.load * 1e-3, color=FAINT, lw=0.7, zorder=0)
-        heights.annotate(
-            unformatted(case.name),
-            (case.load * 1e-3, 1.0),
-            (0, 2),
-            ("data", "axes fraction"),
-            "offset points",
-            ha="center",
-            fontsize=7.5,
-            color="0.25",
-        )
+        at = (case.load * 1e-3, 1.0)
+        note(heights, unformatted(case.name), at, (0, 2), "center", frame=ABOVE, **NAMES)
     heights.set_ylabel("height under load (mm)")
     heights.legend(ncols=3, loc="upper right")
     for axes in (deflection, rotation, heights):
@@ -188,7 +180,7 @@ def search_figure(result: "SearchResult") -> Figure:
     margin = [nest.fatigue_margin for nest in result.nests]
     axes.plot(mass, margin, "o", color=MAIN, ms=5, label="ranked nests, as built", zorder=2)
     for rank, point in enumerate(zip(mass, margin, strict=True), start=1):
-        axes.annotate(str(rank), point, (4, 3), "data", "offset points", fontsize=8, color=MAIN)
+        note(axes, str(rank), point, (4, 3), fontsize=8, color=MAIN)
     axes.set(xlabel="mass of the nest (kg)", ylabel="fatigue margin")
     axes.legend(loc="best")
     return figure
@@ -216,20 +208,10 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     ordered = sorted(results, key=lambda result: result.load)
     columns = np.arange(len(ordered))
     for column, result in zip(columns, ordered, strict=True):
-        every.plot(
-            [column] * 2,
-            [result.lowest * 1e3, result.highest * 1e3],
-            color=FAINT,
-            lw=7,
-            solid_capstyle="butt",
-        )
-        every.plot(
-            [column] * 2,
-            [-result.random * 1e3, result.random * 1e3],
-            color=MAIN,
-            lw=7,
-            solid_capstyle="butt",
-        )
+        worst, likely = (result.lowest, result.highest), (-result.random, result.random)
+        for pair, colour in ((worst, FAINT), (likely, MAIN)):
+            look: Any = {"color": colour, "lw": 7, "solid_capstyle": "butt"}
+            every.plot([column] * 2, 1e3 * np.array(pair), **look)
     every.plot([], [], color=FAINT, lw=5, label="worst case")
     every.plot([], [], color=MAIN, lw=5, label="statistical (RSS)")
     names = [unformatted(result.name) for result in ordered]
@@ -258,10 +240,7 @@ def _curve(result: Verification) -> dict[str, Floats]:
         "deflection": states[0].deflection,
         "K_sys": load / states[0].deflection,
         "rate": np.gradient(load, rise, edge_order=2),
-        **{
-            f"height_{name}": state.height
-            for name, state in zip(("outer", "inner"), states, strict=False)
-        },
+        **{f"height_{n}": s.height for n, s in zip(("outer", "inner"), states, strict=False)},
     }
 
 
@@ -270,17 +249,8 @@ def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
     for i, (x, y, name) in enumerate(sorted(points)):
         above = i % 2 == 0
         axes.plot(x, y, "o", color=MAIN, ms=4)
-        axes.annotate(
-            unformatted(name),
-            (x, y),
-            (-4, 3) if above else (4, -3),
-            "data",
-            "offset points",
-            ha="right" if above else "left",
-            va="bottom" if above else "top",
-            fontsize=7.5,
-            color="0.25",
-        )
+        where = ((-4, 3), "right", "bottom") if above else ((4, -3), "left", "top")
+        note(axes, unformatted(name), (x, y), *where, **NAMES)
 
 
 def _draw_arm(
@@ -326,15 +296,9 @@ def _draw_arm(
         arrowprops={"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4},
     )
     degrees = f"{np.degrees(phi):+.2f}°".replace("-", "−") if case.theta > 1e-5 else "0°"
-    x, y = _moved(frame, -60.0, 30.0)
-    axes.text(
-        x,
-        y,
-        f"{unformatted(case.name)}  {case.load * 1e-3:.1f} kN\n"
-        f"{case.deflection * 1e3:.1f} mm, {degrees}",
-        fontsize=9,
-        va="bottom",
-    )
+    words = f"{unformatted(case.name)}  {case.load * 1e-3:.1f} kN"
+    words += f"\n{case.deflection * 1e3:.1f} mm, {degrees}"
+    note(axes, words, _moved(frame, -60.0, 30.0), (0, 0), va="bottom", fontsize=9, color="k")
 
 
 def _moved(point: Floats, right: float, up: float) -> Floats:

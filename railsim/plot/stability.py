@@ -37,7 +37,7 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     if not found.branches:
         return _linear_figure(found, title or _title(found))
     figure = Picture(10.2, 7.2)
-    figure.suptitle(title or _title(found), x=0.01, ha="left")
+    figure.suptitle(title or _title(found), x=0.012, ha="left")
     grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
@@ -47,10 +47,8 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
         _draw(lower[0], branch, np.where(hunts, branch.column("frequency"), np.nan))
         _draw(lower[1], branch, 1e-3 * branch.column("sum_Y_rms"))
     _mark(upper, found)
-    for axes, limit, scale in (
-        (upper, found.amplitude_limit, 1e3),
-        (lower[1], found.instability_limit, 1e-3),
-    ):
+    limits = found.amplitude_limit, found.instability_limit
+    for axes, limit, scale in zip((upper, lower[1]), limits, (1e3, 1e-3), strict=True):
         if limit is not None:
             words = "limits: 3 mm, half the limit of ΣY"
             axes.axhline(scale * limit.limit, color=LIMIT, lw=0.8, ls=(0, (1, 2)), label=words)
@@ -95,7 +93,7 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     if found.linear is not None:
         words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
     figure = Picture(8.4, 4.4)
-    figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
+    figure.suptitle(f"{title}\n{words}", x=0.012, ha="left")
     left, right = figure.subplots(1, 2, sharey=True)
     left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
     left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
@@ -182,7 +180,7 @@ def map_figure(
     """
     first, *others = axes_values
     figure = Picture(8.4, 4.6)
-    figure.suptitle(title, x=0.01, ha="left")
+    figure.suptitle(title, x=0.012, ha="left")
     axes = figure.subplots()
     for method, values in speeds.items():
         for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):

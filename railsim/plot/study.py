@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from railsim.plot.style import DISTINCT, Picture, styled
+from railsim.plot.style import DISTINCT, Picture, grid_of, styled
 from railsim.text import unformatted
 
 MOST_RANKED = 25
@@ -51,10 +51,11 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
     figure, cells = _panels(len(quantities))
     if len(set(points)) < len(points):
         words = "Medians of the runs at each point; bands from the smallest to the largest"
-        figure.suptitle(words, x=0.01, ha="left", fontsize=8.5, fontweight="normal")
+        figure.suptitle(words, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
     for axes, quantity in zip(cells, quantities, strict=True):
         for member, colour in zip(members, colours, strict=True):
-            _curve(axes, quantity, x, _of(family, member), colour, member)
+            own = None if family is None else [value == member for value in family.values]
+            _curve(axes, quantity, x, own, colour, member)
         axes.set(title=quantity.words, xlabel=x.words)
         if not x.numeric:
             axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
@@ -62,10 +63,6 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
     if family is not None:
         _legend(figure, cells[0], family.words)
     return figure
-
-
-def _of(family: Column | None, member: Any) -> Any:
-    return None if family is None else [value == member for value in family.values]
 
 
 def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, member: Any) -> None:
@@ -97,8 +94,9 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
     columns, rows = x.different, y.different
     for axes, quantity in zip(cells, quantities, strict=True):
         there: dict[tuple[int, int], list[float]] = {}
-        for value, a, b in zip(quantity.values, x.values, y.values, strict=True):
-            if value is not None and a is not None and b is not None:
+        for triple in zip(quantity.values, x.values, y.values, strict=True):
+            if None not in triple:
+                value, a, b = triple
                 there.setdefault((rows.index(b), columns.index(a)), []).append(value)
         values = np.full((len(rows), len(columns)), np.nan)
         for cell, found in there.items():
@@ -149,12 +147,8 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
     for axes, quantity in zip(grid[:, 0], quantities, strict=True):
         pairs = [(v, n) for v, n in zip(quantity.values, names, strict=True) if v is not None]
         shown = sorted(pairs, key=lambda pair: -pair[0])[:MOST_RANKED]
-        bars = axes.barh(
-            [unformatted(_shortened(n)) for _, n in shown],
-            [v for v, _ in shown],
-            color=DISTINCT[0],
-            height=0.7,
-        )
+        lengths, labels = [v for v, _ in shown], [unformatted(_shortened(n)) for _, n in shown]
+        bars = axes.barh(labels, lengths, color=DISTINCT[0], height=0.7)
         axes.bar_label(bars, [f"{value:.4g}" for value, _ in shown], padding=3, fontsize=7)
         axes.invert_yaxis()
         axes.margins(x=0.1, y=0.02)
@@ -173,14 +167,10 @@ def _text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
-    columns = 1 if count == 1 else 2
-    rows = -(-count // columns)
-    figure = Picture(6.8 if columns == 1 else 10.0, 1.0 + 2.9 * rows)
-    cells = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in cells[count:]:
-        axes.remove()
-    return figure, cells[:count]
+def _panels(count: int) -> tuple[Picture, list[Axes]]:
+    across = 1 if count == 1 else 2
+    wide = 6.8 if across == 1 else 10.0
+    return grid_of(count, across, lambda rows: (wide, 1.0 + 2.9 * rows))
 
 
 def _colours(count: int) -> list[Any]:
@@ -194,11 +184,6 @@ def _legend(figure: Figure, axes: Axes, title: str) -> None:
     handles, labels = axes.get_legend_handles_labels()
     longest = max(map(len, labels), default=1)
     fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
-    figure.legend(
-        handles,
-        labels,
-        loc="outside lower left",
-        ncols=min(fitting, 8, len(labels)),
-        title=title,
-        alignment="left",
-    )
+    columns = min(fitting, 8, len(labels))
+    where: Any = {"loc": "outside lower left", "alignment": "left"}
+    figure.legend(handles, labels, ncols=columns, title=title, **where)

@@ -6,7 +6,7 @@ side a dashed line.
 """
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -18,6 +18,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
 
 from railsim.arrays import Floats
 from railsim.definitions.track.section import Section
@@ -66,6 +68,9 @@ NARROW = 0.011
 """Share of the axes' width that a letter of a section's name takes."""
 
 LIMIT = "#b3122b"
+
+ABOVE = ("data", "axes fraction")
+"""Coordinates of what stands at the upper edge of axes."""
 
 
 def distinct(number: int) -> str:
@@ -154,18 +159,40 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
         words = "CLO" if span.section.type == "CLO" else f"R {1.0 / span.section.start_value:.6g}"
         if (span.high - span.low) / (high - low) < NARROW * len(words):
             continue
-        axes.annotate(
-            words.replace("-", "−"),
-            (0.5 * (span.low + span.high), 1.0),
-            (0, 2),
-            ("data", "axes fraction"),
-            "offset points",
-            ha="center",
-            va="bottom",
-            fontsize=6.5,
-            color="0.4",
-        )
+        at, look = (0.5 * (span.low + span.high), 1.0), {"fontsize": 6.5, "color": "0.4"}
+        note(axes, words.replace("-", "−"), at, (0, 2), "center", "bottom", frame=ABOVE, **look)
     axes.set_title(axes.get_title(loc="left"), pad=14.0)
+
+
+def note(
+    axes: Axes, words: str, at: Any, shift: Any, ha: Any = "left", va: Any = "baseline", **how: Any
+) -> Annotation:
+    """Write words beside a point, shifted by points of print; `frame`: coordinates of the point."""
+    look: dict[str, Any] = {"fontsize": 7, "color": "0.3", "frame": "data"} | how
+    frame = look.pop("frame")
+    return axes.annotate(words, at, shift, frame, "offset points", ha=ha, va=va, **look)
+
+
+def key(words: str, **look: Any) -> Line2D:
+    """Return an entry of a legend."""
+    return Line2D([], [], label=words, **look)
+
+
+def side_keys(sides: Collection[str | None], **look: Any) -> list[Line2D]:
+    """Return entries of a legend for the wheels of some sides."""
+    return [key(f"{s} wheel", **{"ls": ls} | look) for s, ls in SIDE_LINES.items() if s in sides]
+
+
+def grid_of(
+    count: int, across: int, size: Callable[[int], tuple[float, float]], **how: Any
+) -> tuple[Picture, list[Axes]]:
+    """Return a figure with axes in rows, of a size by the number of rows, and the axes."""
+    rows = -(-count // across)
+    figure = Picture(*size(rows))
+    cells = list(figure.subplots(rows, across, squeeze=False, **how).flat)
+    for axes in cells[count:]:
+        axes.remove()
+    return figure, cells[:count]
 
 
 def say(axes: Axes, words: str) -> None:

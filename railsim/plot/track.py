@@ -6,11 +6,11 @@ they are not constant.  Constants stand in the line under the title.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from scipy.integrate import cumulative_simpson
 
 from railsim.arrays import Floats
@@ -23,7 +23,7 @@ from railsim.definitions.track.layout import (
 )
 from railsim.definitions.track.section import Section
 from railsim.laws.permission import refused
-from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, shade, spans, styled
+from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, key, note, shade, spans, styled
 from railsim.text import unformatted
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
@@ -62,12 +62,7 @@ def track_figure(track: Track, title: str = "") -> Figure:
     """
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, RESOLUTION + 1)
-    rows = [
-        *_alignment_rows(track, alignment, s),
-        *_rail_rows(track, s),
-        *_friction_rows(track, s),
-        *_support_rows(track, s),
-    ]
+    rows = [*_alignment_rows(track, alignment, s), *_rail_rows(track, s), *_table_rows(track, s)]
     sections = curvature_sections(track)
     remarks = _marked(track)
     height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
@@ -86,15 +81,8 @@ def track_figure(track: Track, title: str = "") -> Figure:
         if k + 1 < len(rows):
             axes[1 + k].tick_params(labelbottom=False)
     for position, _ in remarks:
-        axes[1].plot(
-            position,
-            0.0,
-            marker="^",
-            ms=5,
-            color=LIMIT,
-            clip_on=False,
-            transform=axes[1].get_xaxis_transform(),
-        )
+        look: Any = {"marker": "^", "ms": 5, "color": LIMIT, "clip_on": False}
+        axes[1].plot(position, 0.0, transform=axes[1].get_xaxis_transform(), **look)
     axes[-1].set_xlabel("Distance along the track $s$ (m)")
     if remarks:
         words = "\n".join(f"s = {position:.0f} m: {text}" for position, text in remarks)
@@ -118,17 +106,11 @@ def _draw(axes: Axes, row: _Row, s: Floats) -> None:
 
 
 def _alignment_rows(track: Track, alignment: Alignment, s: Floats) -> list[_Row]:
+    curvature = {"curvature": 1e3 * alignment.curvature(s)}
+    cant = {"cant": 1e3 * alignment.cant(s)}
     rows = [
-        _Row(
-            "Curvature, positive to the right",
-            r"$\kappa$ (1/km)",
-            {"curvature": 1e3 * alignment.curvature(s)},
-        ),
-        _Row(
-            "Cant, positive with the left rail higher",
-            "$h$ (mm)",
-            {"cant": 1e3 * alignment.cant(s)},
-        ),
+        _Row("Curvature, positive to the right", r"$\kappa$ (1/km)", curvature),
+        _Row("Cant, positive with the left rail higher", "$h$ (mm)", cant),
     ]
     if track.vertical:
         gradient = {"gradient": 1e3 * alignment.gradient(s)}
@@ -147,37 +129,31 @@ def _rail_rows(track: Track, s: Floats) -> list[_Row]:
     gauge = 1e3 * track.gauge + y_right - y_left
     rows = []
     if track.irregularities:
+        across, down = {"left": y_left, "right": y_right}, {"left": z_left, "right": z_right}
+        words = "displacement of the rails, positive"
         rows = [
-            _Row(
-                f"Lateral displacement of the rails, positive to the right{without}",
-                "$y$ (mm)",
-                {"left": y_left, "right": y_right},
-            ),
-            _Row(
-                f"Vertical displacement of the rails, positive downwards{without}",
-                "$z$ (mm)",
-                {"left": z_left, "right": z_right},
-            ),
+            _Row(f"Lateral {words} to the right{without}", "$y$ (mm)", across),
+            _Row(f"Vertical {words} downwards{without}", "$z$ (mm)", down),
         ]
     if np.ptp(gauge) > 1e-6:
         rows.append(_Row("Gauge", "(mm)", {"gauge": gauge}))
     return rows
 
 
-def _friction_rows(track: Track, s: Floats) -> list[_Row]:
-    if track.friction_table is None:
-        return []
-    table_s, left, right = np.array(track.friction_table).T
-    curves = {"left": np.interp(s, table_s, left), "right": np.interp(s, table_s, right)}
-    return [_Row("Friction", r"$\mu$", curves)]
-
-
-def _support_rows(track: Track, s: Floats) -> list[_Row]:
-    if track.support.variation is None or track.support.preset == "rigid":
-        return []
-    table_s, pads, ballast = np.array(track.support.variation).T
-    curves = {"pads": np.interp(s, table_s, pads), "ballast": np.interp(s, table_s, ballast)}
-    return [_Row("Stiffness and damping of the support, times those of the preset", "", curves)]
+def _table_rows(track: Track, s: Floats) -> list[_Row]:
+    """Friction and support where they vary along the track."""
+    words = "Stiffness and damping of the support, times those of the preset"
+    support = None if track.support.preset == "rigid" else track.support.variation
+    rows = []
+    for table, title, label, names in (
+        (track.friction_table, "Friction", r"$\mu$", ("left", "right")),
+        (support, words, "", ("pads", "ballast")),
+    ):
+        if table is not None:
+            at, *columns = np.array(table).T
+            curves = {n: np.interp(s, at, v) for n, v in zip(names, columns, strict=True)}
+            rows.append(_Row(title, label, curves))
+    return rows
 
 
 def _constants(track: Track) -> str:
@@ -195,19 +171,14 @@ def _constants(track: Track) -> str:
 
 def _marked(track: Track) -> list[tuple[float, str]]:
     """Return position and text of what is unusual in the alignment; equal texts once."""
-    sections = {
-        section.key: section
-        for part in (curvature_sections(track), cant_sections(track), gradient_sections(track))
-        for section in part
-    }
+    parts = curvature_sections(track), cant_sections(track), gradient_sections(track)
+    begins = {section.key: section.begin for part in parts for section in part}
     found: dict[str, list[float]] = {}
     for remark in track_remarks(track):
-        if remark.key in sections:
-            found.setdefault(remark.text, []).append(sections[remark.key].begin)
-    marked = sorted(
-        (min(begins), text + (f"; {len(begins)} times" if len(begins) > 1 else ""))
-        for text, begins in found.items()
-    )
+        if remark.key in begins:
+            found.setdefault(remark.text, []).append(begins[remark.key])
+    times = {text: f"; {len(at)} times" if len(at) > 1 else "" for text, at in found.items()}
+    marked = sorted((min(at), text + times[text]) for text, at in found.items())
     if len(marked) <= MOST_REMARKS:
         return marked
     *shown, (position, text) = marked[:MOST_REMARKS]
@@ -230,11 +201,8 @@ def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Floa
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
     used = {section.type for section in sections}
-    handles = [
-        Line2D([], [], color=colour, lw=2.2, label=words)
-        for kind, (words, colour) in KINDS.items()
-        if kind in used
-    ]
+    known = [look for kind, look in KINDS.items() if kind in used]
+    handles = [key(words, color=colour, lw=2.2) for words, colour in known]
     axes.legend(handles=handles, loc="best")
 
 
@@ -244,14 +212,8 @@ def _name_curve(
     """Write the radius on the outer side of a curve."""
     at = int(np.searchsorted(s, 0.5 * (section.begin + section.end)))
     outwards = -np.sign(section.start_value) * np.array([-np.sin(heading[at]), np.cos(heading[at])])
-    axes.annotate(
-        f"R {1.0 / section.start_value:.6g} m".replace("-", "\N{MINUS SIGN}"),
-        (x[at], y[at]),
-        (12.0 * outwards[0], -12.0 * outwards[1]),
-        "data",
-        "offset points",
-        ha="left" if outwards[0] > 0.3 else "right" if outwards[0] < -0.3 else "center",
-        va="bottom" if outwards[1] < -0.3 else "top" if outwards[1] > 0.3 else "center",
-        fontsize=8,
-        color=KINDS["CIR"][1],
-    )
+    words = f"R {1.0 / section.start_value:.6g} m".replace("-", "\N{MINUS SIGN}")
+    shift = 12.0 * outwards * (1.0, -1.0)  # Y points down on the page
+    ha = "left" if outwards[0] > 0.3 else "right" if outwards[0] < -0.3 else "center"
+    va = "bottom" if outwards[1] < -0.3 else "top" if outwards[1] > 0.3 else "center"
+    note(axes, words, (x[at], y[at]), shift, ha, va, fontsize=8, color=KINDS["CIR"][1])

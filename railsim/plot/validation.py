@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.arrays import Floats
 from railsim.assessment.model_comparison import ModelValidation, Overlay
 from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
+from railsim.plot.style import grid_of
 
 WORDS = ("measured", "before", "after")
 MOST = 12  # channels of a picture
@@ -16,13 +18,8 @@ LONGEST = 20_000  # values of a line
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
 
 
-def _axes(count: int, across: int, height: float) -> tuple[Figure, list]:  # type: ignore[type-arg]
-    rows = -(-count // across)
-    figure = Figure(figsize=(8.0, 0.6 + height * rows), layout="constrained")
-    grid = figure.subplots(rows, across, squeeze=False).ravel()
-    for spare in grid[count:]:
-        spare.remove()
-    return figure, list(grid[:count])
+def _axes(count: int, across: int, height: float) -> tuple[Figure, list[Axes]]:
+    return grid_of(count, across, lambda rows: (8.0, 0.6 + height * rows))
 
 
 def _shown(quantity: str) -> tuple[float, str]:
@@ -63,7 +60,9 @@ def differences(validation: ModelValidation) -> Figure:
         x = np.array([pair.difference for pair in one.pairs]) / one.limit
         reach = max(1.2, 1.05 * float(np.abs(x).max()))
         axes.hist(
-            x, bins=np.linspace(-reach, reach, 25), color="C3" if one.verdict == "fail" else "C0"
+            x,
+            bins=np.linspace(-reach, reach, 25).tolist(),
+            color="C3" if one.verdict == "fail" else "C0",
         )
         for limit in (-2 / 3, 2 / 3):
             axes.axvline(limit, color="0.5", linewidth=0.8, linestyle="--")

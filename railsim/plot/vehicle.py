@@ -14,7 +14,7 @@ from railsim.definitions.base import Vector
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import Box, body_boxes
-from railsim.plot.style import Picture, distinct, styled
+from railsim.plot.style import Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
@@ -58,13 +58,9 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
     grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
     end, boxes = _leading_end(flat), body_boxes(flat)
-    for cell, view, limits in (
-        (grid[0, :], SIDE, None),
-        (grid[1, :], TOP, None),
-        (grid[2, 0], SIDE, end),
-        (grid[2, 1], TOP, end),
-        (grid[2, 2], BEHIND, None),
-    ):
+    cells = (grid[0, :], grid[1, :], grid[2, 0], grid[2, 1], grid[2, 2])
+    ends = (None, None, end, end, None)
+    for cell, view, limits in zip(cells, (SIDE, TOP, SIDE, TOP, BEHIND), ends, strict=True):
         axes = figure.add_subplot(cell)
         for box in boxes.values():
             axes.add_patch(_outline(box, view))
@@ -129,22 +125,10 @@ def _name_bodies(axes: Axes, together: dict[tuple[float, float], list[str]], abo
         if len(names) > 1:  # one behind the other: left and right
             names = [name.removesuffix("_left").removesuffix("_right") for name in names]
         words = ", ".join(dict.fromkeys(names))
-        near = sum(
-            abs(x - other_x) < NEAR[0] and abs(y - other_y) < NEAR[1]
-            for other_x, other_y in written
-        )
+        near = sum(abs(x - a) < NEAR[0] and abs(y - b) < NEAR[1] for a, b in written)
         written.append((x, y))
-        label = axes.annotate(
-            unformatted(words),
-            (x, y),
-            (0, above + 9 * near),
-            "data",
-            "offset points",
-            ha="center",
-            fontsize=7,
-            color=BODY,
-            zorder=6,
-        )
+        shift = (0, above + 9 * near)
+        label = note(axes, unformatted(words), (x, y), shift, "center", color=BODY, zorder=6)
         label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
@@ -188,13 +172,13 @@ def _line(axes: Axes, points: Sequence[Vector], across: int, upright: int, **sty
 
 
 def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D | Rectangle]:
-    yield Line2D([], [], ls="", marker="+", ms=9, mew=1.8, color=BODY, label="centre of gravity")
-    yield Line2D([], [], color=WHEEL, lw=2.0, label="wheelset")
-    yield Line2D([], [], color=LEVER, lw=0.8, label="attached to")
+    yield key("centre of gravity", ls="", marker="+", ms=9, mew=1.8, color=BODY)
+    yield key("wheelset", color=WHEEL, lw=2.0)
+    yield key("attached to", color=LEVER, lw=0.8)
     yield Rectangle((0, 0), 1, 1, fc=FILL, ec=OUTLINE, label="body, as a box")
     if flat.of_kind("axlebox"):
-        yield Line2D([], [], **BOX, label="axlebox")
+        yield key("axlebox", **BOX)
     for kind, colour in colours.items():
         of_kind = [element for element in flat.elements if _kind(element) == kind]
         label = f"{kind.replace('_', ' ')} ({len(of_kind)})"
-        yield Line2D([], [], color=colour, label=label, **_look(of_kind[0]))
+        yield key(label, color=colour, **_look(of_kind[0]))

@@ -21,8 +21,8 @@ def wear_figure(
     `railsim.studies.wear_loop.wear_rows`. `title`: What was analysed.
     """
     new = wheels[0][1]
-    figure = Picture(8.6, 7.6)
-    figure.suptitle(title, x=0.01, ha="left")
+    figure = Picture(8.6, 7.6, title)
+
     outline, depth, conicity = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 0.8])
     depth.sharex(outline)
     outline.plot(1e3 * new.y, 1e3 * new.z, color="0.2", lw=1.2, label="new")
@@ -35,14 +35,8 @@ def wear_figure(
         lost = 1e3 * (np.asarray(new.z) - np.asarray(wheel.z))
         share = 0.25 + 0.75 * number / (len(wheels) - 1)
         named = number in (1, len(wheels) - 1)
-        depth.plot(
-            1e3 * new.y,
-            lost,
-            color="C3",
-            alpha=share,
-            lw=1.0,
-            label=_km(distance) if named else None,
-        )
+        label = _km(distance) if named else None
+        depth.plot(1e3 * new.y, lost, color="C3", alpha=share, lw=1.0, label=label)
     depth.set_xlim(1e3 * SHOWN[0], 1e3 * SHOWN[1])
     depth.set_ylim(bottom=0.0)
     depth.set(xlabel="y from the nominal rolling circle, flange negative (mm)")
