@@ -161,18 +161,6 @@ class InputError(RailsimError):
         self.faults = tuple(found)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
-    @classmethod
-    def of(cls, file: str, key: str, found: str, allowed: str, option: str = "") -> "InputError":
-        """Return the error of a single fault; arguments as of `Fault`."""
-        return cls([Fault(file, key, found, allowed, option)])
-
-
-def argument_error(
-    parameter: str, key: str, found: str, allowed: str, option: str | None = None
-) -> InputError:
-    """Return the error of a single `argument_fault`."""
-    return InputError([argument_fault(parameter, key, found, allowed, option)])
-
 
 def input_error(file: str, found: str, allowed: str = "", key: str = "") -> InputError:
     """Return the error of one fault, see `Fault`."""

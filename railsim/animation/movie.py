@@ -44,7 +44,7 @@ def write_movie(
     if path.suffix.lower() == ".mp4":
         if shutil.which("ffmpeg") is None:
             allowed = "install ffmpeg, or write a .gif or .html"
-            raise argument_error("path", path.name, "MP4 needs ffmpeg", allowed, "--out")
+            raise argument_error("path", "MP4 needs ffmpeg", allowed, key=path.name, option="--out")
         writer = FFMpegWriter(fps=frames_per_second)
     else:
         writer = PillowWriter(fps=frames_per_second)

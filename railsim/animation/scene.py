@@ -14,7 +14,7 @@ from railsim.arrays import Floats
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import body_boxes
-from railsim.errors import Fault, InputError, argument_error, nearest
+from railsim.errors import Fault, InputError, argument_error, input_error, nearest
 from railsim.result import Result
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
@@ -91,13 +91,13 @@ def result_scene(
     distance = result["distance"]
     if len(distance) < 2:
         found = f"{len(distance)} instants: {result.status}"
-        raise InputError.of("result", "time", found, "a run of some length")
+        raise input_error("result", found, "a run of some length", "time")
     low, high = between or (float(distance[0]), float(distance[-1]))
     first, last = np.searchsorted(distance, [low, high])
     if last - first < 2:
         found = f"nothing between {low:g} and {high:g} m"
         allowed = f"the run goes from {distance[0]:.6g} to {distance[-1]:.6g} m"
-        raise argument_error("between", "", found, allowed)
+        raise argument_error("between", found, allowed)
     rows = np.unique(np.linspace(first, last - 1, min(frames, last - first)).astype(int))
     vehicle = result.vehicle()
     flat = flatten(vehicle)
@@ -160,14 +160,14 @@ def mode_scene(
     for key, (real, imaginary) in mode["shape"].items():
         body, _, component = key.rpartition(".")
         if body not in known or component not in components:
-            raise InputError.of("modes", key, "not of this vehicle", nearest(body, known))
+            raise input_error("modes", "not of this vehicle", nearest(body, known), key)
         if body in names and not (component == "pitch" and drawn[names.index(body)].kind ==
                                   "wheelset"):  # fmt: skip
             shape[names.index(body), components.index(component)] = complex(real, imaginary)
     length = max(body.offset for body in drawn) - min(body.offset for body in drawn)
     largest = max(_largest(body, own) for body, own in zip(drawn, shape, strict=True))
     if largest == 0.0:
-        raise InputError.of("modes", "shape", "nothing moves", "another mode")
+        raise input_error("modes", "nothing moves", "another mode", "shape")
     shape = shape * LARGEST * length / largest
     phase = np.linspace(0.0, 2.0 * np.pi * cycles, frames * cycles)
     frequency = float(mode["frequency"])
@@ -241,5 +241,5 @@ def chosen_mode(
     if wanted.isdigit() and 1 <= int(wanted) <= len(modes):
         return modes[int(wanted) - 1]
     if wanted not in names:
-        raise InputError.of(option, wanted, "no such mode", nearest(wanted, names))
+        raise input_error(option, "no such mode", nearest(wanted, names), wanted)
     return modes[names.index(wanted)]

@@ -200,7 +200,7 @@ def assess(
     if isinstance(results, Result):
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
-        raise argument_error("standard", "", standard, "one of " + ", ".join(STANDARDS))
+        raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
     groups: dict[str, dict[str, Result]] = {}
     for name, result in results.items():
         groups.setdefault(group_key(result), {})[name] = result

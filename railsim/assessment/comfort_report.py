@@ -20,7 +20,7 @@ from railsim.assessment.sperling import Direction, index_of_rms, sperling_mean_s
 from railsim.assessment.weighting import WK
 from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.definitions.track.layout import curvature_sections
-from railsim.errors import InputError
+from railsim.errors import input_error
 from railsim.result.filters import band_passed
 
 NEAR = (0.85, 1.15)  # band around the frequency of hunting, over this frequency
@@ -85,11 +85,11 @@ def comfort_report(record: Record) -> list[PointComfort]:
     """
     names = [name for name in record.sensors if not name.startswith("frame_")]
     if not names:
-        raise InputError.of(
+        raise input_error(
             record.name,
-            "sensor_acceleration",
             "is not in the result",
             "run it with settings.outputs.sensors=true",
+            "sensor_acceleration",
         )
     columns = [list(record.sensors).index(name) for name in names]
     frequency = float(record.result.attributes.get("hunting_frequency", 0.0))
@@ -100,7 +100,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
             into.add(a[:, column], counted, record.rate)
     if not gathered[0].blocks:
         allowed = "at least 5 s after the first 3 s"
-        raise InputError.of(record.name, "time", "too short for one block of 5 s", allowed)
+        raise input_error(record.name, "too short for one block of 5 s", allowed, "time")
     transitions = _transitions(record, columns)
     return [
         PointComfort(

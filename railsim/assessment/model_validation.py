@@ -30,7 +30,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_error
+from railsim.errors import Fault, InputError, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import Shift, shift_of
 from railsim.measurement.counterpart import amplified, check_channels, compared, series
@@ -83,16 +83,16 @@ def validate_model(
     found = [results] if isinstance(results, Result) else list(results)
     if len(found) != len(runs) or not runs:
         words = f"{len(found)} results for {len(runs)} measured runs"
-        raise argument_error("results", "", words, "one for each")
+        raise argument_error("results", words, "one for each")
     if not isinstance(limits, ValidationLimits):
         limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))
     if unknown:
-        raise InputError.of(
+        raise input_error(
             "limits",
-            f"limits.{unknown[0]}",
             "unknown quantity",
             "allowed: " + ", ".join(QUANTITIES),
+            f"limits.{unknown[0]}",
         )
     tests = load_running_limits(zones)
     pairs: list[Pair] = []
@@ -104,11 +104,11 @@ def validate_model(
         overlays += one.overlays()
         pairs += one.pairs(tests, limits)
     if not pairs:
-        raise InputError.of(
+        raise input_error(
             runs[0].name,
-            "distance",
             "no section",
             "a longer run, or channels of Q, Y or the body's accelerations",
+            "distance",
         )
     Q0 = float(np.mean([np.mean(result["Q0"]) for result in found]))
     comparisons = []
@@ -228,7 +228,7 @@ class _Run:
         if len(part.time) < 10:
             found = f"{moved.distance[0]:.0f} to {moved.distance[-1]:.0f} m"
             allowed = f"measured between {begin:.0f} and {distance[-1]:.0f} m, as simulated"
-            raise InputError.of(run.name, "distance", found, allowed)
+            raise input_error(run.name, found, allowed, "distance")
         rising = np.concatenate([[True], np.diff(distance) > 0.0])
         simulated: dict[str, Floats] = {
             name: np.interp(part.distance, distance[rising], x[rising])

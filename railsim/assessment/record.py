@@ -85,7 +85,7 @@ class Record:
 
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """Return the error for a property of the result that is not admissible."""
-        return InputError.of(self.name, key, found, allowed, option=self.name)
+        return InputError([Fault(self.name, key, found, allowed, option=self.name)])
 
     def need(self, names: Sequence[str], output: str) -> None:
         """Refuse a result that lacks quantities.

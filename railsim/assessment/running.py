@@ -28,7 +28,7 @@ from railsim.assessment.verdict import Verdict, all_verdicts
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.result import Result
 
 
@@ -116,11 +116,11 @@ def assessed_runs(
     service = replacement or _service(runs)
     done = _read(runs, limits, service, options)
     if done and not any(run.sections for run in done):
-        raise InputError.of(
+        raise input_error(
             done[0].name,
-            "distance",
             "too short for one section",
             "a longer run, or other sections in the limits file (--limits)",
+            "distance",
         )
     f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
     for run in done:
@@ -172,14 +172,12 @@ def _service(runs: Mapping[str, Result]) -> Service:
     name, first = next(iter(runs.items()))
     service = first.vehicle().service
     if service is None:
-        raise InputError.of(
-            name,
-            "vehicle.service",
-            "the vehicle has no service table",
+        allowed = (
             "add [service] with admissible_speed and cant_deficiency to its file, or give "
-            "`admissible_speed` and `cant_deficiency`",
-            name,
+            "`admissible_speed` and `cant_deficiency`"
         )
+        found = "the vehicle has no service table"
+        raise InputError([Fault(name, "vehicle.service", found, allowed, name)])
     return service
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.loading import load_wear_law
 from railsim.definitions.wear_law import ArchardMap, FrictionWork
-from railsim.errors import InputError
+from railsim.errors import input_error
 
 YIELD_IN_SHEAR = 300e6
 """Yield stress in shear k of rail steel, default value [Pa]."""
@@ -120,7 +120,7 @@ def wear_law(name: str) -> WearLaw:
         return LAWS[name]
     if not name.endswith(".toml"):
         allowed = "one of " + ", ".join(LAWS) + ", or a file .toml"
-        raise InputError.of("wear", "law", f"found '{name}'", allowed)
+        raise input_error("wear", f"found '{name}'", allowed, "law")
     file = load_wear_law(name)
     if file.archard is not None:
         law: Callable[[Patches], Floats] = partial(archard, law=file.archard)

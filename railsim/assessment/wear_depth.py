@@ -17,7 +17,7 @@ from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import inclined_to_track, tape_circle_position
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Wheelset
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.profiles import Profile
 from railsim.profiles.profile import FLANGE_BACK
 from railsim.result import Result
@@ -99,7 +99,7 @@ def _patches(
         raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
-        raise InputError.of("result", "wheelset", f"no wheelset {wheelset}", "")
+        raise input_error("result", f"no wheelset {wheelset}", "", "wheelset")
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
     size = np.pi * result["patch_a"][at] * result["patch_b"][at]
@@ -184,7 +184,7 @@ def parts_of_step(profile: Profile, depth: Floats, distance: float) -> int:
     if not parts <= MOST_PARTS:
         allowed = f"at most {1e3 * MOST_PARTS * UPDATE:g} mm in a step"
         found = f"{1e-3 * distance:g} km wear it {1e3 * worn:.3g} mm deep"
-        raise InputError.of(profile.name, "step", found, allowed)
+        raise input_error(profile.name, found, allowed, "step")
     return parts
 
 
@@ -201,7 +201,7 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     if most > DEEPEST:
         allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / most:.4g} km"
         found = f"{1e-3 * distance:g} km wear {1e3 * most:.3g} mm deep"
-        raise InputError.of("wear", "step", found, allowed)
+        raise input_error("wear", found, allowed, "step")
     smooth = scattered(profile, worn)
     side, lost = upper_side(profile), np.zeros(len(profile.y))
     lost[side] = np.interp(profile.y[side], grid(), smooth, left=0.0, right=0.0)
@@ -209,7 +209,7 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     if area > 0.0:
         if abs(kept / area - 1.0) > ROUNDING:
             found = f"its points resolve {100.0 * kept / area:.0f} % of the worn area"
-            raise InputError.of(profile.name, "points", found, "points at most 1 mm apart")
+            raise input_error(profile.name, found, "points at most 1 mm apart", "points")
         lost *= area / kept
     words = f"worn by {1e6 * area:.2f} mm2"
     name = f"{profile.name.removesuffix(WORN)}{WORN}"

@@ -124,14 +124,14 @@ class Analysis:
         """
         if quantity not in self.output:
             found = f"no result '{quantity}'"
-            raise argument_error("at", quantity, found, nearest(quantity, self.output))
+            raise argument_error("at", found, nearest(quantity, self.output), key=quantity)
         known = self.output[quantity]
         gap = known - value
         crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
         if not len(crossed):
             low, high = np.nanmin(known), np.nanmax(known)
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
-            raise argument_error("at", quantity, found, allowed)
+            raise argument_error("at", found, allowed, key=quantity)
         k = crossed[0]
         s = zeros(
             solve(self.model, self.motion.s[k : k + 2]),

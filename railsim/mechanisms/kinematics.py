@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from railsim.arrays import Floats, Integers
 from railsim.definitions.mechanism.expressions import atan2
 from railsim.definitions.mechanism.parts import Angle
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.assembly import assembled, constraints, dead_loop, open_loop
@@ -242,7 +242,7 @@ def check_freedom(model: Model) -> None:
     names = [n for n, (a, b) in model.joint_rows.items() if weight[a:b].max() > 1e-6]
     words = f"hold the same freedom twice: {rows - rank} degrees of freedom left"
     where = f"joints {', '.join(names)} {words}"
-    raise InputError.of(model.definition.name, "joints", where, "1 is needed")
+    raise input_error(model.definition.name, where, "1 is needed", "joints")
 
 
 def _held(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, int]:

@@ -15,7 +15,7 @@ from railsim.arrays import Complexes, Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
 from railsim.definitions.mechanism.values import coordinates, number, parameter_values, point_names
-from railsim.errors import InputError
+from railsim.errors import InputError, input_error
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 
@@ -69,7 +69,7 @@ class Model:
 
     def refusal(self, key: str, found: str, allowed: str) -> InputError:
         """The error that refuses the mechanism at a key of its file."""
-        return InputError.of(self.definition.name, key, found, allowed)
+        return input_error(self.definition.name, found, allowed, key)
 
     @property
     def axis(self) -> int:

@@ -9,7 +9,7 @@ from railsim.arrays import Floats
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number, parameter_values
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.model import Model, build
@@ -84,7 +84,7 @@ def positions(definition: Mechanism) -> Positions:
         return Positions(s, height, np.full(len(s), np.nan))
     if pair is None:
         found = f"{source.name} has no length of an actuator, or no output"
-        raise InputError.of(definition.name, "optimise", found, "both are needed")
+        raise input_error(definition.name, found, "both are needed", "optimise")
     dense = solve(model, np.linspace(model.start, model.end, DENSE))
     edges = np.array([model.start, model.end])
     if optimise.range == "zone":
@@ -95,7 +95,7 @@ def positions(definition: Mechanism) -> Positions:
         if not np.all(np.isfinite(edges)):
             zone_drivers(dense)
             found = f"{source.name} never reaches it"
-            raise InputError.of(definition.name, "zone", found, "another zone")
+            raise input_error(definition.name, found, "another zone", "zone")
     if optimise.sample == "travel":
         s = np.linspace(edges[0], edges[1], optimise.points)
     else:

@@ -21,7 +21,7 @@ from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, ModelError, argument_fault, nearest
+from railsim.errors import InputError, ModelError, argument_fault, input_error, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
@@ -313,7 +313,7 @@ class _Smooth:
             if not 1.0 / LEVEL < level < LEVEL:
                 found = f"{level:.3g} times what the vehicle reads on '{self.assumed.spectrum}'"
                 allowed = f"1/{LEVEL:g} to {LEVEL:g} times; the 'unit' of all channels, or 'scale'?"
-                raise InputError.of(self.name, "channels", found, allowed)
+                raise input_error(self.name, found, allowed, "channels")
             self._wrong, said = disagreeing(powers, piece, read, self.channels)
             self.said += said
         there = piece.there.copy()

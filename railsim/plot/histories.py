@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
-from railsim.errors import InputError, argument_error
+from railsim.errors import argument_error, input_error
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
 from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels
 from railsim.plot.style import (
@@ -86,7 +86,7 @@ def check_not_empty(result: Result, name: str = "") -> None:
     """Raise InputError where a run ended before its first instant: there is nothing to draw."""
     if not len(result["time"]):
         found = f"holds no instants: {result.status}, {result.attributes.get('status_reason', '')}"
-        raise InputError.of(name or "result", "time", found, "give a run of some length")
+        raise input_error(name or "result", found, "give a run of some length", "time")
 
 
 def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
@@ -94,7 +94,7 @@ def _window(horizontal: Floats, between: tuple[float, float]) -> slice:
     if stop - start < 2:
         found = f"nothing between {between[0]:g} and {between[1]:g}"
         allowed = f"the run goes from {horizontal[0]:.6g} to {horizontal[-1]:.6g}"
-        raise argument_error("between", "", found, allowed)
+        raise argument_error("between", found, allowed)
     return slice(int(start), int(stop))
 
 

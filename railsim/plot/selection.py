@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.notation import Quantity
 from railsim.result import Result
 from railsim.result.labels import known_labels
@@ -113,4 +113,4 @@ def _wanted(
 
 
 def _fault(selection: str, found: str, allowed: str) -> InputError:
-    return InputError.of("QUANTITY", selection, found, allowed)
+    return input_error("QUANTITY", found, allowed, selection)

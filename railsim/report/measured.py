@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.assessment.model_comparison import FAIL, INCOMPLETE, ModelValidation
-from railsim.errors import InputError
+from railsim.errors import input_error
 from railsim.files.access import read_bytes
 from railsim.identification import Identified
 from railsim.identification.identified import correlation_table, parameter_table, residual_table
@@ -168,7 +168,7 @@ def read_part(file: str | Path) -> Part:
     """
     path = _record_of(Path(file))
     if path is None:
-        raise InputError.of(str(file), "", "no record", " or ".join(RECORDS))
+        raise input_error(str(file), "no record", " or ".join(RECORDS))
     try:
         record = json.loads(read_bytes(path, LARGEST_RECORD))
         if path.name == RECORDS[0]:
@@ -177,7 +177,7 @@ def read_part(file: str | Path) -> Part:
     except (ValueError, KeyError, TypeError) as error:
         words = f"{type(error).__name__}: {error}"[:100]
         allowed = "the file as `validate-model` or `identify` has written it"
-        raise InputError.of(str(path), "", words, allowed) from None
+        raise input_error(str(path), words, allowed) from None
 
 
 def _pictures(folder: Path, *names: str) -> list[Drawn]:

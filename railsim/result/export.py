@@ -140,7 +140,7 @@ def _parquet(result: Result, path: Path) -> None:
     except ImportError as error:
         found = f"the package '{error.name}' is not installed"
         allowed = "install it with: pip install pandas pyarrow"
-        raise argument_error("path", "", found, allowed, "--out") from None
+        raise argument_error("path", found, allowed, option="--out") from None
     frame = pandas.DataFrame({name: values for name, _, values in _columns(result)})
     frame.attrs = {"units": {name: unit for name, unit, _ in _columns(result)}}
     with open(path, "wb") as file:

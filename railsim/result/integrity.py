@@ -24,7 +24,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from railsim.errors import InputError
+from railsim.errors import input_error
 
 DIGEST = "digest"
 REMEDY = "it is damaged or was changed since it was written; run it again"
@@ -55,7 +55,7 @@ def sealed(path: Path) -> bool:
         return False
     stated = int(found[1], 16), int(found[2])
     if stated != _crc_of(path, size - _SEAL_BYTES):
-        raise InputError.of(str(path), "", "its bytes are not those of its seal", REMEDY)
+        raise input_error(str(path), "its bytes are not those of its seal", REMEDY)
     return True
 
 

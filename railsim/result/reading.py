@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.files.access import is_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
@@ -69,10 +69,10 @@ def open_result(path: str | Path) -> Result:
     if not is_file(path):
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
         found = "a folder" if os.path.isdir(path) else found
-        raise InputError.of(str(path), "", found, "give a result file (.h5)")
+        raise input_error(str(path), found, "give a result file (.h5)")
     with _readable(path):
         if path.stat().st_size == 0:
-            raise InputError.of(str(path), "", "the file is empty", AS_WRITTEN)
+            raise input_error(str(path), "the file is empty", AS_WRITTEN)
         stamp = _stamp(os.stat(path))
         whole = sealed(path)
         with h5py.File(path, "r") as file:
@@ -93,12 +93,12 @@ def open_run(path: str | Path) -> Result:
         raise InputError([Fault(str(path), name, "missing", AS_WRITTEN) for name in missing])
     if result.status not in STATES:
         found = f"'{result.status}'"
-        raise InputError.of(str(path), "status", found, f"allowed: {', '.join(STATES)}")
+        raise input_error(str(path), found, f"allowed: {', '.join(STATES)}", "status")
     for name in ARRAYS:
         if not np.all(np.isfinite(result[name])):
-            raise InputError.of(str(path), name, "holds what is not finite", REMEDY)
+            raise input_error(str(path), "holds what is not finite", REMEDY, name)
     if np.any(np.diff(result["time"]) <= 0.0):
-        raise InputError.of(str(path), "time", "does not increase", REMEDY)
+        raise input_error(str(path), "does not increase", REMEDY, "time")
     return result
 
 
@@ -171,7 +171,7 @@ def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None
     """
     if _stamp(os.fstat(file.id.get_vfd_handle())) != stamp:
         found = "was replaced or changed after it was opened"
-        raise InputError.of(str(path), "", found, "open it again")
+        raise input_error(str(path), found, "open it again")
 
 
 @contextmanager
@@ -189,7 +189,7 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
         is_hdf5 = isinstance(error, OSError) and "signature not found" in words
         found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
         allowed = "give a result of railsim; " + REMEDY
-        raise InputError.of(str(path), name, found, allowed) from None
+        raise input_error(str(path), found, allowed, name) from None
 
 
 class _Reader:
@@ -202,7 +202,7 @@ class _Reader:
         self._declared = 0  # bytes that arrays say they have
 
     def fault(self, name: str, found: str, allowed: str = AS_WRITTEN) -> InputError:
-        return InputError.of(str(self._path), name, found, allowed)
+        return input_error(str(self._path), found, allowed, name)
 
     def result(self, *, whole: bool) -> Result:
         file = self._file

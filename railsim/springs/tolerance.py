@@ -17,7 +17,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.spring import TrailingArmSuspension
-from railsim.errors import InputError
+from railsim.errors import input_error
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
@@ -79,7 +79,7 @@ def deviations(suspension: TrailingArmSuspension) -> dict[str, float]:
     """The file's tolerances that are not zero, by the dotted name of what deviates."""
     table = suspension.tolerances
     if table is None:
-        raise InputError.of(suspension.name, "tolerances", "missing", "needed: the scatter")
+        raise input_error(suspension.name, "missing", "needed: the scatter", "tolerances")
     every = {
         f"{spring}.{key}": float(getattr(table, key))
         for spring in suspension.springs

@@ -21,7 +21,7 @@ import tomli_w
 from railsim.constants import GRAVITY
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
 from railsim.definitions.vehicle.flatten import FlatVehicle
-from railsim.errors import InputError
+from railsim.errors import input_error
 from railsim.springs.verification import Case, load_cases
 
 LIKELY = (0.75, 1.25)
@@ -66,8 +66,8 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
     """
     table = suspension.vehicle
     if table is None:
-        raise InputError.of(
-            suspension.name, "vehicle", "missing", "needed: where the suspension is mounted"
+        raise input_error(
+            suspension.name, "missing", "needed: where the suspension is mounted", "vehicle"
         )
     name = table.load if load is None else load
     _, (case,) = load_cases(suspension, {name: suspension.loads[name]})

@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension, radial_clearance
 from railsim.design_checks import Check
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, input_error
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
 from railsim.springs.arm import Arm, Coil, CoilState
@@ -195,8 +195,8 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     1.327
     """
     if suspension.fatigue is None:
-        raise InputError.of(
-            suspension.name, "fatigue", "missing", "needed: goodman = [[0, ...], ...]"
+        raise input_error(
+            suspension.name, "missing", "needed: goodman = [[0, ...], ...]", "fatigue"
         )
     _, cases = load_cases(suspension, dynamic_loads(suspension), "fatigue")
     results = {}
