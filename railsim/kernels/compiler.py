@@ -18,6 +18,7 @@ import os
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
 from numba.core import config as _config
@@ -214,7 +215,7 @@ class KernelCache:
             path.unlink(missing_ok=True)
 
 
-def entry(function, *args):
+def entry(function: Any, *args: object) -> Any:
     """Return a compiled function without what finds its types, for arguments of these types.
 
     It has been called with such arguments before.  Numba looks through a `System` for its type,

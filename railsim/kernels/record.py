@@ -46,6 +46,8 @@ class RecordType(types.Type):
 
 
 register_model(RecordType)(models.OpaqueModel)
+# by what decides them: numba takes 10 us for each type of an array
+_types: dict[Any, RecordType] = {}
 
 
 def _size(kind) -> int:
@@ -61,15 +63,16 @@ class Record:
     @cached_property
     def compiled_type(self) -> RecordType:
         """Its type in compiled code."""
-        hints = type(self).__annotations__
         fields: Any = self
-        return RecordType(
-            type(self).__name__,
-            [
-                (name, _kind(value, hints[name], f"{type(self).__name__}.{name}"))
-                for name, value in zip(fields._fields, fields, strict=True)
-            ],
-        )
+        alike = type(self), *map(_shape, fields)
+        if alike not in _types:
+            name, hints = type(self).__name__, type(self).__annotations__
+            kinds = [
+                (field, _kind(value, hints[field], f"{name}.{field}"))
+                for field, value in zip(fields._fields, fields, strict=True)
+            ]
+            _types[alike] = RecordType(name, kinds)
+        return _types[alike]
 
     @cached_property
     def words(self) -> np.ndarray:
@@ -92,6 +95,15 @@ def record(kind: Class) -> Class:
     kept = ("__doc__", "__module__", "__annotations__")
     body = {name: getattr(kind, name) for name in kept}
     return cast(Class, type(kind.__name__, (Record, kind), body))
+
+
+def _shape(value):
+    """What decides the type of a field, beside its hint."""
+    if isinstance(value, Record):
+        return id(value.compiled_type)
+    if isinstance(value, np.ndarray):
+        return value.dtype.char, value.ndim, value.flags.c_contiguous
+    return None
 
 
 def _kind(value, hint, where):

@@ -8,6 +8,7 @@ versions of the libraries that compute, and the processor.
 import hashlib
 import json
 import os
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -22,9 +23,9 @@ from railsim.kernels.cache import own_folder, store, stored
 MOST_STORED = 1000
 """Solutions on disk; the older half of more goes."""
 MOST_NEW = 50
-"""Solutions that a process stores: each run of a large study has an equilibrium of its own."""
+"""Solutions of a kind that a process stores: the runs of a large study each have their own."""
 _SOURCES = ("contact", "definitions", "linear", "model", "profiles", "simulation", "track")
-_new: list[Path] = []
+_new: Counter[str] = Counter()
 
 
 def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -43,8 +44,8 @@ def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dic
         found: dict[str, Any] = json.loads(data)
         return found
     found = solve()
-    if len(_new) < MOST_NEW:
-        _new.append(path)
+    if _new[kind] < MOST_NEW:
+        _new[kind] += 1
         _drop_old(folder)
         store(path, json.dumps(found).encode())
     return found

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from railsim.arrays import Floats
 from railsim.errors import ModelError
+from railsim.kernels.compiler import entry
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
@@ -190,62 +191,59 @@ class Stability:
 def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
     """Largest real part of the eigenvalues of the linearised vehicle [1/s]."""
     work = work_arrays(system)
-    derivative = np.zeros_like(state)
 
-    def rate(trial: Floats) -> Floats:
-        status, _, _ = right_hand_sides(system, work, trial[None], derivative[None])
+    def rates(trials: Floats) -> Floats:
+        derivatives = np.zeros_like(trials)
+        status, _, _ = right_hand_sides(system, work, trials, derivatives)
         if status != RUNNING:
             raise ModelError("the state of steady rolling lies outside the contact table")
-        return derivative.copy()
+        return derivatives
 
-    columns = _jacobian(rate, state, _moving(system, state))
+    columns = _jacobian(rates, state, _moving(system, state))
     return float(np.max(np.linalg.eigvals(columns).real))
 
 
 def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: float) -> float:
     """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails."""
-    work = work_arrays(system)
-    derivative = np.zeros_like(state)
-    stages = np.zeros((3, len(state)))
-    recorder = empty_recorder(model, 1)
+    arrays = system, work_arrays(system)
+    rest = np.zeros_like(state), np.zeros((3, len(state))), empty_recorder(model, 1)
+    one = SCHEMES[scheme], h, Chunk(1, 1, _NEVER)
 
-    def step(trial: Floats) -> Floats:
-        after = trial.copy()
-        status, *_ = time_loop(
-            system,
-            work,
-            after,
-            derivative,
-            stages,
-            recorder,
-            SCHEMES[scheme],
-            h,
-            Chunk(1, 1, _NEVER),
-        )
-        return after if status == RUNNING else np.full_like(after, np.nan)
+    def stepped(trials: Floats) -> Floats:
+        after = trials.copy()
+        loop = time_loop
+        for k, row in enumerate(after):
+            status, *_ = loop(*arrays, row, *rest, *one)
+            if status != RUNNING:
+                after[k] = np.nan
+            if loop is time_loop:  # from now on without a search for types
+                loop = entry(time_loop, *arrays, row, *rest, *one)
+        return after
 
     if system.contact.transient:  # of which steady rolling knows nothing before its first step
-        state = step(state)
+        state = stepped(state[None])[0]
         if not np.isfinite(state).all():
             return np.inf
     # without masses the reference scheme balances the track's forces to 0.01 N only
     iterates = scheme == "rk4" and system.support.elastic and system.support.massless
-    columns = _jacobian(step, state, _moving(system, state), 1e-6 if iterates else 1e-8)
+    columns = _jacobian(stepped, state, _moving(system, state), 1e-6 if iterates else 1e-8)
     if not np.isfinite(columns).all():
         return np.inf
     return float(np.log(np.max(np.abs(np.linalg.eigvals(columns)))) / h)
 
 
-def _jacobian(function, state: Floats, moving: NDArray[np.int64], step: float = 1e-8) -> Floats:  # type: ignore[no-untyped-def]
-    """Jacobian of the entries `moving` by forward differences."""
-    base = function(state)[moving]
-    columns = np.empty((moving.size, moving.size))
-    for column, k in enumerate(moving):
-        trial = state.copy()
-        change = step * max(1.0, abs(state[k]))
-        trial[k] += change
-        columns[:, column] = (function(trial)[moving] - base) / change
-    return columns
+def _jacobian(
+    function: Callable[[Floats], Floats],
+    state: Floats,
+    moving: NDArray[np.int64],
+    step: float = 1e-8,
+) -> Floats:
+    """Jacobian of the entries `moving` by forward differences; the function takes many states."""
+    trials = np.repeat(state[None], moving.size + 1, axis=0)  # the state itself is the first
+    changes = step * np.maximum(1.0, np.abs(state[moving]))
+    trials[np.arange(1, moving.size + 1), moving] += changes
+    found = function(trials)[:, moving]
+    return np.ascontiguousarray(((found[1:] - found[0]) / changes[:, None]).T)
 
 
 def _moving(system: System, state: Floats) -> NDArray[np.int64]:

@@ -1,9 +1,10 @@
 """Step and output interval of a run at any speed.
 
 The longest step that a scheme allows is taken where it is stable for all of a class of runs: at the
-lowest speed and the highest friction of the class.  That is judged once in a process, so that runs
-of a study that differ by little share it.  Where it does not hold, the run's own speed and friction
-are judged.  Either way the step depends on the inputs of the run alone, not on other runs.
+lowest speed and the highest friction of the class.  That is judged once and kept on disk: runs of a
+study that differ by little share it, and so do its processes.  Where it does not hold, the run's
+own speed and friction are judged.  Either way the step depends on the inputs of the run alone, not
+on other runs.
 """
 
 import hashlib
@@ -35,7 +36,7 @@ CLASS = 1.2  # ratio of the speeds of a class
 WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
 MOST_JUDGED = 10_000
-# whether steps hold in classes that have been judged in this process, by a hash of all inputs
+# whether steps hold in classes that this process has judged or read, by a hash of all inputs
 _JUDGED: dict[str, bool] = {}
 
 
@@ -101,7 +102,7 @@ class StepChoice:
     def _choose(self, speed: float, interval: float) -> float:
         requested = self._settings.step
         if requested is None:
-            inputs = f"{self._digest()} {speed!r} {interval!r}"
+            inputs = f"{self._digest(self._model)} {speed!r} {interval!r}"
             step = solution("step", inputs, lambda: {"step": self._stable(speed, interval)})
             return float(step["step"])
         if not self.varies:
@@ -142,9 +143,9 @@ class StepChoice:
         longest = interval / max(1, math.ceil(interval / stability.longest * (1.0 - 1e-9)))
         return longest if self._in_class(speed, longest) else stability.choose(interval)
 
-    def _digest(self) -> str:
-        """Hash of all that the model was made of."""
-        system = self._model.system
+    def _digest(self, model: Model) -> str:
+        """Hash of all that a model with some friction was made of."""
+        system = model.system
         digest = hashlib.sha256(f"{self._inputs} {system.contact.values.shape}".encode())
         digest.update(system.track.rail[:, MU_LEFT : MU_RIGHT + 1, 0].tobytes())
         return digest.hexdigest()
@@ -152,17 +153,19 @@ class StepChoice:
     def _in_class(self, speed: float, step: float) -> bool:
         """Whether a step, with the margin, is stable for the class of a speed and the friction."""
         lowest, model = class_speed(speed), with_class_friction(self._model)
-        digest = hashlib.sha256(f"{self._inputs} {lowest!r} {step!r}".encode())
-        digest.update(model.system.track.rail[:, MU_LEFT : MU_RIGHT + 1, 0].tobytes())
-        key = digest.hexdigest()
+        key = f"{self._digest(model)} {lowest!r} {step!r}"
         if key not in _JUDGED:
             if len(_JUDGED) >= MOST_JUDGED:
                 _JUDGED.clear()
-            try:
-                _JUDGED[key] = self._stability(model, lowest, None).holds(step, MARGIN)
-            except ModelError:  # no steady rolling there: the run's own speed is judged
-                _JUDGED[key] = False
+            found = solution("class", key, lambda: {"holds": self._judged(model, lowest, step)})
+            _JUDGED[key] = bool(found["holds"])
         return _JUDGED[key]
+
+    def _judged(self, model: Model, speed: float, step: float) -> bool:
+        try:
+            return self._stability(model, speed, None).holds(step, MARGIN)
+        except ModelError:  # no steady rolling there: the run's own speed is judged
+            return False
 
     def _stability(self, model: Model, speed: float, state: Floats | None) -> Stability:
         rolling = equilibrium(model, speed).state if state is None else state

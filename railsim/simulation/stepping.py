@@ -317,7 +317,7 @@ class Simulation:
         if self._loop is None:
             nothing = (convoy.ensemble.recorder, convoy.scheme, length, Chunk(1, 0, NEVER))
             time_loop(*arrays, *nothing)
-            self._loop = entry(time_loop, *arrays, *nothing)  # type: ignore[no-untyped-call]
+            self._loop = entry(time_loop, *arrays, *nothing)
         if not self._records:
             first, every = first + 1, NEVER
         chunk = Chunk(first, steps, every, int(convoy.fresh), 0, self._rows)
