@@ -194,6 +194,13 @@ class Faults(list[Fault]):
         except InputError as error:
             self.extend(error.faults)
 
+    def require(
+        self, right: object, parameter: str, found: str, allowed: str, option: str | None = None
+    ) -> None:
+        """Add the fault of an argument that is not right, see `argument_fault`."""
+        if not right:
+            self.append(argument_fault(parameter, "", found, allowed, option))
+
     def check(self) -> None:
         """Raise them as an `InputError`, if there are any."""
         if self:

@@ -20,6 +20,7 @@ mechanism      planar linkages, a package
 spring         coil springs on trailing arms
 settings       settings files: how to compute, not what
 measurement    measured runs
+embedding      files that others name
 section_files  lists of profile sections along a rail or around a wheel
 limits, wear_law, published  limit values, laws of wear, published results, each with its source
 mirror         mirror images of vehicles and tracks

@@ -10,6 +10,7 @@ values beyond 1 are taken for millimetres.
 
 import csv
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions.embedding import embed, tables_of
 from railsim.errors import Fault, InputError, input_error
 from railsim.files.access import TABLE_BYTES, is_file, read_text
 from railsim.text import LONGEST_FILE, shortened
@@ -189,37 +191,22 @@ def _checked(file: Path, points: Floats) -> Floats:
 
 def embed_wheel_sections(data: dict[str, Any]) -> list[Fault]:
     """Replace `file` by what it holds for every wheel with sections in the tables of a vehicle."""
-    faults: list[Fault] = []
-    _embed(data, "", faults)
-    return faults
+    return embed(_uneven(data), "", "a list of sections, .slcw", _embed)
 
 
-def _embed(group: Any, key: str, faults: list[Fault]) -> None:
-    for name, wheelset in _tables(group, "wheelsets"):
-        for part, table in _tables(wheelset, "out_of_round"):
-            where = f"{key}wheelsets.{name}.out_of_round.{part}.file"
-            if table.get("type") != "sections" or not isinstance(table.get("file"), str):
-                continue
-            if not is_file(table["file"]):
-                shown = shortened(table["file"], LONGEST_FILE)
-                faults.append(Fault("", where, f"no file '{shown}'", "a list of sections, .slcw"))
-                continue
-            try:
-                found = wheel_heights(read_sections(table["file"], "wheel"))
-            except InputError as error:
-                faults += error.faults
-                continue
-            del table["file"]
-            table |= dict(zip(("angles", "positions", "heights"), found, strict=True))
-    for name, assembly in _tables(group, "assemblies"):
-        _embed(assembly, f"{key}assemblies.{name}.", faults)
+def _uneven(group: Any) -> Iterator[tuple[str, Any]]:
+    for at, wheelset in tables_of(group, "wheelsets"):
+        for key, table in tables_of(wheelset, "out_of_round"):
+            if table.get("type") == "sections":
+                yield f"{at}.{key}", table
+    for at, assembly in tables_of(group, "assemblies"):
+        yield from ((f"{at}.{key}", table) for key, table in _uneven(assembly))
 
 
-def _tables(group: Any, key: str) -> list[tuple[str, dict[str, Any]]]:
-    inner = group.get(key) if isinstance(group, dict) else None
-    if not isinstance(inner, dict):
-        return []
-    return [(name, table) for name, table in inner.items() if isinstance(table, dict)]
+def _embed(_: str, table: dict[str, Any]) -> None:
+    found = wheel_heights(read_sections(table["file"], "wheel"))
+    del table["file"]
+    table |= dict(zip(("angles", "positions", "heights"), found, strict=True))
 
 
 SMOOTHING_ACROSS = 5e-9  # m3

@@ -10,7 +10,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.laws import Law
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, Faults
 
 D = TypeVar("D", Vehicle, Track)
 PERMITTED = "RAILSIM_LAWS"
@@ -60,18 +60,12 @@ def refused(definition: Vehicle | Track | Settings) -> list[str]:
 def check_laws(laws: Iterable[tuple[str, Law]]) -> None:
     """Raise InputError with all of some named laws that are not permitted."""
     allowed = "--allow-code, or --law FILE with this file; in Python allow_code=True"
-    faults = dict.fromkeys(
-        Fault(
-            "laws",
-            name,
-            f"'{name}' is code of {law.file or 'a result'}, which is not executed",
-            allowed,
-        )
+    words = "is code of {}, which is not executed"
+    Faults(
+        Fault("laws", name, f"'{name}' {words.format(law.file or 'a result')}", allowed)
         for name, law in laws
         if not is_allowed(law.source or "")
-    )
-    if faults:
-        raise InputError(faults)
+    ).check()
 
 
 def permitted_part(definition: D) -> D:

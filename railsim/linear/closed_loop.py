@@ -26,7 +26,7 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.system import TIME, System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.coordinates import FreeVehicle
-from railsim.linear.system import Linearisation
+from railsim.linear.system import Linearisation, without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.model.control import with_control
 from railsim.model.time_step import empty_recorder
@@ -81,12 +81,9 @@ def closed_loop(
     names = (*free.coordinates.names, *(f"{a}.delay" for a in prepared.model.index.actuators))
     state = np.concatenate([free.x, np.zeros(m)])
     w = free.coordinates.forceless
-    if len(w):  # rates of rails without mass follow from the balance of forces
-        y = np.setdiff1d(np.arange(n + m), w)
-        solved = np.linalg.solve(matrix[np.ix_(w, w)], matrix[np.ix_(w, y)])
-        matrix = matrix[np.ix_(y, y)] - matrix[np.ix_(y, w)] @ solved
-        names, state = tuple(names[k] for k in y), state[y]
-    return Linearisation(names, matrix, state, speed)
+    kept = np.setdiff1d(np.arange(n + m), w)
+    names, state = tuple(names[k] for k in kept), state[kept]
+    return Linearisation(names, without_forceless(matrix, w), state, speed)
 
 
 def _commanded(free: FreeVehicle) -> Floats:

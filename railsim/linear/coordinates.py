@@ -19,7 +19,7 @@ from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import FREE, N_SCALARS, SPEED, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
-from railsim.linear.system import Linearisation, jacobian
+from railsim.linear.system import Linearisation, jacobian, without_forceless
 from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
@@ -208,17 +208,10 @@ class FreeVehicle:
 
         Of such a rail B_y y + B_w w = 0 is the balance of forces, w its rate: w = -B_w^-1 B_y y.
         """
-        c, x = self.coordinates, self.x
-        w = c.forceless
-        if len(w):
-            y = np.setdiff1d(np.arange(len(c.names)), w)
-            solved = np.linalg.solve(matrix[np.ix_(w, w)], matrix[np.ix_(w, y)])
-            # their rate stands in the equations of the displacements as well as in all others
-            matrix = matrix[np.ix_(y, y)] - matrix[np.ix_(y, w)] @ solved
-            return Linearisation(
-                tuple(c.names[k] for k in y), matrix, x[y], float(self.state[SPEED])
-            )
-        return Linearisation(c.names, matrix, x, float(self.state[SPEED]))
+        c, matrix = self.coordinates, without_forceless(matrix, self.coordinates.forceless)
+        kept = np.setdiff1d(np.arange(len(c.names)), c.forceless)
+        names = tuple(c.names[k] for k in kept)
+        return Linearisation(names, matrix, self.x[kept], float(self.state[SPEED]))
 
     def linearised(self) -> Linearisation:
         """Linearise about the state of steady rolling; the parameter is the speed."""

@@ -14,8 +14,6 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.kernels.internal import PAD
-from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.step_rk4 import settle_limits
 from railsim.kernels.system import System
 from railsim.linear.steady import NotConverged, SteadyRolling
@@ -54,7 +52,7 @@ class Sliding(SteadyRolling):
         """Derivatives of several states, one a row; friction forces are put into the states."""
         derivatives = np.empty_like(states)
         for state, derivative in zip(states, derivatives, strict=True):
-            self._evaluate_one(state, derivative)
+            derivative[:] = super()._evaluated(state[None])
             if self._since is not None and len(self._pads):
                 stiffness = self.system.internal.parameter[self._pads, 0]
                 moved = self.deflection() - self._since.deflection
@@ -62,16 +60,8 @@ class Sliding(SteadyRolling):
                 settle_limits(
                     self.system.internal, self.system.curves, self._first, self.work.drive, state
                 )
-                self._evaluate_one(state, derivative)
+                derivative[:] = super()._evaluated(state[None])
         return derivatives
-
-    def _evaluate_one(self, state: Floats, derivative: Floats) -> None:
-        status, where, self.patches = right_hand_sides(
-            self.system, self.work, state[None], derivative[None]
-        )
-        if status != RUNNING:
-            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
-            raise NotConverged(f"no steady state: {sentence}")
 
     def deflection(self) -> Floats:
         """Deflections of the pads in the state evaluated last, float64[pad] [m]."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from railsim.arrays import Floats
 
@@ -40,3 +41,16 @@ def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats)
     """
     ahead, behind = (function(state + sign * np.diag(steps)) for sign in (1.0, -1.0))
     return np.asarray(((ahead - behind) / (2.0 * steps[:, None])).T)
+
+
+def without_forceless(matrix: Floats, w: NDArray[np.int64]) -> Floats:
+    """Eliminate the rates `w` of rails without mass, which follow from the balance of forces.
+
+    A rate stands in the equation of its displacement as well as in all others; further rows are
+    outputs, further columns inputs.
+    """
+    if not len(w):
+        return matrix
+    y, columns = (np.setdiff1d(np.arange(size), w) for size in matrix.shape)
+    solved = np.linalg.solve(matrix[np.ix_(w, w)], matrix[np.ix_(w, columns)])
+    return np.asarray(matrix[np.ix_(y, columns)] - matrix[np.ix_(y, w)] @ solved)

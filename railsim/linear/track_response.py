@@ -32,6 +32,7 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import System
 from railsim.linear.circle import POSITION
 from railsim.linear.coordinates import Coordinates, FreeVehicle
+from railsim.linear.system import without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.result.sensors import Sensor
 
@@ -152,7 +153,7 @@ def track_response(
                     ends.append(evaluated(x))
                 columns.append((ends[0] - ends[1]) / (2.0 * step))
         rail[cell] = smooth
-    whole = _without_forceless(np.transpose(columns), c.forceless)
+    whole = without_forceless(np.transpose(columns), c.forceless)
     steady = evaluated(x)[len(x) :]
     steady = np.concatenate([steady, steady[len(steady) // 2 :].reshape(-1, 2).sum(axis=1)])
     guiding = whole[-2 * len(offsets) :].reshape(len(offsets), 2, -1)
@@ -218,15 +219,6 @@ def _velocity(c: Coordinates, body: int, component: int) -> int:
 def _power(order: int, u: float) -> Floats:
     """Coefficients of (v - u)^order / order! over v, by rising powers."""
     return np.array(([1.0], [-u, 1.0], [0.5 * u * u, -u, 0.5])[order])
-
-
-def _without_forceless(whole: Floats, w: NDArray[np.int64]) -> Floats:
-    """Eliminate the rates of rails without mass, whose forces balance (see `FreeVehicle`)."""
-    if not len(w):
-        return whole
-    rows, columns = (np.setdiff1d(np.arange(size), w) for size in whole.shape)
-    solved = np.linalg.solve(whole[np.ix_(w, w)], whole[np.ix_(w, columns)])
-    return np.asarray(whole[np.ix_(rows, columns)] - whole[np.ix_(rows, w)] @ solved)
 
 
 def _readings(

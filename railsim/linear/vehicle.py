@@ -13,7 +13,7 @@ from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, ModelError, argument_error, argument_fault
+from railsim.errors import Faults, ModelError, argument_error
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
 from railsim.linear.circle import POSITION, circle, left_out
@@ -80,30 +80,16 @@ class Contact:
     amplitude: float = AMPLITUDE
     conicity: float | None = None
 
-    def faults(self) -> list[Fault]:
+    def faults(self) -> Faults:
         """Return what is wrong with it."""
-        low, high = CONICITIES
-        checks = (
-            (
-                self.linearisation in LINEARISATIONS,
-                "linearisation",
-                f"found '{self.linearisation}'",
-                " or ".join(LINEARISATIONS),
-            ),
-            (
-                math.isfinite(self.amplitude) and self.amplitude > 0.0,
-                "amplitude",
-                f"found {self.amplitude:g} m",
-                "a positive number of m",
-            ),
-            (
-                self.conicity is None or low <= self.conicity <= high,
-                "conicity",
-                f"found {self.conicity}",
-                f"{low:g} to {high:g}",
-            ),
-        )
-        return [argument_fault(name, "", *words) for right, name, *words in checks if not right]
+        faults, (low, high), size = Faults(), CONICITIES, self.amplitude
+        known, found = self.linearisation in LINEARISATIONS, f"found '{self.linearisation}'"
+        faults.require(known, "linearisation", found, " or ".join(LINEARISATIONS))
+        positive, found = math.isfinite(size) and size > 0.0, f"found {size:g} m"
+        faults.require(positive, "amplitude", found, "a positive number of m")
+        inside = self.conicity is None or low <= self.conicity <= high
+        faults.require(inside, "conicity", f"found {self.conicity}", f"{low:g} to {high:g}")
+        return faults
 
     def record(self) -> dict[str, Any]:
         """Return it as plain data; an amplitude where it counts."""
@@ -152,12 +138,9 @@ class LinearVehicle:
     ) -> None:
         self.contact = contact or Contact()
         faults = self.contact.faults()
-        if not abs(radius) >= 5.0:
-            faults.append(argument_fault("radius", "", f"found {radius:g} m", "5 m at least"))
-        if not abs(cant) <= 0.5:
-            faults.append(argument_fault("cant", "", f"found {cant:g} m", "0.5 m at most"))
-        if faults:
-            raise InputError(faults)
+        faults.require(abs(radius) >= 5.0, "radius", f"found {radius:g} m", "5 m at least")
+        faults.require(abs(cant) <= 0.5, "cant", f"found {cant:g} m", "0.5 m at most")
+        faults.check()
         check_types([vehicle], track)
         self.held, self.name = held, vehicle.name
         self.curvature, self.cant = 1.0 / radius if math.isfinite(radius) else 0.0, cant

@@ -13,7 +13,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, ModelError, argument_fault
+from railsim.errors import Faults, InputError, ModelError
 from railsim.linear.eigenmodes import (
     SEARCHED,
     Eigenmodes,
@@ -151,32 +151,28 @@ def _checked(
 ) -> tuple[float, float]:
     """Return lowest and highest speed [m/s]; raise InputError with all faults of the arguments."""
     low, high = map(speed_in_si, speeds)
-    faults = []
-
-    def check(right: bool, name: str, found: str, allowed: str, option: str | None = None) -> None:
-        if not right:
-            faults.append(argument_fault(name, "", found, allowed, option))
-
+    faults = Faults()
     unknown = next((method for method in methods if method not in METHODS), None)
-    check(unknown is None, "methods", f"found '{unknown}'", " or ".join(METHODS), "--method")
+    faults.require(
+        unknown is None, "methods", f"found '{unknown}'", " or ".join(METHODS), "--method"
+    )
     least, most = SPEED_RANGE
     for name, option, value in (("low", "--from", low), ("high", "--to", high)):
         inside = isinstance(value, Real) and least <= float(value) <= most
-        check(inside, name, f"found {value!r}", f"{least:g} to {most:g} m/s", option)
+        faults.require(inside, name, f"found {value!r}", f"{least:g} to {most:g} m/s", option)
     if not faults:
         words = f"less than the highest, {high:g} m/s"
-        check(low < high, "low", f"found {low:g} m/s", words, "--from")
-    check(2 <= points <= 200, "points", f"found {points}", "2 to 200")
+        faults.require(low < high, "low", f"found {low:g} m/s", words, "--from")
+    faults.require(2 <= points <= 200, "points", f"found {points}", "2 to 200")
     wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
-    check(
-        bool(len(excitations)) and not wrong,
+    faults.require(
+        len(excitations) and not wrong,
         "excitations",
         f"found {wrong[0]:g} m" if wrong else "no size",
         f"{SMALL:g} to {LARGEST_EXCITATION:g} m",
         "--excitation",
     )
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return float(low), float(high)
 
 

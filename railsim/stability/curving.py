@@ -21,7 +21,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, ModelError, argument_fault
+from railsim.errors import Faults, ModelError
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
@@ -258,32 +258,28 @@ def _friction(track: Track) -> float:
 def _check(
     radius: Sequence[float], cant: float, deficiency: Sequence[float], friction: Sequence[float]
 ) -> None:
-    faults = []
-
-    def check(right: bool, name: str, found: str, allowed: str) -> None:
-        if not right:
-            faults.append(argument_fault(name, "", found, allowed))
-
+    faults = Faults()
     least = f"{SMALLEST_RADIUS:g} m at least, negative to the left"
     for value in radius:
         right = math.isfinite(value) and abs(value) >= SMALLEST_RADIUS
-        check(right, "radius", f"found {value:g} m", least)
-    check(0.0 <= cant <= LARGEST_CANT, "cant", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m")
+        faults.require(right, "radius", f"found {value:g} m", least)
+    faults.require(
+        0.0 <= cant <= LARGEST_CANT, "cant", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"
+    )
     for value in friction:
-        check(0.0 < value <= 2.0, "friction", f"found {value:g}", "above 0, at most 2")
+        faults.require(0.0 < value <= 2.0, "friction", f"found {value:g}", "above 0, at most 2")
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
-        check(
+        faults.require(
             math.isfinite(value) and all(low <= v <= high for v in speeds),
             "cant_deficiency",
             f"found {value:g} m with a cant of {cant:g} m",
             f"a sum that gives speeds of {low:g} to {high:g} m/s",
         )
     for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
-        check(bool(len(values)), name, "no value", "one at least")
-    if faults:
-        raise InputError(faults)
+        faults.require(len(values), name, "no value", "one at least")
+    faults.check()
 
 
 def _speed(radius: float, cant: float, deficiency: float) -> float:

@@ -28,7 +28,7 @@ from railsim.definitions.loading import load_running_limits, load_track, load_ve
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_error, input_error
+from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.files.access import check_folder, write_text
 from railsim.result import Result, open_result
 from railsim.studies.carry_out import carry_out
@@ -204,8 +204,7 @@ def recorded(recording: str | Path) -> Track:
     if str(recording).lower().endswith(".csv"):
         irregular = [{"type": "measured", "file": str(Path(recording).resolve())}]
         data: dict[str, Any] = {"irregularities": irregular}
-        if faults := embed_measured(data):
-            raise InputError(faults)
+        Faults(embed_measured(data)).check()
         length = float(data["irregularities"][0]["rows"][-1][0])
         straight = load_track("straight")
         return straight.replace(

@@ -16,7 +16,7 @@ from railsim.cant import curve_speed
 from railsim.definitions.loading import load_running_limits, load_scenario, load_vehicle
 from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, RailsimError
+from railsim.errors import Fault, Faults, InputError, RailsimError
 from railsim.files.access import check_folder
 from railsim.processes import available_cores
 from railsim.result import Result, open_result
@@ -95,7 +95,7 @@ def scenario_cases(
 
     Raises InputError: all faults of all runs.
     """
-    faults: list[Fault] = []
+    faults = Faults()
     cases: list[Case] = []
     axes = [vehicles, _conditions(scenario), list(scenario.parts), *scenario.grid.values()]
     check_number(axes, available_cores(), lambda: ROUGH_DURATION)
@@ -144,8 +144,7 @@ def scenario_cases(
                 track=scaled_radii(case.track, part.speed, service),
             )  # fmt: skip
             cases += repeated(case, limits, service, number) if limits else [case]
-    if faults:
-        raise InputError(dict.fromkeys(faults))
+    Faults(dict.fromkeys(faults)).check()
     return cases
 
 

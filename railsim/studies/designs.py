@@ -12,7 +12,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Constraint, Objective, Optimise, Value, Variable
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, Faults, nearest
 from railsim.studies.outcome import Outcome
 from railsim.studies.records import Record
 from railsim.studies.search import Values
@@ -233,7 +233,7 @@ def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
     if not rows:
         return
     known = {name for _, cells in rows for name, v in cells.items() if isinstance(v, int | float)}
-    faults = []
+    faults = Faults()
     for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints)):
         for number, one in enumerate(ones):
             key = f"optimise.{table}.{number}"
@@ -242,8 +242,7 @@ def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
                 faults.append(Fault(INPUTS, f"{key}.quantity", found, nearest(one.quantity, known)))
             elif not _values(one, rows):
                 faults.append(Fault(INPUTS, f"{key}.where", "no run has these labels", ""))
-    if faults:
-        raise InputError(faults)
+    faults.check()
 
 
 def name_of(one: Value) -> str:

@@ -11,7 +11,7 @@ from itertools import product
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import needs_run
 from railsim.definitions.study.definition import value_texts
-from railsim.errors import Fault, InputError, argument_error, argument_fault, input_error
+from railsim.errors import Fault, Faults, InputError, argument_error, argument_fault, input_error
 from railsim.studies.case import Case, Loader, run_labels, run_name
 from railsim.studies.points import Fingerprints, Point, check_number, point_key
 from railsim.studies.rows import PERMITTED, Row, made_rows
@@ -141,8 +141,7 @@ class Cases:
             Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
             for c in cases
         ]
-        if faults := name_faults(self.points):
-            raise InputError(faults)
+        Faults(name_faults(self.points)).check()
 
     def cases(self, points: Sequence[Point]) -> list[Case]:
         """Return the cases of some points."""

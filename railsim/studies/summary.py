@@ -18,7 +18,7 @@ from typing import Annotated, Any, BinaryIO, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from railsim.definitions.study.analyses import unit_of_number
-from railsim.errors import Fault, InputError, RailsimError, input_error, words_of
+from railsim.errors import Fault, Faults, RailsimError, input_error, words_of
 from railsim.files.access import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
@@ -160,7 +160,7 @@ def check_index(path: Path) -> Index:
     """
     index = read_index(path)
     allowed = "the same study with `resume` computes it again"
-    faults = []
+    faults = Faults()
     for run in index.runs:
         if run.status in NOT_DONE or not run.file:
             continue
@@ -170,8 +170,7 @@ def check_index(path: Path) -> Index:
             faults.append(
                 Fault(str(path), run.file, "the result is missing", allowed, option=str(path))
             )
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return index
 
 

@@ -27,7 +27,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.track.tables import Straight
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import Fault, InputError, ModelError, RailsimError, input_error
+from railsim.errors import Fault, Faults, InputError, ModelError, RailsimError, input_error
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.hunting import HUNTS
@@ -295,20 +295,17 @@ def _profile_name(vehicle: Vehicle) -> str:
 
 
 def _check(runs: Sequence[Run], how: Loop) -> None:
-    faults = []
-    if not runs:
-        faults.append(Fault("wear", "routes", "no route", "at least one"))
+    faults = Faults()
+    faults += [Fault("wear", "routes", "no route", "at least one")] * (not runs)
     for run in runs:
         if not (run.share > 0.0 and math.isfinite(run.share)):
-            faults.append(
-                Fault("wear", "share", f"found {run.share:g} for {run.track.name}", "above 0")
-            )
+            found = f"found {run.share:g} for {run.track.name}"
+            faults.append(Fault("wear", "share", found, "above 0"))
     if not (how.step > 0.0 and math.isfinite(how.step)):
         faults.append(Fault("wear", "step", f"found {how.step:g} m", "above 0"))
     if how.steps < 1:
         faults.append(Fault("wear", "steps", f"found {how.steps}", "1 or more"))
-    if faults:
-        raise InputError(faults)
+    faults.check()
 
 
 def _file_name(

@@ -13,12 +13,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from railsim.arrays import Floats
+from railsim.definitions.embedding import embed, tables_of
 from railsim.definitions.excitations.base import COLUMNS
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
-from railsim.errors import Fault, InputError, counted, nearest
-from railsim.files.access import TABLE_BYTES, is_file, read_bytes
-from railsim.text import LONGEST_FILE, shortened
+from railsim.errors import Fault, Faults, InputError, counted, input_error, nearest
+from railsim.files.access import TABLE_BYTES, read_bytes
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
 # what a column adds to y_left, z_left, y_right, z_right
@@ -45,32 +45,22 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
 
     `data`: a track as plain tables; changed in place. Returns: what is wrong in the files.
     """
-    faults = []
-    listed = data.get("irregularities")
-    for index, table in enumerate(listed if isinstance(listed, list) else []):
-        if not isinstance(table, dict) or not isinstance(table.get("file"), str):
-            continue
-        if "rows" in table:
-            continue  # refused by the definition: either one or the other
-        path = Path(table["file"])
-        key = f"irregularities.{index}.file"
-        if not is_file(path):
-            shown = shortened(table["file"], LONGEST_FILE)
-            faults.append(Fault("", key, f"no file '{shown}'", "a CSV beside the track file"))
-            continue
-        if path.suffix.lower() != ".csv":
-            faults.append(Fault("", key, f"'{path.name}' is no CSV", "the name must end in .csv"))
-            continue
-        how = _definition(table)
-        if how is None:
-            continue  # refused by the definition
-        rows, wrong = read_measured(path, how)
-        faults += wrong
-        if not wrong:
-            for key in ("file", *READING):
-                table.pop(key, None)
-            table["rows"] = [list(row) for row in rows]
-    return faults
+    return embed(tables_of(data, "irregularities"), "rows", "a CSV beside the track file", _embed)
+
+
+def _embed(key: str, table: dict[str, Any]) -> None:
+    path = Path(table["file"])
+    if path.suffix.lower() != ".csv":
+        found = f"'{path.name}' is no CSV"
+        raise input_error("", found, "the name must end in .csv", key=f"{key}.file")
+    how = _definition(table)
+    if how is None:
+        return  # refused by the definition
+    rows, wrong = read_measured(path, how)
+    Faults(wrong).check()
+    for name in ("file", *READING):
+        table.pop(name, None)
+    table["rows"] = [list(row) for row in rows]
 
 
 def _definition(table: dict[str, Any]) -> Measured | None:

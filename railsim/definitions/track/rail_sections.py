@@ -6,11 +6,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field
 
 from railsim.definitions.base import Definition, Finite, Text, check
+from railsim.definitions.embedding import embed, tables_of
 from railsim.definitions.section_files import MOST_SECTIONS, read_sections
 from railsim.definitions.track.check_rail import OTHER
-from railsim.errors import Fault, InputError
-from railsim.files.access import is_file
-from railsim.text import LONGEST_FILE, shortened
+from railsim.errors import Fault
 
 Coordinates = Annotated[tuple[Finite, ...], Field(min_length=8, max_length=2000)]
 MOST_RANGES = 50
@@ -126,30 +125,18 @@ class RailSections(Definition):
 
 def embed_rail_sections(data: dict[str, Any]) -> list[Fault]:
     """Replace `file` by the `contours` that it holds in the sections of a track's tables."""
-    faults: list[Fault] = []
-    listed = data.get("sections")
-    for index, table in enumerate(listed if isinstance(listed, list) else []):
-        if not isinstance(table, dict) or not isinstance(table.get("file"), str):
-            continue
-        if "contours" in table:
-            continue  # refused by the definition
-        if not is_file(table["file"]):
-            shown = shortened(table["file"], LONGEST_FILE)
-            key = f"sections.{index}.file"
-            faults.append(Fault("", key, f"no file '{shown}'", "a list of sections, .slcs or .csv"))
-            continue
-        try:
-            found = read_sections(table["file"], "rail")
-        except InputError as error:
-            faults += error.faults
-            continue
-        del table["file"]
-        table["contours"] = [
-            {"s": round(s, 6), "y": _written(points[0]), "z": _written(points[1])}
-            for s, points in zip(found.positions.tolist(), found.points, strict=True)
-            if _needed(s, found.positions.tolist(), table)
-        ]
-    return faults
+    allowed = "a list of sections, .slcs or .csv"
+    return embed(tables_of(data, "sections"), "contours", allowed, _embed)
+
+
+def _embed(_: str, table: dict[str, Any]) -> None:
+    found = read_sections(table["file"], "rail")
+    del table["file"]
+    table["contours"] = [
+        {"s": round(s, 6), "y": _written(points[0]), "z": _written(points[1])}
+        for s, points in zip(found.positions.tolist(), found.points, strict=True)
+        if _needed(s, found.positions.tolist(), table)
+    ]
 
 
 def _written(values: Any) -> list[float]:
