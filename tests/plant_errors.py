@@ -21,7 +21,6 @@ import sys
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -51,9 +50,11 @@ def changes(path: Path) -> Iterator[Planted]:
     idle = _idle_lines(ast.parse(source))
     with path.open("rb") as file:
         tokens = list(tokenize.tokenize(file.readline))
-    for before, token in pairwise(tokens):
+    for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
         line, column = token.start
-        if line in idle:
+        # a star alone or in front of a sequence multiplies nothing
+        star = token.string == "*" and (before.string in "([{," or after.string == ",")
+        if line in idle or star:
             continue
         now = SWAPPED.get(token.string)
         if token.string in "+-" and before.string in ("(", "[", ",", "=", "return", ":"):
@@ -62,8 +63,6 @@ def changes(path: Path) -> Iterator[Planted]:
             now = repr(float(token.string) * 1.2 if float(token.string) else 1.0)
         elif token.type == tokenize.NUMBER and token.string.isdigit():
             now = str(int(token.string) + 1)
-        if token.string in ("*", "**") and before.string in ("(", ","):
-            now = None
         if now is not None:
             yield Planted(str(path.relative_to(ROOT)), line, column, token.string, now)
 

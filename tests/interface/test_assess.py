@@ -252,6 +252,15 @@ def test_wear_of_a_known_wear_number():
     assert left.percentiles["95"] == pytest.approx(65.0, abs=left.bound)
 
 
+def with_patches(whole, patches):
+    """A run with quantities of its contact patches."""
+    return Result(
+        {name: whole[name] for name in whole} | patches,
+        dict(whole.quantities) | {name: REQUESTED[name] for name in patches},
+        dict(whole.coordinates) | {"patch": PATCHES}, whole.attributes, whole.profiles,
+    )  # fmt: skip
+
+
 def test_laws_of_wear_hold_for_each_patch():
     """150 N and 50 N on 12.57 mm2 each, D 920 mm, by hand.
 
@@ -266,17 +275,32 @@ def test_laws_of_wear_hold_for_each_patch():
         "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
         "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
     }  # fmt: skip
-    run = Result(
-        {name: whole[name] for name in whole} | patches,
-        dict(whole.quantities) | {name: REQUESTED[name] for name in patches},
-        dict(whole.coordinates) | {"patch": PATCHES}, whole.attributes, whole.profiles,
-    )  # fmt: skip
-    (found,) = assess(run, "wear")
+    (found,) = assess(with_patches(whole, patches), "wear")
     wheel = next(iter(found.wear.values()))[0]
     assert wheel.worn_area["pearce_sherratt"] == pytest.approx(37.5 / 920.0 * 1e-9)
     mass = (55.0 * np.pi * 2.0**2 + 5.3 * 50.0) * 1e-9  # kg/m
     assert wheel.worn_area["usfd"] == pytest.approx(mass / (7850.0 * np.pi * 0.92))
     assert wheel.rail_damage == pytest.approx(7e-6)
+
+
+def test_surface_fatigue_is_that_of_the_worst_patch():
+    """FI = T/N - 2 pi a b k/(3 N) (Ekberg 2002), and where it lies in the shakedown map."""
+    whole = made(track(STRAIGHT), FAST)
+    zero = np.zeros((*whole.T_gamma.shape, 3))
+    T = zero.copy()
+    T[:, :, 0, 0], T[:, :, 1, 2] = 4e3, 12e3
+    patches = {
+        "patch_T_gamma": zero, "patch_N": zero + 40e3, "patch_a": zero + 4e-3,
+        "patch_b": zero + 3e-3, "patch_T_x": -T, "patch_T_y": zero,
+    }  # fmt: skip
+    run = with_patches(whole, patches)
+    (found,) = assess(run, "wear")
+    p0 = 1.5 * 40e3 / (np.pi * 4e-3 * 3e-3)
+    left, right = next(iter(found.wear.values()))[:2]
+    for wheel, T_over_N in ((left, 0.1), (right, 0.3)):
+        assert wheel.utilised_friction == pytest.approx(T_over_N)
+        assert wheel.pressure_ratio * (T_over_N - wheel.fatigue_index) == pytest.approx(1.0)
+        assert wheel.fatigue_index == pytest.approx(T_over_N - 300e6 / p0)
 
 
 def test_command_prints_writes_and_fails_only_when_asked(hunting, tmp_path, capsys):

@@ -9,7 +9,7 @@ import railsim
 from railsim.cli import main
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
-from railsim.studies.geometry_limits import Flags, RecordedGeometry
+from railsim.studies.geometry_limits import GEOMETRY, Flags, RecordedGeometry
 from railsim.track.irregularity import displacement
 
 LENGTH, SPEED, DEFECT = 1000.0, 40.0, 640.0
@@ -133,3 +133,20 @@ def test_sections_are_counted_by_hand():
     assert [r["vehicles"] for r in records] == ["flagged", "flagged", "", "not run", "flagged"]
     assert [r["geometry"] for r in records] == ["flagged", "", "", "", ""]
     assert records[-1]["end"] == pytest.approx(1060.0)
+
+
+def test_limits_of_geometry_are_the_least_of_en_13848_5():
+    """Ranges of the standard, from memory, D1 [mm], up to a speed [km/h].
+
+    Alert limits of standard deviations and intervention limits of isolated defects, of level and
+    alignment each.
+    """
+    ranges = {
+        80: ((2.3, 3.0), (1.5, 1.8), (17, 21), (15, 17)),
+        120: ((1.8, 2.7), (1.2, 1.5), (13, 19), (11, 13)),
+        160: ((1.4, 2.4), (1.0, 1.3), (10, 17), (8, 11)),
+        230: ((1.2, 1.9), (0.8, 1.1), (9, 14), (7, 9)),
+        300: ((1.0, 1.5), (0.7, 1.0), (8, 12), (6, 8)),
+    }
+    least = [(speed, *(low for low, _ in row)) for speed, row in ranges.items()]
+    assert least == list(GEOMETRY)

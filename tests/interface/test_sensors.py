@@ -73,6 +73,15 @@ def test_velocity_is_the_rate_of_the_displacement_and_acceleration_that_of_the_v
             assert error < 0.06 * np.max(np.abs(rate)) + 1e-3
 
 
+def test_roll_rate_is_the_rate_of_the_roll():
+    """On straight track, by central differences over 2 ms, from 50 ms on; it does not pitch so."""
+    body, time = run().bodies.index("carbody"), run()["time"]
+    rates = np.gradient(run()["body_position"][:, body, 3:5], time, axis=0)[50:-3]
+    largest = np.max(np.abs(rates), axis=0)
+    assert largest[0] > 10.0 * largest[1]
+    assert of("seat", "roll_rate")[50:-3] == pytest.approx(rates[:, 0], abs=1e-3 * largest[0])
+
+
 def test_an_accelerometer_feels_gravity_and_the_absolute_acceleration_does_not():
     """At rest on 50 mm of cant it reads g sin(cant angle) to the left, towards the lower side."""
     difference = of("seat", "acceleration") - of("seat", "absolute_acceleration")

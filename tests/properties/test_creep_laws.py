@@ -29,6 +29,13 @@ def test_force_never_exceeds_friction(law, ratio, xi_x, xi_y, phi):
 
 
 @law
+@pytest.mark.parametrize("missing", ["N", "mu"])
+def test_no_force_without_load_or_friction(law, missing):
+    force = creep_force(**patch(2.0) | {missing: 0.0}, xi_x=1e-3, xi_y=-2e-3, phi=0.3, law=law)
+    assert np.abs(force).max() == 0.0
+
+
+@law
 @settings(deadline=None, max_examples=60)
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_reversed_creepages_reverse_the_force(law, ratio, xi_x, xi_y, phi):

@@ -1,9 +1,11 @@
 """Laws that hold for every track: unit arc length, heading, mirror image, text and back."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from railsim.definitions.excitations.base import faded
 from railsim.definitions.loading import load_track_text
 from railsim.definitions.mirror import mirrored_track
 from railsim.definitions.track.definition import Track
@@ -12,6 +14,31 @@ from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
 lengths = st.floats(20.0, 200.0)
+
+
+@given(st.floats(0.5, 30.0), st.floats(0.0, 6.0))
+def test_what_is_faded_in_and_out_has_the_slope_of_its_values(fade, phase):
+    """Nothing up to `begin` and from `end` on, all of it in between, by 1 - cos over `fade`."""
+
+    def wave(s):
+        return np.stack([np.sin(0.3 * s + phase)] * 4), np.stack(
+            [0.3 * np.cos(0.3 * s + phase)] * 4
+        )
+
+    moved, s, h = faded(wave, 20.0, 90.0, fade), np.linspace(0.0, 110.0, 997), 1e-5
+    value, slope = moved(s)
+    away = np.min(np.abs(s[:, None] - [20.0, 20.0 + fade, 90.0 - fade, 90.0]), axis=1) > h
+    found = (moved(s + h)[0] - moved(s - h)[0]) / (2.0 * h)
+    np.testing.assert_allclose(slope[:, away], found[:, away], atol=1e-6)
+    outside, whole = (s <= 20.0) | (s >= 90.0), (s >= 20.0 + fade) & (s <= 90.0 - fade)
+    assert not value[:, outside].any()
+    np.testing.assert_allclose(value[:, whole], wave(s)[0][:, whole], atol=1e-12)
+    at = 20.0 + 0.25 * fade
+    assert moved(np.array([at]))[0][0] == pytest.approx(
+        0.5 * (1.0 - np.cos(0.25 * np.pi)) * np.sin(0.3 * at + phase), abs=1e-12
+    )
+
+
 radii = st.builds(
     lambda size, sign: size * sign, st.floats(150.0, 3000.0), st.sampled_from([1.0, -1.0])
 )

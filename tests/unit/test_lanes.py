@@ -14,6 +14,7 @@ from railsim.kernels.lanes import (
     add_to_pairs,
     eight,
     eight_from,
+    eight_in_pairs,
     load_rows,
     square_root,
     starts,
@@ -126,6 +127,11 @@ def test_not_a_number_is_beyond_every_limit():
     elementary(x, out)
     assert np.flatnonzero(np.isnan(out[:, 0])) == [3]
     assert np.flatnonzero(np.isnan(out[:, 3])) == [3]
+
+
+def test_two_of_each_pair_stand_side_by_side_and_the_last_pair_fills_up():
+    assert eight_in_pairs.py_func(0, 4) == (0, 1, 2, 3, 4, 5, 6, 7)
+    assert eight_in_pairs.py_func(4, 6) == (8, 9, 10, 11, 10, 11, 10, 11)
 
 
 def test_plain_functions_have_the_names_of_the_compiled_ones():

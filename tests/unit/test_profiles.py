@@ -150,7 +150,7 @@ def test_units_are_told_by_the_size_when_the_header_is_wrong(tmp_path, scale):
     assert same_contact(profile, "S1002") < 1.5e-6
 
 
-@pytest.mark.parametrize("inclination", [1 / 20, 1 / 40])
+@pytest.mark.parametrize("inclination", [1 / 20, 1 / 30, 1 / 40])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_inclined_rail_is_recognised_and_not_inclined_twice(tmp_path, inclination, side):
     y, z = RAIL

@@ -33,6 +33,12 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
     assert len(judged) == 2
 
 
+def test_outputs_as_dense_as_the_steps_take_one_step_each():
+    vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
+    settings = Settings(output_rate=2000.0)
+    assert prepare(vehicle, track, settings, 20.0, duration=1.0).steps.at(20.0) == (5e-4, 1)
+
+
 def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one(monkeypatch):
     """Differences across a kink of the forces make a short step look unstable, too."""
 

@@ -88,6 +88,17 @@ def test_band_pass_against_scipys_analogue_filter(corners):
     assert butterworth(*corners)(np.zeros(1))[0] == 0.0
 
 
+def test_filter_continues_a_record_by_its_odd_mirror_image():
+    """Which continues a line and a sine from zero to zero, so that both pass up to the ends."""
+    t = np.arange(4001) / 200.0
+    line = 3.0 - 0.5 * t
+    inner = slice(1, -1)
+    np.testing.assert_allclose(low_passed(line, 200.0, 20.0)[inner], line[inner], atol=1e-6)
+    wave = np.sin(2.0 * np.pi * 8.0 * t)
+    gain = butterworth(high=20.0)(np.array([8.0]))[0]
+    np.testing.assert_allclose(low_passed(wave, 200.0, 20.0), gain * wave, atol=1e-6)
+
+
 def test_zero_phase_filter_keeps_the_phase_and_the_causal_one_delays():
     wave = sine(8.0)
     inner = slice(5000, 15000)
@@ -351,6 +362,9 @@ def test_wear_laws():
     """W1."""
     worn = 1e9 * pearce_sherratt_1991(np.array([50.0, 150.0, 250.0]), 0.92)
     np.testing.assert_allclose(worn, [0.01359, 0.02717, 0.1560], rtol=5e-4)
+    # where the branches meet: 25/D from 100 to 200 N, 84/D above
+    worn = 1e9 * pearce_sherratt_1991(np.array([99.0, 101.0, 199.0, 201.0]), 0.92)
+    np.testing.assert_allclose(worn * 920.0, [24.75, 25.0, 25.0, 85.19], rtol=1e-9)
     np.testing.assert_allclose(
         1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0])), [26.5, 55.0, 1466], rtol=5e-4
     )

@@ -3,20 +3,38 @@
 import numpy as np
 import pytest
 from independent_contact import lowest_gap, rail_points
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from railsim.contact import contact_geometry
 from railsim.errors import InputError
+from railsim.kernels.contact_geometry import rail_height
 from railsim.profiles import load_profile
 from railsim.profiles.builtin import s1002_height
 
 WHEEL_Y = np.arange(-60.0, 60.0, 0.02)
 WHEEL = 1e-3 * WHEEL_Y, 1e-3 * s1002_height(WHEEL_Y)
+LATERAL_BEYOND = np.linspace(-0.0345, 0.0075, 61)
 PAIRS = {
     "60E1 1:40": ("60E1", 0.025, (10.228, 26.0265)),
     "60E1 1:20": ("60E1", 0.05, (10.228, 26.0265)),
     "benchmark": ("benchmark", 0.025, (10.49979, 25.98803)),
 }
+
+
+def test_rail_between_its_nodes_is_the_cubic_of_their_heights_and_slopes():
+    """Hermite's, as scipy has it, from the first cell to the last; straight beyond."""
+    rng = np.random.default_rng(4)
+    y = -0.03 + 0.004 * np.arange(9)
+    z, slope = 1e-3 * rng.normal(size=9), 0.3 * rng.normal(size=9)
+    cubic = CubicHermiteSpline(y, z, slope)
+    rail = [rail_height.py_func(at, -0.03, 0.004, z, slope) for at in LATERAL_BEYOND]
+    height, inclination, node = np.array(rail).T
+    inner = np.clip(LATERAL_BEYOND, y[0], y[-1])
+    expected = cubic(inner) + cubic(inner, 1) * (LATERAL_BEYOND - inner)
+    np.testing.assert_allclose(height, expected, atol=1e-15)
+    np.testing.assert_allclose(inclination, cubic(inner, 1), atol=1e-12)
+    np.testing.assert_array_equal(node, np.searchsorted(y[1:-1], LATERAL_BEYOND))
 
 
 @pytest.fixture(

@@ -6,8 +6,9 @@ import pytest
 from railsim.definitions.loading import load_mechanism
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
+from railsim.mechanisms.judgement import Judgement
 from railsim.mechanisms.kinematics import folded, solve
-from railsim.mechanisms.optimisation import optimise
+from railsim.mechanisms.optimisation import _least_breach, optimise
 
 # an arm against a torque; the rod's angle at the pin is largest, asin(d/r), within the travel
 ARM = """
@@ -80,3 +81,28 @@ def test_the_least_angle_is_that_between_the_positions(tmp_path):
     result = analyse(load_mechanism(path))
     exact = np.pi / 2 - np.arcsin(0.1 / 0.3)
     assert result.min_angles["mu"] == pytest.approx(exact, abs=1e-9)
+
+
+def test_least_breach_is_found_where_limits_exclude_each_other_or_one_cannot_be_met():
+    """x = 3 u.  x >= 2 and x^2 <= 1: where 2 - x = x^2 - 1.  (x - 1)^2 <= -0.5: at x = 1."""
+
+    def judged(margins, slopes):
+        slopes = 3.0 * np.array(slopes)[:, None]
+        return Judgement(np.zeros(1), np.zeros((1, 1)), 0.0, np.zeros(1), np.array(margins), slopes)
+
+    def both(u):
+        x = 3.0 * u[0]
+        return judged([x - 2.0, 1.0 - x * x], [1.0, -2.0 * x])
+
+    def one(u):
+        x = 3.0 * u[0]
+        return judged([-0.5 - (x - 1.0) ** 2], [-2.0 * (x - 1.0)])
+
+    begin = np.array([0.05])
+    for problem, x, breach in (
+        (both, 0.5 * (np.sqrt(13.0) - 1.0), 2.5 - 0.5 * np.sqrt(13.0)),
+        (one, 1.0, 0.5),
+    ):
+        u, found = _least_breach(problem, begin, problem(begin))
+        assert 3.0 * u[0] == pytest.approx(x, abs=1e-3)
+        assert found.violation == pytest.approx(breach, abs=1e-6)

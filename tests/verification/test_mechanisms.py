@@ -180,6 +180,53 @@ def test_free_motion_under_the_driven_motions_force_returns_its_law():
     assert found.s[-1] == pytest.approx(np.interp(1.0, timed.time, timed.motion.s), abs=1e-6)
 
 
+@pytest.mark.parametrize("name", ["atr95_lift_5", "tilting_two_springs"])
+def test_velocities_and_accelerations_of_points_are_differences_of_their_positions(models, name):
+    """By the driver: r', r'' by central differences of second order over steps of 1e-4 of it."""
+    model = models[name]
+    h = 1e-4 * (model.end - model.start)
+    middle = np.linspace(model.start, model.end, 7)[1:-1]
+    before, here, after = (solve(model, middle + k * h) for k in (-1, 0, 1))
+    points = [name for name in model.points if not name.startswith("ground.")]
+    assert len(points) > 3
+    for point in points:
+        r, r1, r2 = here.point(point)
+        low, high = before.point(point)[0], after.point(point)[0]
+        size = np.abs(r1).max() + np.abs(r2).max()
+        np.testing.assert_allclose(r1, (high - low) / (2.0 * h), atol=1e-5 * size)
+        np.testing.assert_allclose(r2, (high - 2.0 * r + low) / h**2, atol=1e-4 * size)
+
+
+def test_driver_at_the_ends_of_a_motion_is_an_end():
+    model = build(load_mechanism("tilting_two_springs"))
+    dense = solve(model, np.linspace(model.start, model.end, 401))
+    lengths = dense.length(("ground.P", "plate.C"))[0]
+    found = driver_at(dense, lambda m: m.length(("ground.P", "plate.C"))[:2], lengths[[0, -1]])
+    assert found == pytest.approx([model.start, model.end], abs=1e-12)
+
+    def there_and_back(motion):  # 0 at both ends: the first counts
+        phase = 2.0 * np.pi * (motion.s - model.start) / (model.end - model.start)
+        return np.sin(phase), np.cos(phase) * 2.0 * np.pi / (model.end - model.start)
+
+    assert driver_at(dense, there_and_back, [0.0])[0] == model.start
+
+
+def test_margin_of_the_stroke_is_what_is_left_of_it_in_metres():
+    """The scale turns a margin back into metres, as it is told to the user."""
+    judge = Judge(load_mechanism("atr95_lift_4", ["optimise.max_stroke=0.2"]))
+    judged = judge(np.array([float(judge.values[name]) for name in judge.names]), {})
+    ((scale, margin),) = [
+        (scale, margin)
+        for (name, scale), margin in zip(judge.labels, judged.margins, strict=True)
+        if name == "max_stroke"
+    ]
+    mechanism = load_mechanism("atr95_lift_4")
+    model = build(mechanism)
+    both = solve(model, np.array([model.start, model.end]))
+    stroke = np.ptp(both.length(ends(mechanism.actuators["lift"]))[0])
+    assert scale * margin == pytest.approx(0.2 - stroke, abs=1e-9)
+
+
 def test_energy_is_kept_without_damping():
     free = ["parameters.front_damping=0", "parameters.rear_damping=0"]
     model = build(load_mechanism("tilting_two_springs", free))

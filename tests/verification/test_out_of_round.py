@@ -277,6 +277,15 @@ def test_wrong_wheels_are_refused(part, said):
         with_wheels(one=part)
 
 
+def test_sections_come_from_a_file_or_from_what_was_read():
+    read = {"angles": (0.0, 2.0, 4.0), "positions": (0.0, 0.01), "heights": ((0.0, 0.0),) * 3}
+    assert Sections(type="sections", file="scan.slcw").angles is None
+    assert Sections(type="sections", **read).file is None
+    for both in ({**read, "file": "scan.slcw"}, {"angles": read["angles"]}):
+        with pytest.raises(ValueError, match="either 'file', or"):
+            Sections(type="sections", **both)
+
+
 def test_wrong_lists_are_refused(tmp_path):
     path = written_list(tmp_path, "rounded")
     text = path.read_text()

@@ -1,10 +1,13 @@
 """Search and tolerances: what is returned holds up when it is verified another way."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_spring
 from railsim.errors import InputError
+from railsim.springs import search as springs_search
 from railsim.springs.search import LIMITS, search
 from railsim.springs.tolerance import ride_heights
 from railsim.springs.verification import fatigue, verify
@@ -65,6 +68,30 @@ def test_nests_keep_to_the_space(found):
         assert clearance >= limits.clearance_min - 1e-9
         assert limits.free_height[0] - 1e-9 <= outer.free_height <= limits.free_height[1] + 1e-9
         assert {outer.wire_diameter, inner.wire_diameter} <= set(limits.wire_diameters)
+
+
+def test_coils_are_rounded_both_ways(monkeypatch):
+    """Four combinations for each diameter and height, next to the numbers that fit exactly."""
+    asked = []
+
+    def noted(task, x, n=None):
+        found = nests.evaluate(task, x) if n is None else nests.evaluate(task, x, n)
+        asked.append((x, n, found.n))
+        return found
+
+    nests = SimpleNamespace(evaluate=springs_search.evaluate)
+    monkeypatch.setattr(springs_search, "evaluate", noted)
+    changes = ["search.candidates=256", "search.results=1", f"search.wire_diameters={WIRES}"]
+    suspension = load_spring("turasas_axlebox", changes)
+    search(suspension)
+    rounded = [k for k, (_, n, _) in enumerate(asked) if n is not None and len(n[0]) == 256]
+    assert rounded
+    for k in rounded:
+        exact = np.array(asked[k - 1][2]) / suspension.search.coil_step
+        tried = np.array(asked[k][1]) / suspension.search.coil_step
+        up = np.round(tried - np.repeat(np.floor(exact), 4, axis=1)).astype(int)
+        for four in np.split(up, up.shape[1] // 4, axis=1):
+            assert sorted(four.T.tolist()) == [[0, 0], [0, 1], [1, 0], [1, 1]]
 
 
 def test_nests_are_ranked_and_name_their_active_limits(found):

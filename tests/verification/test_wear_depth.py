@@ -164,6 +164,26 @@ def test_law_is_applied_to_each_patch():
     assert np.sum(depth[grid() < middle]) == pytest.approx(25.0 / 920.0 * 1e-9, rel=1e-9)
 
 
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("roll", [-5e-3, 5e-3])
+def test_wear_lies_where_a_rolled_wheelset_touches(roll, side):
+    """y = y' cos(roll) - z' sin(roll), z = y' sin(roll) + z' cos(roll): y' is worn."""
+    made = undisturbed()
+    zero = np.zeros_like(made.patch_N)
+    out = (-1.0, 1.0)[side]
+    place = tape_circle_position(1.36) + 0.01  # 10 mm outside of the rolling circle
+    y, z = out * place, 0.46
+    patches = {"patch_T_gamma": zero.copy(), "patch_T_x": zero.copy(), "patch_angle": zero,
+               "patch_y": zero + y * np.cos(roll) - z * np.sin(roll),
+               "patch_z": zero + y * np.sin(roll) + z * np.cos(roll), "patch_b": zero + 2e-3,
+               "body_position": made.body_position.copy()}  # fmt: skip
+    patches["patch_T_gamma"][..., 0], patches["patch_T_x"][..., 0] = 150.0, 5e3
+    axle = made.bodies.index(made.wheelsets[0])
+    patches["body_position"][:, axle, 3] = roll
+    depth = worn_depth(changed(made, patches), 0, side)
+    assert np.sum(grid() * depth) / np.sum(depth) == pytest.approx(0.01, abs=5e-5)
+
+
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("place", [-0.034, -0.020, 0.0, 0.02])
 def test_worn_area_of_the_laws_is_that_of_the_profiles(law, place):
