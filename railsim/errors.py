@@ -80,11 +80,9 @@ def argument_fault(
     return Fault(parameter, key, found, allowed, option or "--" + parameter.replace("_", "-"))
 
 
-MOST_FAULTS = 100
-"""Faults that are kept of an input; the rest is counted."""
+MOST_FAULTS = 100  # faults that are kept of an input; the rest is counted
 
-EQUAL = 5
-"""More faults than these that differ in their keys alone are one line with a count."""
+EQUAL = 5  # more faults than these that differ in their keys alone are one line with a count
 
 
 def fault_lines(faults: Iterable[Fault]) -> list[str]:

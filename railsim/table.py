@@ -35,8 +35,7 @@ GOOD, BAD = ("pass", "complete"), ("fail", "failed", "derailed", "exceeded", "wa
 """Cells that a terminal shows in green, in red; the rows of the latter have a class in pages."""
 
 
-NARROWEST = 6
-"""Width to which columns of texts shrink on a terminal [characters]."""
+NARROWEST = 6  # width to which columns of texts shrink on a terminal [characters]
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ import numpy as np
 from railsim.arrays import Floats
 
 FACTOR = {"vertical": 0.588, "lateral": 0.735}
-BAND = (0.5, 30.0)
-"""Frequency range of the index [Hz]."""
+BAND = (0.5, 30.0)  # frequency range of the index [Hz]
 Direction = Literal["vertical", "lateral"]
 
 

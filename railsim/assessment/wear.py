@@ -16,12 +16,10 @@ from railsim.definitions.loading import load_wear_law
 from railsim.definitions.wear_law import ArchardMap, FrictionWork
 from railsim.errors import input_error
 
-YIELD_IN_SHEAR = 300e6
-"""Yield stress in shear k of rail steel, default value [Pa]."""
+YIELD_IN_SHEAR = 300e6  # yield stress in shear k of rail steel, default value [Pa]
 
 
-DENSITY = 7850.0
-"""Density of wheel and rail steel [kg/m3]."""
+DENSITY = 7850.0  # density of wheel and rail steel [kg/m3]
 
 
 @dataclass(frozen=True)

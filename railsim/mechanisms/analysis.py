@@ -18,8 +18,7 @@ from railsim.mechanisms.kinematics import Motion, check_freedom, driver_words, f
 from railsim.mechanisms.model import Model, build
 from railsim.mechanisms.outputs import check_pressure, outputs, sampled, zone_drivers
 
-DENSE = 401
-"""Positions from which heights and lengths are looked up."""
+DENSE = 401  # positions from which heights and lengths are looked up
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,11 @@ from railsim.definitions.mechanism.parts import Link, Prismatic, Revolute
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.model import Model
 
-CLOSED = 1e-9
-"""Residual, as a share of the mechanism's size, of a closed loop."""
+CLOSED = 1e-9  # residual, as a share of the mechanism's size, of a closed loop
 TRIES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5)
 """Amounts by which the pose's angles are moved in turn: it may itself be a dead point [rad]."""
-TIGHT = 1e3
-"""Weight of the other joints where the gap of one joint is sought."""
-IN_LOOP = 1e-3
-"""Share of the largest residual from which a joint counts as one of the loop."""
+TIGHT = 1e3  # weight of the other joints where the gap of one joint is sought
+IN_LOOP = 1e-3  # share of the largest residual from which a joint counts as one of the loop
 
 
 @dataclass(frozen=True)

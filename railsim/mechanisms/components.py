@@ -10,10 +10,8 @@ import numpy as np
 
 from railsim.arrays import Floats
 
-EDGE = 1e-9
-"""Share of an interval by which rounding may leave a table."""
-T_REFERENCE = 20.0
-"""Temperature to which the nominal forces of gas springs refer [C]."""
+EDGE = 1e-9  # share of an interval by which rounding may leave a table
+T_REFERENCE = 20.0  # temperature to which the nominal forces of gas springs refer [C]
 
 
 def gas_spring_force(

@@ -18,8 +18,7 @@ from railsim.mechanisms.model import Model
 Law = Callable[[Floats], tuple[Floats, Floats, Floats]]
 """Travel, speed and acceleration at given times."""
 
-ACCURACY = 1e-11
-"""Relative error of a step of the free motion."""
+ACCURACY = 1e-11  # relative error of a step of the free motion
 
 
 def polynomial_345(duration: float, stroke: float) -> tuple[float, float, float]:

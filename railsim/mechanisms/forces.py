@@ -43,8 +43,7 @@ from railsim.mechanisms.components import (
 from railsim.mechanisms.kinematics import Motion, driver_words
 from railsim.mechanisms.model import Model, real
 
-STROKE_EDGE = 1e-4
-"""Share of a gas spring's stroke by which rounding may take it beyond its ends."""
+STROKE_EDGE = 1e-4  # share of a gas spring's stroke by which rounding may take it beyond its ends
 
 
 @dataclass(frozen=True)
@@ -82,8 +81,7 @@ class OnBody(NamedTuple):
     torque: Any
 
 
-Load = Between | AtPoint | OnBody
-"""What a part exerts on the bodies."""
+Load = Between | AtPoint | OnBody  # what a part exerts on the bodies
 
 
 class Mass(NamedTuple):

@@ -31,10 +31,8 @@ from railsim.mechanisms.model import Model, build, with_lanes
 from railsim.mechanisms.outputs import length_points
 from railsim.mechanisms.targets import Positions, drivers_at_heights, positions
 
-GRID = 17
-"""Positions over the whole travel at which constraints are held."""
-DENSE = 201
-"""Positions from which the least values between them are looked for."""
+GRID = 17  # positions over the whole travel at which constraints are held
+DENSE = 201  # positions from which the least values between them are looked for
 SLOWEST = 0.05
 """Smallest rate of the actuator against its mean: keeps a search away from dead points."""
 

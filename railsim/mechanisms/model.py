@@ -21,8 +21,7 @@ from railsim.kernels.linkage import Linkage
 
 Values = Any  # float or complex ndarray, shape (lane, 1)
 OPEN_ARC = 0.99 * np.pi
-STEP = 1e-30
-"""Imaginary step: its square vanishes beside any real number."""
+STEP = 1e-30  # imaginary step: its square vanishes beside any real number
 
 
 @dataclass(frozen=True)

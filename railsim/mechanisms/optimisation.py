@@ -41,17 +41,12 @@ SEARCH = Effort(2, 20, 1e-2)
 FINISH = Effort(4, 25, 1e-3)
 EXCHANGES = 6
 """Times that positions of broken constraints are added, until none is broken between positions."""
-EVERY = 5
-"""Share of the positions that every start is first judged at."""
-FINALISTS = 3
-"""Starts that are followed to the end, at all positions."""
+EVERY = 5  # share of the positions that every start is first judged at
+FINALISTS = 3  # starts that are followed to the end, at all positions
 MOST_STARTS = 10_000
-SECONDS_PER_START = 1.0
-"""At a rough guess, of one core."""
-DRAWS = 60
-"""Draws for each start until the links can be assembled."""
-REFUSED = 1e6
-"""Objective, against that at the start, of parameters that cannot be assembled."""
+SECONDS_PER_START = 1.0  # at a rough guess, of one core
+DRAWS = 60  # draws for each start until the links can be assembled
+REFUSED = 1e6  # objective, against that at the start, of parameters that cannot be assembled
 
 
 def optimise(

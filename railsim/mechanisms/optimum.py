@@ -14,10 +14,8 @@ from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import check_freedom
 from railsim.mechanisms.model import build
 
-FEASIBLE = 1e-7
-"""Breach of a constraint, in its scale, that counts as none."""
-ACTIVE = 1e-5
-"""Margin, in its scale, below which a constraint is active."""
+FEASIBLE = 1e-7  # breach of a constraint, in its scale, that counts as none
+ACTIVE = 1e-5  # margin, in its scale, below which a constraint is active
 
 
 @dataclass(frozen=True)

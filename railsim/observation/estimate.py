@@ -14,8 +14,7 @@ from railsim.linear.track_response import QUANTITIES
 from railsim.observation.pieces import STEP, Piece
 from railsim.table import Column, Table
 
-BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0)}
-"""Wavelengths of EN 13848-1 [m]."""
+BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0)}  # wavelengths of EN 13848-1 [m]
 LETTERS = ("y", "z", "cross_level", "gauge")  # columns of a recording
 MILLI, KILO = 1e3, 1e-3
 SEEN = 0.5  # share of the variance that the channels explain, below which nothing is filled in

@@ -27,8 +27,7 @@ WHEEL, RAIL = DISTINCT[0], "0.35"
 SIDE_COLOURS = {"left": DISTINCT[1], "right": DISTINCT[0]}
 ZONE_COLOURS = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DISTINCT[1]}
 TABLE_LINES = ("-", "--")
-LIFT = 14.0
-"""Height at which the wheel is drawn above its rail [mm]."""
+LIFT = 14.0  # height at which the wheel is drawn above its rail [mm]
 
 
 @styled()

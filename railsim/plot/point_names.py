@@ -10,13 +10,11 @@ from matplotlib.axes import Axes
 from railsim.arrays import Floats
 from railsim.plot.style import note
 
-SIZE = 7.0
-"""Of the letters [points]."""
+SIZE = 7.0  # of the letters [points]
 REACHES = (5.0, 12.0, 20.0, 30.0)
 """Distances from point to name that are tried, the nearest first [points]."""
 DIRECTIONS = np.radians([20.0, 160.0, -20.0, -160.0, 90.0, -90.0, 55.0, 125.0, -55.0, -125.0])
-LEADER = 10.0
-"""Distance from which a thin line joins name and point [points]."""
+LEADER = 10.0  # distance from which a thin line joins name and point [points]
 
 
 def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]) -> None:

@@ -64,13 +64,11 @@ DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#
 
 SIDE_LINES = {"left": "-", "right": (0, (4.0, 1.6))}
 SHADES = {"CLO": "0.95", "CIR": "0.90"}
-NARROW = 0.011
-"""Share of the axes' width that a letter of a section's name takes."""
+NARROW = 0.011  # share of the axes' width that a letter of a section's name takes
 
 LIMIT = "#b3122b"
 
-ABOVE = ("data", "axes fraction")
-"""Coordinates of what stands at the upper edge of axes."""
+ABOVE = ("data", "axes fraction")  # coordinates of what stands at the upper edge of axes
 
 
 def distinct(number: int) -> str:

@@ -21,8 +21,7 @@ from railsim.result.filters import low_passed
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
-POSITIONS = ("time", "distance", "mileage", "wheelset_distance")
-"""Quantities that are not filtered."""
+POSITIONS = ("time", "distance", "mileage", "wheelset_distance")  # quantities that are not filtered
 
 
 def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:

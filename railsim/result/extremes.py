@@ -30,19 +30,15 @@ PEAK_QUANTITIES = (
 )
 """Default quantities of peak tables."""
 
-LOW_PASS = 20.0
-"""Low pass of forces in EN 14363 [Hz]."""
+LOW_PASS = 20.0  # low pass of forces in EN 14363 [Hz]
 FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
 """Quantities whose peaks are also given after that low pass."""
-LEAST_RATE = 2.5
-"""Outputs per period of the low pass at least."""
+LEAST_RATE = 2.5  # outputs per period of the low pass at least
 DEVIATION = (15.87, 84.13)
 """Percentiles that are one standard deviation from the median of a normal distribution."""
-SETTLING = 1.0 / 3.0
-"""Share of a full curve in which the vehicle settles."""
+SETTLING = 1.0 / 3.0  # share of a full curve in which the vehicle settles
 
-SETTLES, CROSSINGS = 0.4, 6
-"""What is still settling in a full curve, see `_settling`."""
+SETTLES, CROSSINGS = 0.4, 6  # what is still settling in a full curve, see `_settling`
 
 BY_SIGN = ("dQ_over_Q0",)
 """Quantities whose largest and smallest value are two different questions (overload, unloading)."""

@@ -22,8 +22,7 @@ from railsim.arrays import Complexes, Floats
 
 Response = Callable[[Floats], Complexes | Floats]
 
-BLOCK = 2**16
-"""Samples of a block at least."""
+BLOCK = 2**16  # samples of a block at least
 REACH = 6.0
 """Periods of the lowest corner after which a Butterworth filter of order 4 has forgotten
 (its slowest part has fallen to exp(-2 pi 0.383 6) = 5e-7)."""

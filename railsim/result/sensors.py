@@ -16,10 +16,8 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, flatten
 from railsim.track.alignment import Alignment
 
-BOX = 1.0
-"""Distance of a sensor on an axlebox from the middle of the wheelset [m]."""
-NEAR = 3.0
-"""A frame above a wheelset lies no further from it than this along the vehicle [m]."""
+BOX = 1.0  # distance of a sensor on an axlebox from the middle of the wheelset [m]
+NEAR = 3.0  # A frame above a wheelset lies no further from it than this along the vehicle [m]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from railsim.result.extremes import MidCurve, Peak, mid_curves, peaks
 from railsim.table import Amount, Column, Table
 
 KINDS = {"abs": "", "max": ", largest", "min": ", smallest"}
-MOST_CURVES = 3
-"""Curves with a table each; more are listed, one line each."""
+MOST_CURVES = 3  # curves with a table each; more are listed, one line each
 PLACE = [Column("time", "t", "s", ".2f"), Column("distance", "s", "m", ".1f")]
 """When, and where the reference body was."""
 

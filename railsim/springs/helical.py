@@ -25,8 +25,7 @@ import numpy as np
 
 from railsim.errors import ModelError
 
-Values = Any
-"""A float or an array: the result has the broadcast shape of the arguments."""
+Values = Any  # A float or an array: the result has the broadcast shape of the arguments
 
 # Below this value of x^2 the quotients are summed as series: the closed forms would lose half of
 # the digits to cancellation, the series are cut where they are exact to 1e-13.
