@@ -121,8 +121,7 @@ class Assessment:
         limits = self.limits
         comfort = {}
         if isinstance(limits, ComfortLimits):
-            comfort = {run: [p.record(limits) for p in points]
-                       for run, points in self.comfort.items()}  # fmt: skip
+            comfort = {run: [p.record(limits) for p in own] for run, own in self.comfort.items()}
         return {
             "vehicle": self.vehicle,
             "standard": self.standard,
@@ -220,20 +219,12 @@ def assess(
 
 
 def _running(runs: Mapping[str, Result], limits: RunningLimits, done: Running) -> Assessment:
-    return Assessment(
+    vehicle, verdict = (
         next(iter(runs.values())).vehicle().name,
-        limits.standard,
-        tuple(runs),
         overall(done.verdicts, limits.deciding),
-        done.verdicts,
-        done.zones,
-        done.conditions,
-        done.sections,
-        done.hunting_frequency,
-        done.influences,
-        remarks=done.remarks,
-        limits=limits,
     )
+    found = {"verdict": verdict, "limits": limits, **vars(done)}
+    return Assessment(vehicle, limits.standard, tuple(runs), **found)
 
 
 def _other(
@@ -247,15 +238,15 @@ def _other(
     vehicle = next(iter(runs.values())).vehicle().name
     records = {name: Record(result, name, coarse=coarse) for name, result in runs.items()}
     remarks = [remark for record in records.values() for remark in record.remarks()]
-    remarks += [f"{name}: {r.status}, only the part before that is assessed"
-                for name, r in runs.items() if r.status != "complete"]  # fmt: skip
-    names = tuple(runs)
+    ended = {name: r.status for name, r in runs.items() if r.status != "complete"}
+    remarks += [f"{n}: {end}, only the part before that is assessed" for n, end in ended.items()]
+    about = vehicle, standard, tuple(runs)
     if standard == "wear":
         wear = {name: wear_report(record, law=law) for name, record in records.items()}
-        return Assessment(vehicle, standard, names, wear=wear, remarks=tuple(remarks))
+        return Assessment(*about, wear=wear, remarks=tuple(remarks))
     if standard == "safety":
         safety = {name: safety_report(record) for name, record in records.items()}
-        return Assessment(vehicle, standard, names, safety=safety, remarks=tuple(remarks))
+        return Assessment(*about, safety=safety, remarks=tuple(remarks))
     classes = load_comfort_limits(limits or "comfort")
     comfort = {name: comfort_report(record) for name, record in records.items()}
     for name, points in comfort.items():
@@ -263,10 +254,11 @@ def _other(
         remarks += [f"{name}: {sentence}" for sentence in said if sentence]
     if not classes.mean_comfort.checked:
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
-    return Assessment(
-        vehicle, standard, names, comfort=comfort, remarks=tuple(dict.fromkeys(remarks)),
-        limits=classes, driven={name: (r.speed, *_rails(r)) for name, r in runs.items()},
-    )  # fmt: skip
+    said_once, driven = (
+        tuple(dict.fromkeys(remarks)),
+        {n: (r.speed, *_rails(r)) for n, r in runs.items()},
+    )
+    return Assessment(*about, comfort=comfort, remarks=said_once, limits=classes, driven=driven)
 
 
 def _rails(result: Result) -> tuple[str, str]:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.weighting import WB, WC, WD, WF, WK
+from railsim.assessment.weighting import WB, WC, WD, WF, WK, Weighting
 from railsim.result.filters import integral, low_passed
 
 BLOCK = 5.0  # s
@@ -72,10 +72,13 @@ def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
 
 def weighted_for_comfort(a: Floats, rate: float) -> tuple[Floats, Floats]:
     """Accelerations along x, y, z with Wd, Wd, Wb, and along x with Wc (seat back) [m/s2]."""
-    floor = np.stack(
-        [weighting.weighted(a[:, k], rate) for k, weighting in enumerate((WD, WD, WB))], axis=-1
-    )
-    return floor, WC.weighted(a[:, 0], rate)
+    return _along_axes(a, rate, WB), WC.weighted(a[:, 0], rate)
+
+
+def _along_axes(a: Floats, rate: float, vertical: Weighting) -> Floats:
+    """Accelerations along x, y with Wd, along z with another weighting."""
+    weightings = enumerate((WD, WD, vertical))
+    return np.stack([weighting.weighted(a[:, k], rate) for k, weighting in weightings], axis=-1)
 
 
 def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
@@ -115,9 +118,7 @@ def iso2631_vibration(a: Floats, rate: float) -> Vibration:
 
     `a` (float64[time, 3]): Acceleration along x, y, z [m/s2]. `rate`: Samples per second [1/s].
     """
-    weighted = np.stack(
-        [weighting.weighted(a[:, k], rate) for k, weighting in enumerate((WD, WD, WK))], axis=-1
-    )
+    weighted = _along_axes(a, rate, WK)
     rms = np.sqrt(np.mean(weighted**2, axis=0))
     running = running_mean(weighted**2, rate, 1.0)
     largest = np.sqrt(np.max(running, axis=0)) if len(running) else np.full(3, math.nan)
@@ -244,11 +245,8 @@ def transition_comfort(
     jerk = float(np.max(changes[of_jerk]))
     inside = (middles >= begin) & (middles <= end)
     rolling = float(np.degrees(np.max(np.abs(rolls[inside])))) if inside.any() else 0.0
-    return TransitionComfort(
-        begin, end, acceleration, jerk, rolling,
-        standing=p_ct(acceleration, jerk, rolling, "standing"),
-        seated=p_ct(acceleration, jerk, rolling, "seated"),
-    )  # fmt: skip
+    felt = acceleration, jerk, rolling
+    return TransitionComfort(begin, end, *felt, p_ct(*felt, "standing"), p_ct(*felt, "seated"))
 
 
 def event_comfort(lateral: Floats, rate: float) -> dict[str, float]:
@@ -265,6 +263,6 @@ def event_comfort(lateral: Floats, rate: float) -> dict[str, float]:
     spread = maximum_filter1d(low, 2 * half + 1)[whole] - minimum_filter1d(low, 2 * half + 1)[whole]
     mean = np.abs(running_mean(low, rate, 2 * half / rate))
     return {
-        posture: float(np.max(np.maximum(a * spread + b * mean - c, 0.0)))
-        for posture, (a, b, c) in EVENT.items()
+        p: float(np.max(np.maximum(a * spread + b * mean - c, 0.0)))
+        for p, (a, b, c) in EVENT.items()
     }

@@ -85,12 +85,8 @@ def comfort_report(record: Record) -> list[PointComfort]:
     """
     names = [name for name in record.sensors if not name.startswith("frame_")]
     if not names:
-        raise input_error(
-            record.name,
-            "is not in the result",
-            "run it with settings.outputs.sensors=true",
-            "sensor_acceleration",
-        )
+        allowed = "run it with settings.outputs.sensors=true"
+        raise input_error(record.name, "is not in the result", allowed, "sensor_acceleration")
     columns = [list(record.sensors).index(name) for name in names]
     frequency = float(record.result.attributes.get("hunting_frequency", 0.0))
     gathered = [_Gathered(frequency) for _ in names]
@@ -148,8 +144,7 @@ class _Gathered:
             low, high = (share * self.frequency for share in NEAR)
             near = band_passed(floor[:, 1], rate, low, high)[counted]
             self.hunting += float(np.sum(near**2))
-        for axis, direction in ((1, "lateral"), (2, "vertical")):
-            way: Direction = "lateral" if direction == "lateral" else "vertical"
+        for axis, way in enumerate(self.sperling, start=1):
             self.sperling[way] += size * sperling_mean_square(a[counted, axis], rate, way)
         for posture, value in event_comfort(a[counted, 1], rate).items():
             self.events[posture] = max(self.events[posture], np.nan_to_num(value))

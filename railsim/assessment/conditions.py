@@ -77,8 +77,9 @@ def _stated(met: bool) -> str:
 
 
 def _number(place: str, found: str, wanted: Zone, *, met: bool) -> Condition:
-    return Condition("number of sections", place, _stated(met), found,
-                     f"{wanted.sections} at least", wanted.source, wanted.checked)  # fmt: skip
+    least = f"{wanted.sections} at least"
+    about = "number of sections", place, _stated(met), found, least
+    return Condition(*about, wanted.source, wanted.checked)
 
 
 def missing_zones(
@@ -88,11 +89,9 @@ def missing_zones(
     if population.fault:
         return []
     there = {report.zone for report in reports if report.population is population}
-    return [
-        _number(", ".join(filter(None, [f"zone {name}", population.name])), "none", zone, met=False)
-        for name, zone in sorted(limits.zones.items())
-        if name not in there
-    ]
+    zones = [pair for pair in sorted(limits.zones.items()) if pair[0] not in there]
+    behind = f", {population.name}" if population.name else ""
+    return [_number(f"zone {name}{behind}", "none", zone, met=False) for name, zone in zones]
 
 
 def zone_conditions(
@@ -107,22 +106,19 @@ def zone_conditions(
     if not n:
         return found
     if (ends := wanted.mean_radius) is not None:
-        found.append(Condition(
-            "mean radius", place, _stated(ends[0] <= report.radius <= ends[1]),
-            f"{report.radius:.0f} m", f"{ends[0]:.0f} to {ends[1]:.0f} m", source, checked,
-        ))  # fmt: skip
+        met, wide = ends[0] <= report.radius <= ends[1], f"{ends[0]:.0f} to {ends[1]:.0f} m"
+        about = "mean radius", place, _stated(met), f"{report.radius:.0f} m", wide
+        found.append(Condition(*about, source, checked))
     if wanted.radius is not None:
         right = sum(value.section.turn > 0 for value in report.values)
-        found.append(Condition(
-            "curves to both hands", place, _stated(0 < right < n),
-            f"{right} sections to the right, {n - right} to the left", "both", "ours",
-        ))  # fmt: skip
+        words = f"{right} sections to the right, {n - right} to the left"
+        state = _stated(0 < right < n)
+        found.append(Condition("curves to both hands", place, state, words, "both", "ours"))
     times = Counter((row.realisation, round(row.section.begin, 1)) for row in rows)
     again = sum(times.values()) - len(times)
-    found.append(Condition(
-        "independent sections", place, _stated(not again),
-        f"{again} of {n} on irregularities that another section has as well", "none", "ours",
-    ))  # fmt: skip
+    words = f"{again} of {n} on irregularities that another section has as well"
+    state = _stated(not again)
+    found.append(Condition("independent sections", place, state, words, "none", "ours"))
     found.append(_quality(place, rows, limits.track_quality, service))
     return found
 
@@ -131,10 +127,8 @@ def _quality(
     place: str, rows: Sequence[SectionRow], target: TrackTarget | None, service: Service
 ) -> Condition:
     worse = sum(row.quality == "worse than QN2" for row in rows)
-    alignment, level = (
-        float(np.percentile([getattr(row, name) for row in rows], SHARE))
-        for name in ("alignment", "level")
-    )
+    both = np.percentile([(row.alignment, row.level) for row in rows], SHARE, axis=0)
+    alignment, level = both.tolist()
     found = (
         f"{SHARE:.0f} % of the sections below {1e3 * alignment:.2f} mm alignment and "
         f"{1e3 * level:.2f} mm level; {100.0 * worse / len(rows):.0f} % worse than QN2"
@@ -146,9 +140,8 @@ def _quality(
     met = ends[0] <= alignment <= ends[1] and ends[2] <= level <= ends[3]
     low_a, high_a, low_l, high_l = (1e3 * end for end in ends)
     required = f"{low_a:.2f} to {high_a:.2f} mm and {low_l:.2f} to {high_l:.2f} mm"
-    return Condition(
-        "track quality", place, _stated(met), found, required, target.source, target.checked
-    )
+    about = "track quality", place, _stated(met), found, required
+    return Condition(*about, target.source, target.checked)
 
 
 def vehicle_conditions(
@@ -166,11 +159,10 @@ def vehicle_conditions(
     found.append(_loads(reports))
     frictions = [mu for run in runs for mu in run.track().friction]
     least = limits.friction
-    found.append(_compared(
-        "friction", f"{min(frictions):.3g} to {max(frictions):.3g}", least,
-        f"{least.value:g} at least" if least else "",
-        met=bool(least and min(frictions) >= least.value),
-    ))  # fmt: skip
+    words = f"{min(frictions):.3g} to {max(frictions):.3g}"
+    required = f"{least.value:g} at least" if least else ""
+    met = bool(least and min(frictions) >= least.value)
+    found.append(_compared("friction", words, least, required, met=met))
     return found
 
 
@@ -193,12 +185,13 @@ def _conicity(
     speed = service.admissible_speed
     high = next((least for v, least in classes.high if speed <= v), classes.high_above)
     found = f"{known.min():.2f} to {known.max():.2f}"
-    return [
-        _compared(names[0], found, classes, f"{classes.low:.2f} at most in some sections",
-                  met=bool(known.min() <= classes.low)),
-        _compared(names[1], found, classes, f"{high:.2f} at least in some sections",
-                  met=bool(known.max() >= high)),
-    ]  # fmt: skip
+    required = (
+        f"{classes.low:.2f} at most in some sections",
+        f"{high:.2f} at least in some sections",
+    )
+    met = bool(known.min() <= classes.low), bool(known.max() >= high)
+    each = zip(names, required, met, strict=True)
+    return [_compared(name, found, classes, words, met=ok) for name, words, ok in each]
 
 
 def _loads(reports: Sequence[ZoneReport]) -> Condition:

@@ -54,11 +54,10 @@ def section_values(
     for group in _neighbours(sections):
         signals = Signals(record, group[0].begin, group[-1].end, f0=f0, causal=causal)
         for section in group:
-            values = {
-                (criterion.name, place): numbers
-                for criterion in CRITERIA.values()
-                for place, numbers in criterion.measure(signals, section).items()
-            }
+            values: dict[tuple[str, str], list[float]] = {}
+            for name, criterion in CRITERIA.items():
+                measured = criterion.measure(signals, section)
+                values |= {(name, place): numbers for place, numbers in measured.items()}
             found.append(SectionValues(section, values, _lifted(signals, section)))
     return found
 

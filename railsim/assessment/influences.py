@@ -47,8 +47,8 @@ def influences(reports: Sequence[ZoneReport], service: Service) -> list[Influenc
     found = []
     target = np.array([service.cant_deficiency, 1.0 / RADIUS])
     for population in dict.fromkeys(report.population.name for report in reports):
-        curves = [v for r in reports if r.population.name == population for v in r.values
-                  if v.section.turn]  # fmt: skip
+        values = [v for r in reports if r.population.name == population for v in r.values]
+        curves = [v for v in values if v.section.turn]
         keys = dict.fromkeys(key for value in curves for key in value.values if key[0] in FORCES)
         for name, place in keys:
             own = [value for value in curves if (name, place) in value.values]

@@ -8,24 +8,16 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.criteria import FORCES, RIDE_BAND, ends, middle
+from railsim.assessment.criteria import FORCES, RIDE_BAND, both_ends, ends, middle, rms
 from railsim.assessment.signals import Band
 from railsim.table import Amount, Column, Table
 
 PASS, FAIL, INCOMPLETE = "pass", "fail", "incomplete"
 
 
-def _rms(x: Floats, _: int) -> list[float]:
-    return [float(np.sqrt(np.mean(x**2)))]
-
-
 def _outwards(x: Floats, turn: int) -> list[float]:
     """Percentile to the outside of the curve, both on straight track; values are signed so."""
     return ends(x, 1 if turn else 0)
-
-
-def _both(x: Floats, _: int) -> list[float]:
-    return ends(x, 0)
 
 
 @dataclass(frozen=True)
@@ -60,10 +52,10 @@ QUANTITIES = {one.name: one for one in (
     Compared("Y_over_Q_max", "Y/Q, 2 m", "", "Y_over_Q", FORCES, _outwards, True, 2.0),
     Compared("sum_Y_max", "track shift force, 2 m", "kN", "sum_Y", FORCES, _outwards, False, 2.0),
     Compared("body_y_qst", "body lateral, quasi-static", "m/s2", "bodyy", FORCES, middle, True),
-    Compared("body_y_max", "body lateral, 0.4 to 10 Hz", "m/s2", "bodyy", RIDE_BAND, _both),
-    Compared("body_z_max", "body vertical, 0.4 to 10 Hz", "m/s2", "bodyz", RIDE_BAND, _both),
-    Compared("body_y_rms", "body lateral, rms", "m/s2", "bodyy", RIDE_BAND, _rms),
-    Compared("body_z_rms", "body vertical, rms", "m/s2", "bodyz", RIDE_BAND, _rms),
+    Compared("body_y_max", "body lateral, 0.4 to 10 Hz", "m/s2", "bodyy", RIDE_BAND, both_ends),
+    Compared("body_z_max", "body vertical, 0.4 to 10 Hz", "m/s2", "bodyz", RIDE_BAND, both_ends),
+    Compared("body_y_rms", "body lateral, rms", "m/s2", "bodyy", RIDE_BAND, rms),
+    Compared("body_z_rms", "body vertical, rms", "m/s2", "bodyz", RIDE_BAND, rms),
 )}  # fmt: skip
 """What is compared, in the order of tables."""
 

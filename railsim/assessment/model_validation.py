@@ -23,7 +23,7 @@ from railsim.assessment.model_comparison import (
     Pair,
 )
 from railsim.assessment.sections import TestSection, section_length, track_sections
-from railsim.assessment.signals import OUTWARDS, Band, Signal
+from railsim.assessment.signals import OUTWARDS, Signal, passed
 from railsim.definitions.limits import RunningLimits, ValidationLimits
 from railsim.definitions.loading import load, load_running_limits, load_track
 from railsim.definitions.track.definition import Track
@@ -37,7 +37,7 @@ from railsim.measurement.counterpart import amplified, check_channels, compared,
 from railsim.measurement.likeness import suspicions
 from railsim.notation import SIDES
 from railsim.result import Result
-from railsim.result.filters import band_passed, low_passed
+from railsim.result.filters import low_passed
 from railsim.result.sensors import all_sensors
 
 LIKE = 50.0  # 1/s, at which signs and clocks are compared
@@ -88,12 +88,8 @@ def validate_model(
         limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))
     if unknown:
-        raise input_error(
-            "limits",
-            "unknown quantity",
-            "allowed: " + ", ".join(QUANTITIES),
-            f"limits.{unknown[0]}",
-        )
+        allowed = "allowed: " + ", ".join(QUANTITIES)
+        raise input_error("limits", "unknown quantity", allowed, f"limits.{unknown[0]}")
     tests = load_running_limits(zones)
     pairs: list[Pair] = []
     overlays: list[Overlay] = []
@@ -104,27 +100,21 @@ def validate_model(
         overlays += one.overlays()
         pairs += one.pairs(tests, limits)
     if not pairs:
-        raise input_error(
-            runs[0].name,
-            "no section",
-            "a longer run, or channels of Q, Y or the body's accelerations",
-            "distance",
-        )
+        allowed = "a longer run, or channels of Q, Y or the body's accelerations"
+        raise input_error(runs[0].name, "no section", allowed, "distance")
     Q0 = float(np.mean([np.mean(result["Q0"]) for result in found]))
     comparisons = []
     for name, quantity in QUANTITIES.items():
         own = tuple(pair for pair in pairs if pair.quantity == name)
         if own and name in limits.limits:
             limit = limits.limits[name].at(Q0)
-            comparisons.append(
-                Comparison(quantity, own, limit, limits.mean * limit, limits.sections)
-            )
+            mean, least = limits.mean * limit, limits.sections
+            comparisons.append(Comparison(quantity, own, limit, mean, least))
     if not all(one.checked for one in limits.limits.values()):
         remarks.append(f"limits of {limits.edition} not checked against the printed standard")
-    return ModelValidation(
-        found[0].vehicle().name, tuple(run.name for run in runs), tuple(comparisons),
-        tuple(overlays), limits.edition, tuple(dict.fromkeys(remarks)),
-    )  # fmt: skip
+    names, said = tuple(run.name for run in runs), tuple(dict.fromkeys(remarks))
+    results_of = found[0].vehicle().name, names, tuple(comparisons), tuple(overlays)
+    return ModelValidation(*results_of, limits.edition, said)
 
 
 def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> list[Result]:
@@ -139,11 +129,7 @@ def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> 
         name = run.definition.track
         track = None if name is None else load_track(name)
         speed = float(np.mean(run.speed))
-        fits = {
-            name: result
-            for name, result in results.items()
-            if not _contradictions(run, result, track)
-        }
+        fits = {n: r for n, r in results.items() if not _contradictions(run, r, track)}
         if len(fits) == 1:
             found += fits.values()
             continue
@@ -213,9 +199,8 @@ class _Run:
                 values = np.asarray(series(result, selection))
             except KeyError as error:
                 key = f"channels.{name}"
-                faults.append(
-                    Fault(run.name, key, str(error.args[0]), "run it with outputs for it")
-                )
+                words = str(error.args[0])
+                faults.append(Fault(run.name, key, words, "run it with outputs for it"))
                 continue
             simulated_there[name] = amplified(values, rate, run.channel(name))
         if faults:
@@ -230,18 +215,15 @@ class _Run:
             allowed = f"measured between {begin:.0f} and {distance[-1]:.0f} m, as simulated"
             raise input_error(run.name, found, allowed, "distance")
         rising = np.concatenate([[True], np.diff(distance) > 0.0])
-        simulated: dict[str, Floats] = {
-            name: np.interp(part.distance, distance[rising], x[rising])
-            for name, x in simulated_there.items()
-        }
         unknown = {name: np.isnan(part[name]) for name in selections}
         row = np.arange(len(part.time))
-        measured: dict[str, Floats] = {
-            name: np.interp(row, row[~gap], part[name][~gap])
-            if not gap.all()
-            else np.zeros(len(row))
-            for name, gap in unknown.items()
-        }
+        simulated: dict[str, Floats] = {}
+        measured: dict[str, Floats] = dict.fromkeys(selections, np.zeros(len(row)))
+        for name, x in simulated_there.items():
+            simulated[name] = np.interp(part.distance, distance[rising], x[rising])
+            known = ~unknown[name]
+            if known.any():
+                measured[name] = np.interp(row, row[known], part[name][known])
         every = max(1, round(part.rate / LIKE))
 
         def thin(values: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -253,14 +235,12 @@ class _Run:
 
     def overlays(self) -> list[Overlay]:
         rate = self.measurement.rate
-        return [
-            Overlay(
-                self.measurement.name, name, quantity, self.s, rate,
-                np.where(self.unknown[name], np.nan, _passed(self.measured[name], rate, FORCES)),
-                _passed(self.simulated[name], rate, FORCES),
-            )
-            for name, quantity in compared(self.measurement).items()
-        ]  # fmt: skip
+        found = []
+        for name, quantity in compared(self.measurement).items():
+            read, made = (passed(x[name], rate, FORCES) for x in (self.measured, self.simulated))
+            read = np.where(self.unknown[name], np.nan, read)
+            found.append(Overlay(self.measurement.name, name, quantity, self.s, rate, read, made))
+        return found
 
     def pairs(self, tests: RunningLimits, limits: ValidationLimits) -> list[Pair]:
         vehicle, track = self.result.vehicle(), self.result.track()
@@ -310,9 +290,8 @@ class _Run:
         for quantity, name in by.items():
             kind, *labels = quantity.split(":")
             if base.startswith("body"):
-                at_floor = kind == "sensor_acceleration" and not labels[0].startswith(
-                    ("frame", "axlebox")
-                )
+                elsewhere = ("frame", "axlebox")
+                at_floor = kind == "sensor_acceleration" and not labels[0].startswith(elsewhere)
                 if at_floor and labels[1] == base[-1]:
                     found.append((labels[0], None, base[-1], [name]))
             elif kind == base:
@@ -343,16 +322,13 @@ class _Run:
             both = []
             for source in (self.measured, self.simulated):
                 values = self._signal(source, quantity, how, side, names, section)
-                x = Signal(values[:, None], s[:, None], [(place, side)]).in_section(
-                    0, section, quantity.window
-                )
+                signal = Signal(values[:, None], s[:, None], [(place, side)])
+                x = signal.in_section(0, section, quantity.window)
                 both.append(quantity.value(x, section.turn) if len(x) else [])
             label = f"{place} {wheel}".rstrip()
-            found += [
-                Pair(quantity.name, self.measurement.name, label, section.begin, section.end,
-                     section.radius, m, v)
-                for m, v in zip(*both, strict=False)
-            ]  # fmt: skip
+            names_of = quantity.name, self.measurement.name, label
+            where = section.begin, section.end, section.radius
+            found += [Pair(*names_of, *where, m, v) for m, v in zip(*both, strict=False)]
         return found
 
     def _signal(
@@ -360,7 +336,7 @@ class _Run:
         names: list[str], section: TestSection,
     ) -> Floats:  # fmt: skip
         rate = self.measurement.rate
-        first, *rest = [_passed(source[name], rate, quantity.band) for name in names]
+        first, *rest = [passed(source[name], rate, quantity.band) for name in names]
         outwards = 1.0 if side is None else float(OUTWARDS[side])
         if how == "sum":
             first = first + rest[0]
@@ -374,11 +350,6 @@ class _Run:
         if how == "y":
             return (section.turn or 1.0) * first
         return first
-
-
-def _passed(x: Floats, rate: float, band: Band) -> Floats:
-    low, high = band
-    return low_passed(x, rate, high) if low is None else band_passed(x, rate, low, high)
 
 
 def _placed(

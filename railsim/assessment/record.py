@@ -154,12 +154,11 @@ class Record:
         else:
             begin, end = known.first, known.first + len(known.speed)
             before, after = slice(rows.start, begin), slice(end, rows.stop)
-            parts = (
-                self._of_motion(before, speed[: begin - rows.start]),
-                (known.acceleration, known.roll),
-                self._of_motion(after, speed[end - rows.start :]),
-            )
-            found = np.concatenate([a for a, _ in parts]), np.concatenate([r for _, r in parts])
+            first = self._of_motion(before, speed[: begin - rows.start])
+            last = self._of_motion(after, speed[end - rows.start :])
+            each = zip(first, (known.acceleration, known.roll), last, strict=True)
+            acceleration, roll = map(np.concatenate, each)
+            found = acceleration, roll
         self._last = _Readings(rows.start, speed, *found)
         return found
 
@@ -182,9 +181,8 @@ class Record:
         """Speed of the reference body at an arc length [m/s]."""
         i = int(np.clip(np.searchsorted(self.distance, s), 1, self.rows - 1))
         low, high = max(i - 5, 0), min(i + 5, self.rows - 1)
-        return float(
-            (self.distance[high] - self.distance[low]) / (self.time[high] - self.time[low])
-        )
+        way, time = (float(x[high] - x[low]) for x in (self.distance, self.time))
+        return way / time
 
     def rows_between(self, begin: float, end: float, margin: float) -> slice:
         """Rows in which any part of the vehicle is between two arc lengths, with a margin [s]."""
@@ -207,10 +205,8 @@ class Record:
 
     def remarks(self) -> list[str]:
         """Notes on the record for the reader of the assessment."""
-        found = [
-            f"{self.name}: {remark}" if remark.startswith(HUNTS) else remark
-            for remark in self.result.remarks
-        ]
+        said = self.result.remarks
+        found = [f"{self.name}: {one}" if one.startswith(HUNTS) else one for one in said]
         if self.coarse:
             found.append(
                 f"{self.name}: {self.rate:.4g} samples per second are too few for instantaneous "

@@ -116,12 +116,8 @@ def assessed_runs(
     service = replacement or _service(runs)
     done = _read(runs, limits, service, options)
     if done and not any(run.sections for run in done):
-        raise input_error(
-            done[0].name,
-            "too short for one section",
-            "a longer run, or other sections in the limits file (--limits)",
-            "distance",
-        )
+        allowed = "a longer run, or other sections in the limits file (--limits)"
+        raise input_error(done[0].name, "too short for one section", allowed, "distance")
     f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
     for run in done:
         run.values = section_values(run.record, run.counting, f0=f0, causal=options.causal)
@@ -133,10 +129,9 @@ def assessed_runs(
         members = [run for run in done if run.population == name]
         result = members[0].record.result
         population = Population(name, result.vehicle(), result["Q0"])
-        reports = zone_reports(
-            population, [v for run in members for v in run.values],
-            [s for run in members for s in run.sections], service, limits, options.method,
-        )  # fmt: skip
+        values = [v for run in members for v in run.values]
+        sections = [s for run in members for s in run.sections]
+        reports = zone_reports(population, values, sections, service, limits, options.method)
         zones += reports
         conditions += missing_zones(population, reports, limits)
         for report in reports if not population.fault else ():
@@ -146,10 +141,8 @@ def assessed_runs(
     if done:
         conditions += vehicle_conditions(zones, counted, results, limits, service)
     verdicts = all_verdicts(runs, zones, conditions)
-    return Running(
-        verdicts, tuple(zones), tuple(conditions), tuple(rows), f0,
-        tuple(influences(zones, service)), _remarks(done, zones, limits),
-    )  # fmt: skip
+    parts = tuple(zones), tuple(conditions), tuple(rows), f0, tuple(influences(zones, service))
+    return Running(verdicts, *parts, _remarks(done, zones, limits))
 
 
 def limits_checked(limits: RunningLimits, file: str) -> RunningLimits:
@@ -159,12 +152,12 @@ def limits_checked(limits: RunningLimits, file: str) -> RunningLimits:
     one.
     """
     needed = [name for name, one in CRITERIA.items() if one.group != INFORMATION]
-    faults = [Fault(file, f"limits.{name}", "unknown quantity", nearest(name, CRITERIA))
-              for name in limits.limits if name not in CRITERIA]  # fmt: skip
-    faults += [Fault(file, f"limits.{name}", "missing", "needed for its verdict")
-               for name in needed if name not in limits.limits]  # fmt: skip
-    if faults:
-        raise InputError(faults)
+    found = {
+        n: ("unknown quantity", nearest(n, CRITERIA)) for n in limits.limits if n not in CRITERIA
+    }
+    found |= {n: ("missing", "needed for its verdict") for n in needed if n not in limits.limits}
+    if found:
+        raise InputError(Fault(file, f"limits.{name}", *words) for name, words in found.items())
     return limits
 
 
@@ -194,9 +187,8 @@ def _read(
         record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
         if "Q0" not in result:
             raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
-        sections = track_sections(
-            result.track(), limits, service, record.covered(), record.speed_at
-        )
+        covered = record.covered()
+        sections = track_sections(result.track(), limits, service, covered, record.speed_at)
         counting = [s for s in sections if s.zone and (options.all_sections or not s.reason)]
         found.append(_Run(name, record, populations[name], sections, counting))
     return found
@@ -214,10 +206,8 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
     for s in run.sections:
         alignment, level = quality.deviations(s.begin, s.end) if quality else (0.0, 0.0)
         name = quality_class(min(s.speed, service.admissible_speed), alignment, level)
-        rows.append(SectionRow(
-            run.name, run.population, s, alignment, level, name, conicity, realisation,
-            s in run.counting,
-        ))  # fmt: skip
+        found = alignment, level, name, conicity, realisation, s in run.counting
+        rows.append(SectionRow(run.name, run.population, s, *found))
     return rows
 
 

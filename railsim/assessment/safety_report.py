@@ -70,9 +70,8 @@ def safety_report(record: Record) -> SafetyReport:
             climb = climb_distance(s[:, w], quotient[:, w, k], limit, _height(record, w, k))
             lifted = bool(np.isnan(quotient[:, w, k]).any())
             largest = float("nan") if lifted else float(np.max(quotient[:, w, k]))
-            wheels.append(WheelSafety(
-                f"wheelset {w + 1} {side}", limit, largest, climb.length, climb.begin, climb.rise
-            ))  # fmt: skip
+            own = f"wheelset {w + 1} {side}", limit, largest
+            wheels.append(WheelSafety(*own, climb.length, climb.begin, climb.rise))
     bogies: dict[str, list[int]] = {}
     for w, name in enumerate(names):
         bogies.setdefault(name.split(".")[0], []).append(w)

@@ -8,7 +8,8 @@ sections outside the conditions of their zones are listed with the reason why th
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.limits import RunningLimits, Zone
@@ -112,15 +113,13 @@ def _constant(track: Track) -> list[tuple[float, float, float, float]]:
     elif cants[-1].end < last:
         value = cants[-1].end_value
         cants = [*cants, Section("", "CST", cants[-1].end, last, value, value)]
-    found = []
-    for element in _joined(plan):
-        for cant in _joined(cants):
-            begin = max(_inner(element, track.rounding)[0], _inner(cant, track.rounding)[0])
-            end = min(_inner(element, track.rounding)[1], _inner(cant, track.rounding)[1], last)
-            if begin < end:
-                kappa = element.start_value
-                radius = 1.0 / kappa if kappa else math.inf
-                found.append((max(begin, 0.0), end, radius, cant.start_value))
+    found, half = [], 0.5 * track.rounding
+    for element, cant in product(_joined(plan), _joined(cants)):
+        begin = max(element.begin, cant.begin) + half
+        end = min(element.end - half, cant.end - half, last)
+        if begin < end:
+            radius = 1.0 / element.start_value if element.start_value else math.inf
+            found.append((max(begin, 0.0), end, radius, cant.start_value))
     return sorted(found)
 
 
@@ -132,17 +131,10 @@ def _joined(sections: Sequence[Section]) -> list[Section]:
             continue
         before = constant[-1] if constant else None
         if before and before.end == section.begin and before.end_value == section.start_value:
-            constant[-1] = Section(
-                before.key, before.type, before.begin, section.end, before.start_value,
-                section.end_value,
-            )  # fmt: skip
+            constant[-1] = replace(before, end=section.end, end_value=section.end_value)
         else:
             constant.append(section)
     return constant
-
-
-def _inner(section: Section, rounding: float) -> tuple[float, float]:
-    return section.begin + 0.5 * rounding, section.end - 0.5 * rounding
 
 
 def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
@@ -171,10 +163,8 @@ def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service
     unit = 1.0 if zone.radius is None else service.cant_deficiency
     reasons = []
     if not low * unit - 1e-6 <= deficiency <= high * unit + 1e-6:
-        reasons.append(
-            f"cant deficiency {1e3 * deficiency:.0f} mm, required {1e3 * low * unit:.0f} to "
-            f"{1e3 * high * unit:.0f} mm"
-        )
+        required = f"{1e3 * low * unit:.0f} to {1e3 * high * unit:.0f} mm"
+        reasons.append(f"cant deficiency {1e3 * deficiency:.0f} mm, required {required}")
     if zone.speed is not None:
         slow, fast = (share * service.admissible_speed for share in zone.speed)
         if not slow - 1e-6 <= speed <= fast + 1e-6:

@@ -10,7 +10,7 @@ from railsim.arrays import Floats
 from railsim.assessment.record import Record
 from railsim.assessment.safety import overturning
 from railsim.assessment.sections import TestSection
-from railsim.result.filters import band_passed, distance_means, low_passed, window_centres
+from railsim.result.filters import band_passed, distance_means, window_centres
 
 Band = tuple[float | None, float]
 """Lower and upper corner of a filter [Hz]; without the lower one a low pass."""
@@ -55,6 +55,12 @@ class Signal:
 def between(s: Floats, begin: float, end: float) -> slice:
     """Rows between two arc lengths."""
     return slice(int(np.searchsorted(s, begin)), int(np.searchsorted(s, end, side="right")))
+
+
+def passed(x: Floats, rate: float, band: Band, *, causal: bool = False) -> Floats:
+    """Values over time through the filter of a band."""
+    low, high = band
+    return band_passed(x, rate, low or 0.0, high, causal=causal)
 
 
 class Signals:
@@ -103,11 +109,7 @@ class Signals:
 
     def passed(self, x: Floats, band: Band) -> Floats:
         """Values over time through a filter."""
-        flat, (low, high) = x.reshape(len(x), -1), band
-        if low is None:
-            flat = low_passed(flat, self.record.rate, high, causal=self.causal)
-        else:
-            flat = band_passed(flat, self.record.rate, low, high, causal=self.causal)
+        flat = passed(x.reshape(len(x), -1), self.record.rate, band, causal=self.causal)
         return flat.reshape(x.shape)
 
     def s_wheelset(self, band: Band | None) -> Floats:

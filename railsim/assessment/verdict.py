@@ -60,12 +60,13 @@ def all_verdicts(
     found = {}
     for name in VERDICTS:
         exceeded = [why for report in reports for why in _exceeded(report, name)]
-        unknown = [
-            f"{report.title}: {row.criterion.words}, {row.place}: too few values for an estimate"
-            for report in reports
-            for row in report.rows
-            if row.criterion.group == name and math.isnan(row.share)
+        rows = [(r.title, row) for r in reports for row in r.rows if row.criterion.group == name]
+        few = [
+            f"{title}: {row.criterion.words}, {row.place}"
+            for title, row in rows
+            if math.isnan(row.share)
         ]
+        unknown = [f"{where}: too few values for an estimate" for where in few]
         incomplete = [*stopped, *unknown, *missing]
         if derailed and name == SAFETY:
             value = DERAILED
@@ -96,6 +97,6 @@ def _exceeded(report: ZoneReport, criterion: str) -> list[str]:
         if (about := row.criterion).group == criterion
     ]
     if criterion == SAFETY:
-        found += [f"{report.title}: {wheel} without load over {metres:.1f} m: Y/Q has no value"
-                  for wheel, metres in report.lifted.items()]  # fmt: skip
+        lifted = [f"{wheel} without load over {m:.1f} m" for wheel, m in report.lifted.items()]
+        found += [f"{report.title}: {words}: Y/Q has no value" for words in lifted]
     return found

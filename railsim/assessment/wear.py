@@ -196,10 +196,8 @@ class WholeLifeRailModel:
         T = np.asarray(T_gamma, dtype=np.float64)
         rising = (T - self.threshold) / (self.peak - self.threshold)
         falling = (self.balance - T) / (self.balance - self.peak)
-        return np.asarray(
-            self.damage * np.maximum(np.minimum(rising, falling), 0.0)
-            + self.damage * np.minimum(falling, 0.0)
-        )
+        growth, removal = np.maximum(np.minimum(rising, falling), 0.0), np.minimum(falling, 0.0)
+        return np.asarray(self.damage * growth + self.damage * removal)
 
 
 def surface_fatigue_index(

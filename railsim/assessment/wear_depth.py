@@ -30,17 +30,8 @@ WORN = " worn"
 DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the profile meanwhile
 UPDATE = 0.1e-3  # m, after which the contact is computed again on the worn profile
 MOST_PARTS = 100  # of a step
-NEEDED = (
-    "patch_T_gamma",
-    "patch_N",
-    "patch_friction",
-    "patch_a",
-    "patch_b",
-    "patch_y",
-    "patch_z",
-    "patch_angle",
-    "body_position",
-)
+OF_PATCHES = ("T_gamma", "N", "friction", "a", "b", "y", "z", "angle")
+NEEDED = (*(f"patch_{name}" for name in OF_PATCHES), "body_position")
 
 
 def grid() -> Floats:
@@ -100,20 +91,15 @@ def _patches(
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
         raise input_error("result", f"no wheelset {wheelset}", "", "wheelset")
-    at = (slice(None), wheelset, side)
+    own = (result[f"patch_{name}"][:, wheelset, side] for name in OF_PATCHES)
+    T_gamma, N, friction, a, b, y, z, angle = own
     ways = np.gradient(result["distance"])
-    size = np.pi * result["patch_a"][at] * result["patch_b"][at]
     speed = (ways / np.gradient(result["time"]))[:, None]
-    patches = Patches(
-        result["patch_T_gamma"][at], size, 2.0 * wheel.radius[side], result["patch_N"][at],
-        result["patch_friction"][at], speed,
-    )  # fmt: skip
+    patches = Patches(T_gamma, np.pi * a * b, 2.0 * wheel.radius[side], N, friction, speed)
     body = result.bodies.index(result.wheelsets[wheelset])
-    roll = result["body_position"][:, body, 3, None]
     # from the axes of the track to those of the wheelset
-    across = result["patch_y"][at] + roll * result["patch_z"][at]
-    widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))
-    return law.worn_area(patches), ways, across, widths, wheel
+    across = y + result["body_position"][:, body, 3, None] * z
+    return law.worn_area(patches), ways, across, b * np.abs(np.cos(angle)), wheel
 
 
 def upper_side(profile: Profile) -> slice:
@@ -215,10 +201,8 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     name = f"{profile.name.removesuffix(WORN)}{WORN}"
     # z points down: a wheel loses height, a rail gains depth
     z = profile.z + lost if profile.kind == "rail" else profile.z - lost
-    return Profile(
-        name, profile.kind, profile.y, z, f"{profile.source}; {words}",
-        profile.inclination, (*profile.notes, words),
-    )  # fmt: skip
+    origin = f"{profile.source}; {words}", profile.inclination, (*profile.notes, words)
+    return Profile(name, profile.kind, profile.y, z, *origin)
 
 
 @dataclass(frozen=True)
@@ -252,7 +236,5 @@ def wheel_dimensions(profile: Profile) -> WheelDimensions:
         return float(np.interp(-depth, -z[tread][pair], y[tread][pair]))
 
     thick, outer = face(0.010), np.maximum.accumulate(z[field][::-1])[::-1]
-    return WheelDimensions(
-        float(z[tip]), thick - FLANGE_BACK, thick - face(z[tip] - 0.002),
-        float(np.max(outer - z[field])),
-    )  # fmt: skip
+    slope, hollow = thick - face(z[tip] - 0.002), float(np.max(outer - z[field]))
+    return WheelDimensions(float(z[tip]), thick - FLANGE_BACK, slope, hollow)

@@ -20,6 +20,7 @@ from railsim.notation import SIDES
 from railsim.result.filters import StreamingPercentiles
 
 CELL = 0.5  # N, initial bin width for the percentiles of the wear number
+OF_PATCHES = ("fatigue_index", "utilised_friction", "pressure_ratio")
 PATCHES = ("patch_N", "patch_a", "patch_b", "patch_T_x", "patch_T_y")
 
 
@@ -122,13 +123,11 @@ def wear_report(
             T_gamma=float(mean[w, k] / length),
             percentiles={f"{p:g}": streams[w][k].percentile(p) for p in (50.0, 95.0, 99.85)},
             bound=streams[w][k].width,
-            worn_area={
-                name: float(worn[name][w, k] / length) if name in worn else None for name in laws
-            },
+            worn_area={n: float(worn[n][w, k] / length) if n in worn else None for n in laws},
             rail_damage=float(damage[w, k, np.argmax(np.abs(damage[w, k]))] / length),
-            fatigue_index=float(worst[0, w, k]) if patches else None,
-            utilised_friction=float(worst[1, w, k]) if patches else None,
-            pressure_ratio=float(worst[2, w, k]) if patches else None,
+            **dict(
+                zip(OF_PATCHES, worst[:, w, k].tolist() if patches else [None] * 3, strict=True)
+            ),
         )
         for w in range(len(radii))
         for k, side in enumerate(SIDES)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.criteria import CRITERIA, INFORMATION, SAFETY, Criterion
+from railsim.assessment.criteria import CRITERIA, INFORMATION, SAFETY, WORDS, Criterion
 from railsim.assessment.en14363 import SectionValues
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.statistics import Estimate, extreme, one_dimensional, two_dimensional
@@ -148,8 +148,7 @@ class ZoneReport:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sections that do not count, and wheels without load."""
-        lifted = [f"{wheel} without load over {metres:.1f} m" for wheel, metres in
-                  self.lifted.items()]  # fmt: skip
+        lifted = (f"{wheel} without load over {m:.1f} m" for wheel, m in self.lifted.items())
         return (*reasons(self.sections), *lifted)
 
     def record(self) -> dict[str, object]:
@@ -179,8 +178,8 @@ def zone_reports(
     `values`: Of the sections that count, of all its runs. `sections`: All sections of all its
     runs. `method` ({'normal', 'simplified'}).
     """
-    judged = [c for c in CRITERIA.values() if method in c.methods and
-              (c.group in (SAFETY, INFORMATION) or not population.fault)]  # fmt: skip
+    groups = (SAFETY, INFORMATION) if population.fault else tuple(WORDS)
+    judged = [c for c in CRITERIA.values() if method in c.methods and c.group in groups]
     reports = []
     for zone in sorted(limits.zones):
         all_own = tuple(s for s in sections if s.zone == zone)
@@ -189,12 +188,10 @@ def zone_reports(
         own = tuple(v for v in values if v.section.zone == zone)
         pooled = _Pooled(population, zone, own, limits, service)
         rows = [row for criterion in judged for row in pooled.rows(criterion)]
-        reports.append(ZoneReport(
-            zone, population, own, all_own,
-            tuple(row for row in rows if row.criterion.group != INFORMATION),
-            tuple(row for row in rows if row.criterion.group == INFORMATION),
-            limits.zones[zone].sections,
-        ))  # fmt: skip
+        limited = tuple(row for row in rows if row.criterion.group != INFORMATION)
+        beside = tuple(row for row in rows if row.criterion.group == INFORMATION)
+        needed = limits.zones[zone].sections
+        reports.append(ZoneReport(zone, population, own, all_own, limited, beside, needed))
     return reports
 
 
@@ -247,10 +244,8 @@ class _Pooled:
         number = re.match(r"(?:wheelset |frame_)(\d+)", place)
         wheelset = int(number[1]) - 1 if number else None
         static = math.nan if wheelset is None else float(np.mean(self.population.Q0[wheelset]))
-        return Situation(
-            self.population.vehicle, self.service, self.zone, _mean_radius(self.values), wheelset,
-            static, self.limits.limits,
-        )  # fmt: skip
+        at = self.service, self.zone, _mean_radius(self.values), wheelset, static
+        return Situation(self.population.vehicle, *at, self.limits.limits)
 
     def _estimate(self, criterion: Criterion, influence: Floats, values: Floats) -> Estimate:
         kind = criterion.kind
@@ -265,10 +260,8 @@ class _Pooled:
     def _less_high_friction(self, place: str, guiding: Floats) -> Floats | None:
         """Guiding forces corrected where Y/Q of the inner wheel indicates high friction, if any."""
         law, inner = self.limits.high_friction, place.replace("outer", "inner")
-        quotient = np.array([
-            v.values["Y_over_Q_inner", inner][0] for v in self.values
-            if ("Y_qst", place) in v.values
-        ])  # fmt: skip
+        own = [v.values for v in self.values if ("Y_qst", place) in v.values]
+        quotient = np.array([values["Y_over_Q_inner", inner][0] for values in own])
         if law is None or not (quotient > law.threshold).any():
             return None
         return np.asarray(guiding - law.slope * np.maximum(quotient - law.threshold, 0.0))
