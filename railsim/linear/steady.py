@@ -16,19 +16,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from railsim.arrays import Floats
 from railsim.errors import ModelError
-from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
-from railsim.kernels.support import RATE, REFERENCE_MASS
 from railsim.kernels.system import AXLEBOX, SPEED, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
-from railsim.linear.coordinates import track_indices
 from railsim.model.assembly import Model
-from railsim.model.work import CONSTANT_SPEED, components_of, without_loads, work_arrays
+from railsim.model.equilibrium import conditions, difference_quotients
+from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
 from railsim.notation import COMPONENTS
 
 RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
@@ -67,7 +64,7 @@ class SteadyRolling:
         self.system = without_loads(system)._replace(drive=CONSTANT_SPEED)
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
-        self._unknowns, self._equations, self._inertias = _conditions(model, system, held)
+        self._unknowns, self._equations, self._inertias = conditions(model, system, held=held)
         bodies = system.bodies
         self._rigid = np.flatnonzero(bodies.kind != AXLEBOX)
         self._wheelsets = np.flatnonzero(bodies.kind == WHEELSET)
@@ -166,10 +163,7 @@ class SteadyRolling:
         return better
 
     def _jacobian(self, state: Floats, forces: Floats) -> Floats:
-        steps = STEP * np.maximum(1.0, np.abs(state[self._unknowns]))
-        trials = np.repeat(state[None], len(steps), axis=0)
-        trials[np.arange(len(steps)), self._unknowns] += steps
-        return np.asarray(((self._forces(trials) - forces) / steps[:, None]).T)
+        return difference_quotients(self._forces, state, forces, self._unknowns, STEP)
 
     def _line_search(
         self, state: Floats, forces: Floats, change: Floats
@@ -200,37 +194,6 @@ class SteadyRolling:
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
         return "no steady state; largest remaining accelerations: " + ", ".join(parts)
-
-
-def _conditions(
-    model: Model, system: System, held: bool
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Indices of unknowns and equations in state and derivative; inertia of each equation."""
-    n = model.index.n_bodies
-    bodies = system.bodies
-    unknowns, equations, inertias = [], [], []
-    for body, kind in enumerate(bodies.kind):
-        if kind == WHEELSET and held:
-            continue
-        for component in components_of(int(kind)):
-            if body in bodies.references and component == 0:
-                continue
-            spin = kind == WHEELSET and component == 4
-            unknowns.append((6 * n if spin else 0) + 6 * body + component)
-            equations.append(6 * n + 6 * body + component)
-            inertias.append(
-                float(bodies.mass[body] if component < 3 else bodies.inertia[body, component - 3])
-            )
-    if not held:
-        track, _ = track_indices(model)
-        unknowns += track
-        equations += [RATE + k for k in track]
-        inertias += [REFERENCE_MASS] * len(track)
-    for i in np.flatnonzero(system.internal.kind == AIR):
-        unknowns.append(12 * n + int(i))
-        equations.append(12 * n + int(i))
-        inertias.append(1.0)
-    return np.array(unknowns), np.array(equations), np.array(inertias)
 
 
 Systems = Callable[[float], tuple[System, float]]

@@ -15,12 +15,13 @@ What cannot be balanced is named: body, component, force or moment.
 """
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Indices
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import NORMAL, W_Q
 from railsim.kernels.contact_table import K2, K
@@ -28,7 +29,15 @@ from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
+from railsim.kernels.support import (
+    DOF,
+    K_BALLAST_Z,
+    K_PAD_Z,
+    RAIL_DOF,
+    RATE,
+    REFERENCE_MASS,
+    SUPPORT_SIZE,
+)
 from railsim.kernels.system import (
     ARC_LENGTH,
     AXLEBOX,
@@ -210,6 +219,52 @@ def _tracks(system: System, state: Floats) -> Floats:
     return state[end - SUPPORT_SIZE * wheelsets : end].reshape(wheelsets, SUPPORT_SIZE)
 
 
+def conditions(
+    model: Model, system: System, *, held: bool = False, rolling: bool = True
+) -> tuple[Indices, Indices, Floats]:
+    """Unknowns and equations of balance as entries of the state, and the inertias of equations.
+
+    The unknown of a wheelset's spin is its rate, of all others the position; without `rolling` it
+    does not spin.  `held`: neither wheelsets nor their track move.
+    """
+    n, bodies, support = model.index.n_bodies, system.bodies, system.support
+    unknowns, equations, inertias = [], [], []
+    for body, kind in enumerate(bodies.kind):
+        for component in components_of(int(kind)):
+            spin = kind == WHEELSET and component == 4
+            given = body in bodies.references and component == 0
+            if given or (kind == WHEELSET and held) or (spin and not rolling):
+                continue
+            unknowns.append((6 * n if spin else 0) + 6 * body + component)
+            equations.append(6 * n + 6 * body + component)
+            of_body = (bodies.mass[body],) * 3 + tuple(bodies.inertia[body])
+            inertias.append(float(of_body[component]))
+    if support.elastic and not held:
+        first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(system.contact.body)
+        starts = first + SUPPORT_SIZE * np.arange(len(system.contact.body))
+        moving = np.arange(DOF if support.sleeper else RAIL_DOF)
+        track = (starts[:, None] + moving).ravel().tolist()
+        unknowns += track
+        equations += [RATE + k for k in track]
+        inertias += [REFERENCE_MASS] * len(track)
+    air = (12 * n + np.flatnonzero(system.internal.kind == AIR)).tolist()
+    return (
+        np.array([*unknowns, *air]),
+        np.array([*equations, *air]),
+        np.array([*inertias, *[1.0] * len(air)]),
+    )
+
+
+def difference_quotients(
+    function: Callable[[Floats], Floats], state: Floats, value: Floats, unknowns: Indices, h: float
+) -> Floats:
+    """Slopes of a function of several states over some entries of one, where it has `value`."""
+    steps = h * np.maximum(1.0, np.abs(state[unknowns]))
+    trials = np.repeat(state[None], len(steps), axis=0)
+    trials[np.arange(len(steps)), unknowns] += steps
+    return np.asarray(((function(trials) - value) / steps[:, None]).T)
+
+
 class _Balance:
     """Newton's method on the accelerations of all bodies, velocities zero in the track frame."""
 
@@ -219,29 +274,7 @@ class _Balance:
         self.speed = speed
         self.work = work_arrays(system)
         self.residual = np.inf
-        n = model.index.n_bodies
-        self._unknowns: list[int] = []
-        self._equations: list[int] = []
-        for body, kind in enumerate(system.bodies.kind):
-            for component in components_of(int(kind)):
-                if body in system.bodies.references and component == 0:
-                    continue
-                spin = kind == WHEELSET and component == 4
-                if spin and not rolling:
-                    continue
-                # the unknown of a wheelset's spin is its rate, of all others the position
-                self._unknowns.append((6 * n if spin else 0) + 6 * body + component)
-                self._equations.append(6 * n + 6 * body + component)
-        if system.support.elastic:
-            first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(system.contact.body)
-            moving = DOF if system.support.sleeper else RAIL_DOF
-            starts = first + SUPPORT_SIZE * np.arange(len(system.contact.body))
-            degrees = (starts[:, None] + np.arange(moving)).ravel().tolist()
-            self._unknowns += degrees
-            self._equations += [RATE + k for k in degrees]
-        for i in np.flatnonzero(system.internal.kind == AIR):
-            self._unknowns.append(12 * n + int(i))
-            self._equations.append(12 * n + int(i))
+        self._unknowns, self._equations, _ = conditions(model, system, rolling=rolling)
 
     def solve(self, guess: Floats) -> Floats:
         """Return the balanced state; raise ModelError with the unbalanced components."""
@@ -321,10 +354,7 @@ class _Balance:
         return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
 
     def _jacobian(self, state: Floats, rest: Floats) -> Floats:
-        steps = 1e-9 * np.maximum(1.0, np.abs(state[self._unknowns]))
-        trials = np.repeat(state[None], len(steps), axis=0)
-        trials[np.arange(len(steps)), self._unknowns] += steps
-        return np.asarray(((self._accelerations(trials) - rest) / steps[:, None]).T)
+        return difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
 
     def _line_search(
         self, state: Floats, rest: Floats, change: Floats, trials: int
