@@ -100,9 +100,8 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
 
 def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["Remark"]:
     """Return what is allowed but unusual in a definition, and in a vehicle's `supports` at rest."""
+    from railsim.definitions import Track, Vehicle
     from railsim.definitions.base import Remark
-    from railsim.definitions.track.definition import Track
-    from railsim.definitions.vehicle.definition import Vehicle
 
     found = definition.unusual()
     if isinstance(definition, Vehicle):

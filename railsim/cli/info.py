@@ -74,8 +74,8 @@ def command(
 
         found = describe(open_result(file))
     else:
+        from railsim.definitions import Vehicle
         from railsim.definitions.loading import load_any
-        from railsim.definitions.vehicle.definition import Vehicle
         from railsim.description import describe
         from railsim.plottable import Plottable
 

@@ -8,9 +8,7 @@ from railsim.cli.common import F, collected, load_option, option, set_option
 from railsim.errors import Faults, input_error
 
 if TYPE_CHECKING:
-    from railsim.definitions.settings import Settings
-    from railsim.definitions.track.definition import Track
-    from railsim.definitions.vehicle.definition import Vehicle
+    from railsim.definitions import Settings, Track, Vehicle
 
 MOST_VALUES = 2000
 

@@ -24,7 +24,7 @@ from railsim.cli.progress import progress_bar
 from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
-    from railsim.definitions.vehicle.definition import Vehicle
+    from railsim.definitions import Vehicle
     from railsim.linear.modes import Modes, RootLocus
 
 FILES = ("modes.json", "modes.png")

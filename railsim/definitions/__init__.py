@@ -1,6 +1,7 @@
 """What a user may write: frozen, typed, validated definitions in SI units.
 
-Begin with `loading` (from a file to a definition), then read `vehicle` and `track`.
+The three that a run needs are taken from here.  Begin with `loading` (from a file to a
+definition), then read `vehicle` and `track`.
 
 =============  ==================================================================================
 module         job
@@ -29,3 +30,9 @@ loading        files to definitions
 schema         JSON Schemas and the manual's key tables
 =============  ==================================================================================
 """
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.definition import Vehicle
+
+__all__ = ["Settings", "Track", "Vehicle"]

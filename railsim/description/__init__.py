@@ -10,9 +10,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
+from railsim.definitions import Track, Vehicle
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.description.tracks import describe_track
 from railsim.description.values import Description
 from railsim.description.vehicles import describe_vehicle

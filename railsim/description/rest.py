@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.description.values import Description, Parts
 from railsim.laws import permitted_part

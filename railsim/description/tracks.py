@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from railsim.definitions import Track
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.track.alignment_rules import cant_at
-from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import cant_sections, curvature_sections, gradient_sections
 from railsim.definitions.track.section import Section
 from railsim.description.values import Description, Parts, either, short

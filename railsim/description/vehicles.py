@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any
 
+from railsim.definitions import Vehicle
 from railsim.definitions.elements.base import Element
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Assembly
 from railsim.description.values import Description, Parts, either, short

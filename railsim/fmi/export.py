@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Track, Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import argument_error, input_error, nearest, optional_package
 from railsim.files.access import check_file, whole_file

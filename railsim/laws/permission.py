@@ -6,9 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults
 

@@ -2,8 +2,7 @@
 
 import math
 
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
+from railsim.definitions import Settings, Track
 from railsim.model.uneven_wheels import UnevenWheels
 
 LENGTH = 50.0  # m; the tables reach beyond both ends

@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.arrays import Floats
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import ModelError
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel

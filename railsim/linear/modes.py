@@ -10,10 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import argument_error
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of

@@ -12,7 +12,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
-from railsim.definitions.track.definition import Track
+from railsim.definitions import Track
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import ARC_LENGTH, FORCE, MOMENT, System

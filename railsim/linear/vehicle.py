@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.creep_law import CREEP_LAWS
 from railsim.definitions.loading import check_types
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, ModelError, argument_error
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System

@@ -16,13 +16,11 @@ from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Drive as DriveDefinition
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import is_straight_and_level
 from railsim.definitions.track.support import Support as SupportDefinition
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError, input_error

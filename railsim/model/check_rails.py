@@ -6,8 +6,8 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.curves import GAUGE_DEPTH, tape_circle_position
+from railsim.definitions import Track
 from railsim.definitions.track.check_rail import FAR, CheckRail
-from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.tables import Wheelset
 from railsim.kernels.check_rails import CHECK_ROW, CHECK_WHEEL, FIRST, LAST

@@ -3,8 +3,7 @@
 import numpy as np
 
 from railsim.contact.creep import creep_law
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
+from railsim.definitions import Settings, Track
 from railsim.definitions.vehicle.laws import LawUse
 from railsim.errors import input_error, nearest
 from railsim.kernels.creep import OWN

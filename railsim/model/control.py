@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from railsim.definitions.settings import Settings
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Settings, Vehicle
 from railsim.definitions.vehicle.laws import BODY_SIGNALS, Controller, Signal
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import controllers as kernel

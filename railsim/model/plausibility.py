@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions import Vehicle
 from railsim.definitions.base import Remark
 from railsim.definitions.elements.base import FreeLength
 from railsim.definitions.elements.side_bearer import SideBearer
 from railsim.definitions.elements.spring_damper import SpringDamper
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.errors import ModelError
 

@@ -13,8 +13,8 @@ from railsim.arrays import Floats
 from railsim.contact.curves import gauge_face
 from railsim.contact.section_tables import Range, cached_section_table
 from railsim.contact.table import ContactTable, Normal
+from railsim.definitions import Track
 from railsim.definitions.section_files import SectionList
-from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rail_sections import RailSections
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.errors import ModelError

@@ -13,11 +13,9 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.constants import GRAVITY
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.loading import check_types, load_track
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.kernels.element_outputs import DEFLECTION, FORCE, LINK, MOUNT
 from railsim.kernels.time_loop import FAST, Chunk, time_loop

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from railsim.arrays import Floats
 from railsim.contact.curves import rail_curve, tape_circle_position
 from railsim.contact.out_of_round import Surface, parts_by_wheel, surface_arrays, wheel_surface
-from railsim.definitions.track.definition import Track
+from railsim.definitions import Track
 from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.out_of_round import Flat, Sections, Uneven
 from railsim.kernels.contact_table import FLANGE, N_PATCH

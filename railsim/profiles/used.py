@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator
 
+from railsim.definitions import Track, Vehicle
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.tables import Assembly
 from railsim.errors import Fault, InputError
 from railsim.profiles import load_profile

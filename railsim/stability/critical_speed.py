@@ -9,10 +9,8 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, InputError, ModelError
 from railsim.linear.eigenmodes import (
     SEARCHED,

@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 
 from railsim.arrays import Floats
 from railsim.cant import curve_speed
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, ModelError
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD

@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from railsim.arrays import Floats
+from railsim.definitions import Settings, Track
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.files.access import check_folder, write_text

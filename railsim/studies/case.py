@@ -9,11 +9,9 @@ from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.settings import Settings
 from railsim.definitions.study.analyses import Analysis, needs_run, needs_speed
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError
 from railsim.files.overrides import split_overrides
 from railsim.files.sources import OVERRIDE

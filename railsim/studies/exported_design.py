@@ -52,7 +52,7 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     folder : Path
         Folder of the new file; the path to the original is relative to it.
     """
-    from railsim.definitions.vehicle.definition import Vehicle
+    from railsim.definitions import Vehicle
 
     base = sources.read_source(sources.find_file(vehicle, "vehicle"), "vehicle")
     defaults = Vehicle.model_construct().model_dump(mode="json")

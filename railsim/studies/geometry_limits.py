@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions import Track
 from railsim.definitions.excitations.recording import BANDS, band_passed
-from railsim.definitions.track.definition import Track
 from railsim.table import Column, Table
 from railsim.track.irregularity import displacement
 

@@ -13,12 +13,11 @@ from railsim.assessment.record import START
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality
 from railsim.cant import curve_speed
+from railsim.definitions import Track, Vehicle
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.study.scenario import Speed, TestCondition
-from railsim.definitions.track.definition import Track
 from railsim.definitions.track.tables import Circle
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, input_error

@@ -10,8 +10,7 @@ from railsim.arrays import Floats
 from railsim.assessment.wear import WearLaw
 from railsim.assessment.wear_depth import rail_depth
 from railsim.constants import GRAVITY
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Track, Vehicle
 from railsim.notation import SIDES
 from railsim.profiles import load_profile
 from railsim.result import Result

@@ -17,9 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import InputError, RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import workers_begin

@@ -22,10 +22,8 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.cant import cant_deficiency
 from railsim.constants import CANT_BASE
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import StationaryLimits, Value
-from railsim.definitions.settings import Settings
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.errors import Fault, InputError, input_error
 from railsim.linear.sliding import has_pads

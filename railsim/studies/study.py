@@ -5,11 +5,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.settings import Settings
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.study.analyses import Analysis, needs_run
 from railsim.definitions.study.definition import Sample
-from railsim.definitions.track.definition import Track
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.files.access import check_folder, is_file
 from railsim.processes import available_cores

@@ -21,11 +21,10 @@ from railsim.arrays import Floats
 from railsim.assessment.wear import DEFAULT_LAW, WearLaw, wear_law
 from railsim.assessment.wear_depth import parts_of_step, wheel_dimensions, worn_depth, worn_profile
 from railsim.contact import contact_geometry
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import WheelLimits
-from railsim.definitions.settings import InitialState, Settings
-from railsim.definitions.track.definition import Track
+from railsim.definitions.settings import InitialState
 from railsim.definitions.track.tables import Straight
-from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, Faults, InputError, ModelError, RailsimError, input_error
 from railsim.profiles import Profile, load_profile

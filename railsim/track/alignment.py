@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
-from railsim.definitions.track.definition import Track
+from railsim.definitions import Track
 from railsim.definitions.track.layout import (
     cant_sections,
     curvature_sections,

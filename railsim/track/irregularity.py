@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import Measured, largest_between_rows
-from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 from railsim.errors import input_error, nearest

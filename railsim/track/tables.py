@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
-from railsim.definitions.track.definition import Track
 from railsim.errors import input_error
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
