@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
 from railsim.errors import RailsimError
+from railsim.kernels.compiler import entry
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
@@ -271,10 +272,19 @@ class Convoy:
         self.fresh, self.due = runs[0].fresh, runs[0].due
         self.evaluates = self.state[TIME] >= runs[0].prepared.evaluation - ROUND_OFF
         self.varies = runs[0].prepared.steps.varies
-        # equal steps of distance while the speed changes: every interval is a chunk of its own
+        # equal steps of distance while the speed changes: the last step of an interval ends there
         self.spacing = settings.output_spacing if self.varies else None
         wheelsets = [len(model.system.contact.body) for model in models]
         self._shares = [number / sum(wheelsets) for number in wheelsets]
+        self._entries: dict[object, Any] = {}
+
+    def compiled(self, function: Any, *args: object) -> Any:
+        """Call a compiled function of system and work arrays, without a search for types."""
+        call = self._entries.get(function, function)
+        result = call(self.system, self.work, *args)
+        if call is function:
+            self._entries[function] = entry(function, self.system, self.work, *args)
+        return result
 
     def to_the_end(self, moved: Callable[[Sequence[Run], Floats], None]) -> list[list[Run]]:
         """Advance to the end, or to where runs part; return in which groups they go on."""
@@ -296,7 +306,7 @@ class Convoy:
             choices = self.choices()
             if len(set(choices)) > 1 or self._errors():
                 return self._parted(choices, before)
-            status, where, rows = self._chunk(*choices[0]) if choices else self.last_record()
+            status, where, rows = self._chunk(choices) if choices else self.last_record()
             if status != RUNNING and len(self._runs) > 1:
                 return self._parted(self.ensemble.concerned(status, where), before)
             self.write(rows)
@@ -324,7 +334,7 @@ class Convoy:
         if self.left() <= 1e-9:
             return []
         if self.spacing is not None:
-            right_hand_sides(self.system, self.work, self.state[None], self.derivative[None])
+            self.compiled(right_hand_sides, self.state[None], self.derivative[None])
         speed, rate = self.state[SPEED], self.derivative[SPEED]
         choices = []
         for run in self._runs:
@@ -341,30 +351,53 @@ class Convoy:
                 choices.append((math.nan, 0))
         return choices
 
-    def _chunk(self, step: float, every: int) -> tuple[int, int, int]:
-        """Advance by one chunk: status, where, number of records."""
-        at_most = max(1, STEPS // (every * len(self._runs)))
-        intervals = 1 if self.varies else min(ROWS, at_most)
+    def _chunk(self, choices: list[tuple[float, int]]) -> tuple[int, int, int]:
+        """Advance by one chunk: status, where, number of records.
+
+        Where the speed varies the step is chosen anew at every output.
+        """
+        rows, steps, most = 0, 0, max(1, STEPS // len(self._runs))
+        while True:
+            step, every = choices[0]
+            intervals = 1 if self.varies else min(ROWS, max(1, most // every))
+            status, where, rows = self._intervals(step, every, intervals, rows)
+            steps += every
+            ends = status != RUNNING or rows >= ROWS or steps >= most or self._evaluation_begins()
+            if ends or not self.varies:
+                return status, where, rows
+            choices = self.choices()
+            if len(set(choices)) != 1 or self._errors():  # at the end, or where runs part
+                return status, where, rows
+
+    def _intervals(
+        self, step: float, every: int, intervals: int, rows: int
+    ) -> tuple[int, int, int]:
+        """Advance by some intervals between outputs after `rows` records of this chunk."""
         if not self.evaluates:  # whose begin is the end of a chunk
             before = self._runs[0].prepared.evaluation - self.state[TIME]
             intervals = min(intervals, max(1, math.ceil(before / (step * every) - ROUND_OFF)))
         n_steps = min(intervals * every, math.ceil(self.left() / step * (1.0 - 1e-9)))
         last = int(self.spacing is not None and n_steps == every)
         goal = self.state[ARC_LENGTH] + (self.spacing or 0.0)
-        status, where, steps, rows = self.call(step, 0, n_steps - last, every)
+        status, where, steps, rows = self.call(step, 0, n_steps - last, every, rows=rows)
         if last and status == RUNNING:
             # the last step of an interval of distance ends where the interval ends
             rest = duration(
                 goal - self.state[ARC_LENGTH], self.state[SPEED], self.derivative[SPEED]
             )
-            status, where, more, first = self.call(rest, steps, 1, every)
-            steps, rows = steps + more, rows + first
+            status, where, more, rows = self.call(rest, steps, 1, every, rows=rows)
+            steps += more
         self.due = status == RUNNING and steps % every == 0
         return status, where, rows
 
+    def _evaluation_begins(self) -> bool:
+        """Whether the part of the run that is evaluated begins here."""
+        begin = self._runs[0].prepared.evaluation
+        return not self.evaluates and bool(self.state[TIME] >= begin - ROUND_OFF)
+
     def begin_evaluation(self) -> None:
         """Begin with new extremes where the part of the run begins that is evaluated."""
-        if self.evaluates or self.state[TIME] < self._runs[0].prepared.evaluation - ROUND_OFF:
+        if not self._evaluation_begins():
             return
         for run, part in zip(self._runs, self.ensemble.parts, strict=True):
             _take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
@@ -380,29 +413,20 @@ class Convoy:
         return status, where, rows
 
     def call(
-        self, step: float, first: int, n_steps: int, every: int, closing: int = 0
+        self, step: float, first: int, n_steps: int, every: int, closing: int = 0, rows: int = 0
     ) -> tuple[int, int, int, int]:
-        """Call the time loop; its status, where, number of steps and of records."""
+        """Call the time loop; its status, where, number of steps, of records with those before."""
         begin = time.thread_time()  # a library's idle threads may still be spinning
         most = max(1, STEPS // len(self._runs))
         longest = longest_part(self.system, self.state[SPEED])
         divide_strikes(self.work, self.scheme, step, longest)
-        at, end, rows = first, first + n_steps, 0
+        at, end = first, first + n_steps
         while True:
             # more than one call only within one output interval, which records at its begin:
             # Ctrl-C is heard between calls
-            status, where, steps, new = time_loop(
-                self.system,
-                self.work,
-                self.state,
-                self.derivative,
-                self.stages,
-                self.ensemble.recorder,
-                self.scheme,
-                step,
-                Chunk(at, min(most, end - at), every, fresh=int(self.fresh), closing=closing),
-            )
-            at, rows = at + steps, rows + new
+            chunk = Chunk(at, min(most, end - at), every, int(self.fresh), closing, rows)
+            status, where, steps, rows = self.loop(step, chunk)
+            at += steps
             self.fresh = self.fresh and steps == 0
             if status != RUNNING or at >= end:
                 break
@@ -411,6 +435,12 @@ class Convoy:
             run.cpu_time += share * spent
             run.together = max(run.together, len(self._runs))
         return status, where, at - first, rows
+
+    def loop(self, step: float, chunk: Chunk) -> tuple[int, int, int, int]:
+        """Call the time loop once."""
+        arrays = self.state, self.derivative, self.stages, self.ensemble.recorder
+        status, where, steps, rows = self.compiled(time_loop, *arrays, self.scheme, step, chunk)
+        return status, where, steps, rows
 
     def write(self, rows: int) -> None:
         """Hand the records of a chunk to the runs' sinks."""

@@ -20,7 +20,6 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault, nearest
 from railsim.kernels.actuators import COMMAND, send
-from railsim.kernels.compiler import entry
 from railsim.kernels.controllers import BASE, VALUE
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import ARC_LENGTH, SPEED, TIME
@@ -121,7 +120,6 @@ class Simulation:
         self._length, self._every, self._goal = 0.0, 1, 0.0
         self._prepared_for, self._longest = math.nan, math.inf
         self._closed: Result | None = None
-        self._loop: Any = None
         self._begun: SavedState | None = None
         self._seen: Mapping[str, Floats] | None = None
         self._probe: Any = None  # work arrays and recorder where a state is evaluated
@@ -313,17 +311,10 @@ class Simulation:
             divide_strikes(convoy.work, convoy.scheme, length, self._longest)
             self._prepared_for = length
         kept = convoy.work.vibration.copy() if length < self._length else 0.0  # of whole steps
-        arrays = (convoy.system, convoy.work, convoy.state, convoy.derivative, convoy.stages)
-        if self._loop is None:
-            nothing = (convoy.ensemble.recorder, convoy.scheme, length, Chunk(1, 0, NEVER))
-            time_loop(*arrays, *nothing)
-            self._loop = entry(time_loop, *arrays, *nothing)
         if not self._records:
             first, every = first + 1, NEVER
         chunk = Chunk(first, steps, every, int(convoy.fresh), 0, self._rows)
-        run.status, run.where, taken, self._rows = self._loop(
-            *arrays, convoy.ensemble.recorder, convoy.scheme, length, chunk
-        )
+        run.status, run.where, taken, self._rows = convoy.loop(length, chunk)
         convoy.fresh = convoy.fresh and taken == 0
         if length < self._length:
             convoy.work.vibration[:] = kept
