@@ -1,11 +1,11 @@
 """Hardware and versions."""
 
-import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from railsim.processes import available_cores
 from railsim.version import __version__
 
 PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "h5py")
@@ -15,7 +15,7 @@ def hardware() -> dict[str, Any]:
     """Return processor, number of cores and memory."""
     return {
         "processor": _from_file("/proc/cpuinfo", "model name") or platform.processor(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": available_cores(),
         "memory": _from_file("/proc/meminfo", "MemTotal"),
         "system": f"{platform.system()} {platform.machine()}",
     }

@@ -35,6 +35,8 @@ _SUFFIX = ".railsim.partial"
 _RANDOM = rf"\.[a-z0-9_]{{8}}{re.escape(_SUFFIX)}"  # as `tempfile` names files
 _OF_FILES = (*RESULTS, *PICTURES, *TABLES, ".csv", ".json", ".html", ".txt")
 _NO_WAITING = getattr(os, "O_NONBLOCK", 0)
+_BINARY = getattr(os, "O_BINARY", 0)
+_CLOSED_FIRST = os.name == "nt"  # Windows neither renames nor removes an open file
 _own_partial_files: set[Path] = set()
 
 
@@ -179,7 +181,7 @@ def open_regular(path: str | Path) -> BinaryIO:
         if system and not resolved.is_relative_to(_SHARED_MEMORY):
             raise input_error(str(path), "a file of the system", "give one of your own")
         # a pipe would wait for its writer
-        file = open(os.open(path, os.O_RDONLY | _NO_WAITING), "rb")  # noqa: SIM115
+        file = open(os.open(path, os.O_RDONLY | _NO_WAITING | _BINARY), "rb")  # noqa: SIM115
     except (OSError, ValueError, RuntimeError) as error:
         raise _unreadable(path, error) from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -242,6 +244,8 @@ class PartialFile:
         """
         os.fsync(self._handle)
         os.chmod(self.path, _usual_mode(self.target))
+        if _CLOSED_FIRST:
+            self._close()
         path = self.target
         if overwrite:
             os.replace(self.path, path)
@@ -259,8 +263,13 @@ class PartialFile:
 
     def remove(self) -> None:
         """Remove the hidden file, if it is still there, and release its lock; may be repeated."""
+        if _CLOSED_FIRST:
+            self._close()
         self.path.unlink(missing_ok=True)
         _own_partial_files.discard(self.path)
+        self._close()
+
+    def _close(self) -> None:
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1

@@ -29,6 +29,9 @@ _LOG = logging.getLogger("railsim")
 _HEAD = re.compile(rb"railsim-cache ([0-9a-f]{8}) ([0-9]{15})\n")
 _HEAD_BYTES = 39
 _unwritable: set[Path] = set()
+_OWNERS = hasattr(os, "geteuid")  # Windows has lists of access instead, which are not read here
+_BINARY = getattr(os, "O_BINARY", 0)
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 MARK = "CACHEDIR.TAG"  # the name and its first line are known to programs for backups
 _MARK_TEXT = b"""Signature: 8a477f597d28d172789f06886806bc55
@@ -116,11 +119,11 @@ def _make_marked(folder: Path, *, reserved: bool = False) -> None:
     _make(folder)
     if reserved or not os.listdir(folder):
         with suppress(OSError):
-            handle = os.open(folder / MARK, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            handle = os.open(folder / MARK, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, 0o600)
             with open(handle, "wb") as file:
                 file.write(_MARK_TEXT)
     facts = folder.stat()
-    if facts.st_uid != os.geteuid() or facts.st_mode & 0o777 == 0o700:
+    if not _OWNERS or facts.st_uid != os.geteuid() or facts.st_mode & 0o777 == 0o700:
         return
     if _is_marked(folder):
         with suppress(OSError):
@@ -136,6 +139,9 @@ def _is_marked(folder: Path) -> bool:
 
 def _distrust(folder: Path, top: Path) -> str:
     """Say why another user could have written into a folder of the cache."""
+    if not _OWNERS:
+        own = folder.is_relative_to(Path.home().resolve())
+        return "" if own else f"who may write to {folder} is known of folders of your own only"
     for path in (folder, *folder.parents):
         facts = os.lstat(path)
         if facts.st_uid not in (os.geteuid(), 0):
@@ -193,13 +199,13 @@ def _remove(folder: Path) -> None:
 def _content(path: Path) -> bytes | None:
     """Return the content of a regular file that only this user or root can have written."""
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        handle = os.open(path, os.O_RDONLY | _NO_LINK | _BINARY)
         with open(handle, "rb") as file:
             facts = os.fstat(file.fileno())
             others = facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-            if not stat.S_ISREG(facts.st_mode) or others:
+            if _OWNERS and (others or facts.st_uid not in (os.geteuid(), 0)):
                 return None
-            return file.read() if facts.st_uid in (os.geteuid(), 0) else None
+            return file.read() if stat.S_ISREG(facts.st_mode) else None
     except OSError:
         return None
 

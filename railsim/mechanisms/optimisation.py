@@ -24,7 +24,7 @@ from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of
-from railsim.processes import workers_begin
+from railsim.processes import FORKSERVER, workers_begin
 from railsim.units import duration_in_words
 
 
@@ -133,7 +133,7 @@ def _search(definition: Mechanism, judge: Judge, jobs: Sequence[Any], workers: i
         rough = Judge(definition, EVERY)
         found = [_run(rough, index, begin, choice, SEARCH) for _, index, begin, choice in jobs]
         return _finished(judge, found, [_run(judge, *job) for job in _finals(judge, found)])
-    context = get_context("forkserver")
+    context = get_context("forkserver" if FORKSERVER else "spawn")
     with workers_begin(), ProcessPoolExecutor(workers, mp_context=context) as pool:
         found = list(pool.map(_run_job, [(*job, SEARCH, EVERY) for job in jobs], chunksize=1))
         finals = [(definition, *job, 1) for job in _finals(judge, found)]

@@ -69,7 +69,9 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / JOURNAL
-        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND
+        for name in ("O_NOFOLLOW", "O_BINARY"):  # not everywhere
+            flags |= getattr(os, name, 0)
         self._handle = os.open(self.path, flags, 0o666)
         with suppress(OSError):  # a file system without locks
             if not locked(self._handle):
