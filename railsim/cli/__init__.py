@@ -143,7 +143,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         status = _status(arguments)
-        for sentence in _cache_notices():
+        cache = sys.modules.get("railsim.kernels.cache")
+        for sentence in getattr(cache, "notices", ()):
             echo(f"remark: {sentence}", err=True)
         sys.stdout.flush()
     except BrokenPipeError:
@@ -194,12 +195,6 @@ def _failed(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int
     if "--json" in arguments:
         print_json({"exit_status": status, **words})
     return status
-
-
-def _cache_notices() -> list[str]:
-    """Return what there is to say of the cache; nothing where no compiled code was needed."""
-    module = sys.modules.get("railsim.kernels.cache")
-    return list(getattr(module, "notices", ()))
 
 
 def _called(arguments: list[str]) -> int:

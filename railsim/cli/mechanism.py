@@ -81,7 +81,11 @@ def command(
     if output.out is not None:
         content = _content(results, cases, optimum)
         if optimum is not None:
-            content[OPTIMISED] = _optimised_text(files[0], case, output.out, optimum, assignments)
+            from railsim.mechanisms.optimised_file import optimised_text
+
+            own = Path(files[0])
+            base = Path(os.path.relpath(own, output.out)).as_posix() if own.is_file() else files[0]
+            content[OPTIMISED] = optimised_text(base, optimum, assignments, case).encode()
         output.write_all(content)
     output.answer(
         _data(results, cases, at_values, optimum),
@@ -187,13 +191,3 @@ def _content(
         content["motion.csv"] = report.motion_table(collected.result)
     content[REPORT] = report.page(collected, drawn).encode()
     return content
-
-
-def _optimised_text(
-    file: str, case: str | None, out: str, optimum: "Optimum", assignments: Sequence[str]
-) -> bytes:
-    """The file that extends another with the best parameters and whatever --set changed."""
-    from railsim.mechanisms.optimised_file import optimised_text
-
-    base = Path(os.path.relpath(file, out)).as_posix() if Path(file).is_file() else file
-    return optimised_text(base, optimum, assignments, case).encode()

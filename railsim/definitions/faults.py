@@ -63,11 +63,11 @@ def _written_path(detail: Any, data: Any) -> tuple[str, ...]:
     """Return the key path as written: pydantic's location without the tags of unions."""
     path: list[str] = []
     node = data
-    location = detail["loc"]
+    location, last = detail["loc"], len(detail["loc"]) - 1
     for depth, item in enumerate(location):
         if _holds(node, item):
             node = node[item]
-        elif not (isinstance(node, dict) and depth == len(location) - 1 and _lacks(detail)):
+        elif not (isinstance(node, dict) and depth == last and detail["type"] == "missing"):
             continue
         path.append(str(item))
     return tuple(path)
@@ -77,10 +77,6 @@ def _holds(node: Any, item: str | int) -> bool:
     if isinstance(node, list):
         return isinstance(item, int) and item < len(node)
     return isinstance(node, dict) and item in node
-
-
-def _lacks(detail: Any) -> bool:
-    return bool(detail["type"] == "missing")
 
 
 def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:

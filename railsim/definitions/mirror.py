@@ -69,7 +69,10 @@ def _mirrored_group(group: Group) -> Group:
             )
             for name, w in group.wheelsets.items()
         },
-        "axleboxes": {name: _mirrored_box(box) for name, box in group.axleboxes.items()},
+        "axleboxes": {
+            name: box if box.sides == "both" else _moved(box)
+            for name, box in group.axleboxes.items()
+        },
         "elements": {name: _mirrored_element(e) for name, e in group.elements.items()},
         "assemblies": {name: _mirrored_group(a) for name, a in group.assemblies.items()},
     }
@@ -84,10 +87,6 @@ def _across(point: Vector) -> Vector:
 
 def _moved(part: Part) -> Part:
     return part.model_copy(update={"position": _across(part.position)})
-
-
-def _mirrored_box(box: Axlebox) -> Axlebox:
-    return box if box.sides == "both" else _moved(box)
 
 
 def _mirrored_element(element: Element) -> Element:

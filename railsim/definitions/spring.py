@@ -6,7 +6,7 @@ belong to one command (`[target]` to design, `[fatigue]` to fatigue, `[vehicle]`
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -50,16 +50,12 @@ def _ordered(bounds: Range) -> Range:
     return bounds
 
 
-def _one_row(value: Any) -> Any:
-    return value if isinstance(value, list | tuple) else ((0.0, value),)
-
-
 _NUMBER = {"type": "number", "exclusiveMinimum": 0}
 _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 
 NumberOrTable = Annotated[
     tuple[Row, ...],
-    BeforeValidator(_one_row),
+    BeforeValidator(lambda v: v if isinstance(v, list | tuple) else ((0.0, v),)),
     AfterValidator(_rising_table),
     WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _ROW, "minItems": 1}]}),
 ]
@@ -327,7 +323,7 @@ class TrailingArmSuspension(FileDefinition):
 
     def contradictions(self) -> list[Fault]:
         """Return what is wrong between the parts."""
-        return spring_faults(self)
+        return [*_load_faults(self), *_inner_faults(self)]
 
     def unusual(self) -> list[Remark]:
         """Return what is allowed but unusual."""
@@ -340,11 +336,6 @@ class TrailingArmSuspension(FileDefinition):
             return (self.arm.seat_height,)
         raised = self.outer.free_height - self.inner.free_height - self.engagement
         return (self.arm.seat_height, self.arm.seat_height + raised)
-
-
-def spring_faults(suspension: TrailingArmSuspension) -> list[Fault]:
-    """Faults between the parts of a valid spring file: names of loads, springs that do not fit."""
-    return [*_load_faults(suspension), *_inner_faults(suspension)]
 
 
 def _load_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:

@@ -142,11 +142,6 @@ def _holds(keys: Sequence[str], path: Sequence[str]) -> bool:
     return all(part in rest for part in path)
 
 
-def _kinds(table: Sequence[str]) -> str:
-    """Beginning of a new member of a table, such as the kind that has to be given."""
-    return NEW_MEMBERS.get(table[-1], "") if table else ""
-
-
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:
     table = ".".join(before) or "the file"
     if isinstance(node, dict):
@@ -154,7 +149,8 @@ def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str
         allowed = nearest(part, known) if known else "it is empty"
         named = all(isinstance(member, dict) for member in node.values())
         new = named and not allowed.startswith("did you mean")
-        adds = f"{table}.{part}={{{_kinds(before)}...}} adds it" if new else ""
+        kinds = NEW_MEMBERS.get(before[-1], "") if before else ""
+        adds = f"{table}.{part}={{{kinds}...}} adds it" if new else ""
         return "; ".join(filter(None, [f"no '{part}' in {table}", allowed, adds]))
     if isinstance(node, list):
         names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]

@@ -52,13 +52,8 @@ def with_values(
 
     Raises InputError: keys that lead nowhere; all of them at once.
     """
-    given = ((key, partial(_given, value)) for key, value in values.items())
+    given = ((key, lambda _, value=value: _plain(value)) for key, value in values.items())
     return _changed(source, given, free, defaults, source.file)
-
-
-def _given(value: Any, _: Any) -> Any:
-    """Return a value whatever the present one is."""
-    return _plain(value)
 
 
 def _parsed(text: str) -> tuple[str, Read | None]:

@@ -281,7 +281,9 @@ class _Balance:
         state = guess.copy()
         state[SPEED] = self.speed
         state[ARC_LENGTH] = 0.0
-        self._start_rolling(state)
+        spins = 6 * self.model.index.n_bodies + 4
+        for body in np.flatnonzero(self.system.bodies.kind == WHEELSET):
+            state[spins + 6 * body] = -self.speed / self.system.bodies.radius[body]
         rest = self._accelerations(state)
         change = np.zeros(len(self._unknowns))
         for _ in range(_STEPS):
@@ -337,12 +339,6 @@ class _Balance:
             ahead, behind = self._accelerations(trials)
             columns.append((ahead - behind) / (2.0 * span))
         return np.array(columns).T
-
-    def _start_rolling(self, state: Floats) -> None:
-        n = self.model.index.n_bodies
-        bodies = self.system.bodies
-        for body in np.flatnonzero(bodies.kind == WHEELSET):
-            state[6 * n + 6 * body + 4] = -self.speed / bodies.radius[body]
 
     def _accelerations(self, states: Floats) -> Floats:
         """Accelerations of one state, or of several, one a row."""

@@ -382,7 +382,11 @@ def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | Non
     branches = [branch for branch in found.branches if branch.direction != "ramp"]
     only_ramp = not branches
     if only_ramp:
-        branches = [_above_its_end(branch, lowest) for branch in found.branches]
+        end = np.inf if lowest is None else lowest.speed
+        branches = [
+            Branch(branch.direction, [point for point in branch.points if point.speed >= end])
+            for branch in found.branches
+        ]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.high)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.high)
     if only_ramp and (found.amplitude_limit.reached or found.instability_limit.reached):
@@ -390,12 +394,6 @@ def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | Non
             "limits: lowest speeds on the falling ramp; at constant speed they are exceeded from "
             "up to 2 m/s above (bifurcation)"
         )
-
-
-def _above_its_end(branch: Branch, lowest: Point | None) -> Branch:
-    """What of a ramp lies above the end of its branch."""
-    end = np.inf if lowest is None else lowest.speed
-    return Branch(branch.direction, [point for point in branch.points if point.speed >= end])
 
 
 def _remark_range(found: CriticalSpeed, vehicle: Vehicle) -> None:

@@ -53,7 +53,12 @@ def diagram(
     up, down = Branch("up"), Branch("down")
     for speed in speeds:
         try:
-            up.points.append(_upwards(motion, up, speed))
+            last = up.points[-1] if up.points else None
+            if last is None or last.amplitude < SMALL:  # where it rests, a small disturbance
+                seen = settled(motion, motion.rest(speed, SMALL), speed, speed)
+            else:
+                seen = settled(motion, last.state, last.speed, speed)
+            up.points.append(seen_at(speed, seen))
         except LeftRange:
             break
         tell(0.25 * len(up.points) / len(speeds))
@@ -99,14 +104,6 @@ def settled(
             break
         state, before = seen.state, seen.amplitude
     return seen
-
-
-def _upwards(motion: Motion, up: Branch, speed: float) -> Point:
-    """The next motion upwards; where the last one rests, from a small disturbance."""
-    last = up.points[-1] if up.points else None
-    if last is None or last.amplitude < SMALL:
-        return seen_at(speed, settled(motion, motion.rest(speed, SMALL), speed, speed))
-    return seen_at(speed, settled(motion, last.state, last.speed, speed))
 
 
 def _is_known(point: Point, branches: Sequence[Branch]) -> bool:

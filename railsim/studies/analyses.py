@@ -37,11 +37,6 @@ def analysed(case: Case, result: Result | None) -> Numbers:
     return found
 
 
-def _nothing_more(case: Case, analysis: RunAnalysis, result: Result | None) -> Numbers:
-    """A run has its peaks and mid-curve values, as in every study."""
-    return {}
-
-
 def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Numbers:
     """Largest share of each limit; values of comfort, wear and safety."""
     from railsim.assessment import assess
@@ -159,7 +154,7 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Nu
 
 
 _ACTIONS: dict[type[Any], Callable[..., Numbers]] = {
-    RunAnalysis: _nothing_more,
+    RunAnalysis: lambda *_: {},  # peaks and mid-curve values, as in every study
     AssessAnalysis: _assessed,
     ModesAnalysis: _modes,
     CriticalSpeedAnalysis: _critical_speed,

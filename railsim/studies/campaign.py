@@ -120,9 +120,10 @@ def scenario_cases(
             speed = part_speed(part.speed, service)
             label = [short_name(vehicle), state, name, *map(in_a_name, point.values())]
             try:
-                if condition and not _has(vehicle, vehicle_assignments, condition):
-                    continue
                 if condition:
+                    loads = load_vehicle(vehicle, vehicle_assignments).loads
+                    if condition.load not in (None, "design", *loads):
+                        continue
                     texts += condition.assignments
                     texts += [f"vehicle.load={condition.load}"] if condition.load else []
                 run = RunSpec(
@@ -153,12 +154,6 @@ def _conditions(scenario: Scenario) -> list[tuple[int, str, TestCondition | None
     if not scenario.conditions:
         return [(0, "", None)]
     return [(k, name, one) for k, (name, one) in enumerate(scenario.conditions.items())]
-
-
-def _has(vehicle: str | Path, assignments: Sequence[str], condition: TestCondition) -> bool:
-    """Whether a vehicle has the load case of a condition."""
-    known = load_vehicle(vehicle, assignments).loads
-    return condition.load in (None, "design", *known)
 
 
 def part_speed(speed: Speed, service: Service) -> float:

@@ -63,6 +63,7 @@ class Case:
         Definitions with their defaults, the points of the profiles and the version of railsim; not
         the name, the labels or the analyses of the finished run.
         """
+        used = (*used_profiles(self.vehicle), *used_profiles(self.track))
         inputs = {
             "railsim": __version__,
             "vehicle": self.vehicle.to_toml(),
@@ -74,15 +75,11 @@ class Case:
             "until": self.until,
             "profiles": {
                 name: hashlib.sha256(load_profile(name).key()).hexdigest()
-                for name in sorted(self._profile_names())
+                for name in sorted({name for _, name, _ in used})
             },
         }
         text = json.dumps(inputs, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
-
-    def _profile_names(self) -> set[str]:
-        used = (*used_profiles(self.vehicle), *used_profiles(self.track))
-        return {name for _, name, _ in used}
 
 
 Overrides = tuple[str, ...]

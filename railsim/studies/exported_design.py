@@ -80,12 +80,8 @@ def _difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str
         old = before.get(key)
         if value == old:
             continue
-        if isinstance(value, dict) and isinstance(old, dict) and _same_kind(value, old):
-            found[key] = _difference(old, value)
-        else:
-            found[key] = value
+        found[key] = value
+        if isinstance(value, dict) and isinstance(old, dict):
+            alike = value.get("kind") == old.get("kind")
+            found[key] = _difference(old, value) if alike else value
     return found
-
-
-def _same_kind(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    return bool(one.get("kind") == other.get("kind"))

@@ -6,6 +6,7 @@ The command line, Python's keyword arguments and study files make them; the jour
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -83,14 +84,6 @@ def _table(table: Any, option: str = "grid") -> Any:
     return {key: _texts(f"{option} {key}", values) for key, values in table.items()}
 
 
-def _linked(table: Any) -> Any:
-    return _table(table, "linked")
-
-
-def _as_text(value: Any) -> str | None:
-    return None if value is None else str(value)
-
-
 def _stored(value: Any) -> Any:
     """Return definitions as plain data without what is not given."""
     if isinstance(value, Mapping):
@@ -121,14 +114,16 @@ class StudySpec(BaseModel):
     tracks: Annotated[list[str], BeforeValidator(_file_names)]
     speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
     grid: Annotated[dict[str, list[str]], BeforeValidator(_table)] = {}
-    linked: list[Annotated[dict[str, list[str]], BeforeValidator(_linked)]] = []
+    linked: list[
+        Annotated[dict[str, list[str]], BeforeValidator(partial(_table, option="linked"))]
+    ] = []
     sample: Annotated[Sample | None, PlainSerializer(_stored)] = None
     quantities: str | None = None
     analyses: Annotated[dict[Name, Analysis], PlainSerializer(_stored)] = {}
     keep: str = "all"
     compress: bool = False
     single: bool = False
-    settings: Annotated[str | None, BeforeValidator(_as_text)] = None
+    settings: Annotated[str | None, BeforeValidator(lambda v: v if v is None else str(v))] = None
     start: float = 0.0
     duration: float | None = None
     until: float | None = None

@@ -159,7 +159,10 @@ def stationary(
     """
     flat = flatten(vehicle)
     if cant is None:
-        cant = _admissible_cant(vehicle)
+        if vehicle.service is None:
+            allowed, name = "give `cant`, or add [service] with cant_deficiency", vehicle.name
+            raise InputError([Fault(name, "service", "missing", allowed, name)])
+        cant = vehicle.service.cant_deficiency
     if not 0.0 < cant <= 0.5:
         raise input_error("cant", f"{cant:g} m", "above 0, up to 0.5 m")
     twists = twist_heights(flat, limits)
@@ -236,13 +239,6 @@ def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floa
         name: body,
         "both twists": bogie + body,
     }
-
-
-def _admissible_cant(vehicle: Vehicle) -> float:
-    if vehicle.service is None:
-        allowed = "give `cant`, or add [service] with cant_deficiency"
-        raise InputError([Fault(vehicle.name, "service", "missing", allowed, vehicle.name)])
-    return vehicle.service.cant_deficiency
 
 
 def _unloading(

@@ -26,11 +26,9 @@ LARGEST = 0.5  # m; of a law of one's own
 
 def shown_displacement(track: Track) -> Displacement | None:
     """Return the displacement for pictures, without laws that are not permitted."""
-    return displacement(permitted_part(track)) or (_nothing if track.irregularities else None)
-
-
-def _nothing(s: Floats) -> tuple[Floats, Floats]:
-    return np.zeros((4, *s.shape)), np.zeros((4, *s.shape))
+    return displacement(permitted_part(track)) or (
+        (lambda s: (np.zeros((4, *s.shape)),) * 2) if track.irregularities else None
+    )
 
 
 def displacement(track: Track) -> Displacement | None:

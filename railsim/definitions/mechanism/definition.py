@@ -265,10 +265,6 @@ RESULTS = ("travel", "stroke", "length_start", "length_end", "max_force", "min_f
 """Results that `published` may name, beside the smallest of each angle."""
 
 
-def _table_or_word(value: Any) -> str:
-    return "table" if isinstance(value, dict) else "word"
-
-
 Objective = Literal["follow", "constant", "linear", "constant_force", "peak_force"]
 
 
@@ -278,7 +274,7 @@ class Optimise(Definition):
     objective: Annotated[
         Annotated[Objective, Tag("word")]
         | Annotated[dict[Objective, Annotated[float, Field(strict=True, ge=0.0)]], Tag("table")],
-        Discriminator(_table_or_word),
+        Discriminator(lambda value: "table" if isinstance(value, dict) else "word"),
     ] = "follow"
     """What to make small, or a table of objectives with their weights"""
     reference: Text | None = None

@@ -24,10 +24,6 @@ def _quantity(value: Any) -> float | str:
     return float(value)
 
 
-def _quantity_or_auto(value: Any) -> float | str:
-    return AUTO if value == AUTO else _quantity(value)
-
-
 Quantity = Annotated[
     float | str,
     PlainValidator(_quantity),
@@ -35,7 +31,7 @@ Quantity = Annotated[
 ]
 QuantityOrAuto = Annotated[
     float | str,
-    PlainValidator(_quantity_or_auto),
+    PlainValidator(lambda value: AUTO if value == AUTO else _quantity(value)),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]
 
@@ -78,13 +74,9 @@ class Polar(Definition):
     """Direction from the body's x axis [rad]"""
 
 
-def _coordinates_tag(value: Any) -> str:
-    return "polar" if isinstance(value, dict | Polar) else "cartesian"
-
-
 Coordinates = Annotated[
     Annotated[tuple[Quantity, Quantity], Tag("cartesian")] | Annotated[Polar, Tag("polar")],
-    Discriminator(_coordinates_tag),
+    Discriminator(lambda value: "polar" if isinstance(value, dict | Polar) else "cartesian"),
 ]
 
 

@@ -59,7 +59,9 @@ def track_faults(track: TrackTables) -> list[Fault]:
 def track_remarks(track: TrackTables) -> list[Remark]:
     """Return what is allowed in a track but unusual."""
     plan, cant, vertical = curvature_sections(track), cant_sections(track), gradient_sections(track)
-    remarks = _curvature_steps(plan) + _gradient_steps(vertical)
+    remarks = _curvature_steps(plan)
+    text = "the gradient steps without a vertical curve (LIR)"
+    remarks += [Remark(behind.key, text) for _, behind in _steps(vertical)]
     remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
     remarks += _cant_sizes(cant) + _cant_sides(cant, plan)
     if track.speed is not None:
@@ -158,11 +160,6 @@ def _curvature_steps(plan: Sequence[Section]) -> list[Remark]:
         )
         for before, behind in _steps(plan)
     ]
-
-
-def _gradient_steps(vertical: Sequence[Section]) -> list[Remark]:
-    text = "the gradient steps without a vertical curve (LIR)"
-    return [Remark(behind.key, text) for _, behind in _steps(vertical)]
 
 
 def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:

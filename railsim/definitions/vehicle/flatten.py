@@ -162,18 +162,13 @@ def flatten(vehicle: VehicleTables) -> FlatVehicle:
         raise TypeError(wrong_type("vehicle", vehicle))
     stored: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
     if KEPT not in stored:
-        faults = vehicle_faults(vehicle)
+        faults = name_faults(vehicle.model_dump()) or position_faults(vehicle)
         if faults:
             raise InputError(
                 Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
             )
         stored[KEPT] = _flat(vehicle)
     return stored[KEPT]
-
-
-def vehicle_faults(vehicle: VehicleTables) -> list[Fault]:
-    """Return what is wrong between the parts of a vehicle; the faults' file is left empty."""
-    return name_faults(vehicle.model_dump()) or position_faults(vehicle)
 
 
 def _flat(vehicle: VehicleTables) -> FlatVehicle:

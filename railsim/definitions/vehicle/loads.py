@@ -25,11 +25,7 @@ from railsim.errors import Fault, nearest
 DESIGN = "design"  # the load of the vehicle's own numbers, as a load case is called
 
 
-def _case(name: str) -> str | None:
-    return None if name == DESIGN else name
-
-
-LoadName = Annotated[Text, AfterValidator(_case)]
+LoadName = Annotated[Text, AfterValidator(lambda name: None if name == DESIGN else name)]
 V = TypeVar("V", bound=Definition)  # a vehicle, which is built on this module
 
 
