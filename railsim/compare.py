@@ -32,24 +32,19 @@ class Comparison:
     @property
     def differences(self) -> dict[str, float]:
         """Relative difference of every magnitude from the first one's; nan if that is zero."""
-        first = abs(next(iter(self.peaks.values())).value)
-        return {
-            label: (abs(peak.value) - first) / first if first > 0.0 else nan
-            for label, peak in self.peaks.items()
-        }
+        sizes = {label: abs(peak.value) for label, peak in self.peaks.items()}
+        first = next(iter(sizes.values()))
+        return {n: (size - first) / first if first > 0.0 else nan for n, size in sizes.items()}
 
     def record(self) -> dict[str, Any]:
         """Return the comparison as plain numbers and strings, SI."""
-        differences = self.differences
+        differences = self.differences.values()
         return {
             "quantity": self.quantity.name,
             "where": self.where,
             "values": {
-                label: {
-                    **peak.record(),
-                    "difference": None if isnan(differences[label]) else differences[label],
-                }
-                for label, peak in self.peaks.items()
+                label: peak.record() | {"difference": None if isnan(share) else share}
+                for (label, peak), share in zip(self.peaks.items(), differences, strict=True)
             },
         }
 
@@ -139,15 +134,8 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
                 for side, values in mine.items():
                     there_too = np.interp(positions, result["distance"], other[side])
                     labels = {"wheelset": base.wheelsets[0], **({"side": side} if side else {})}
-                    found_ones.append(
-                        Difference(
-                            base.quantities[name],
-                            labels,
-                            label,
-                            positions,
-                            there_too - values[there],
-                        )
-                    )
+                    apart, quantity = there_too - values[there], base.quantities[name]
+                    found_ones.append(Difference(quantity, labels, label, positions, apart))
     return found_ones
 
 
@@ -169,12 +157,11 @@ def comparison_table(rows: Sequence[Comparison]) -> Table:
     """Return comparisons with one line for each value, SI."""
     names = ("quantity", "unit", "where", "result", "value", "wheelset", "side", "time",
              "distance", "difference")  # fmt: skip
-    lines = (
-        {**value, "where": row.where, "result": label}
-        for row in rows
-        for label, value in row.record()["values"].items()
-    )
-    return Table(map(Column, names), lines)
+    lines = []
+    for row in rows:
+        values = row.record()["values"].items()
+        lines += [{**value, "where": row.where, "result": label} for label, value in values]
+    return Table(names, lines)
 
 
 def comparison_tables(rows: Sequence[Comparison], results: Mapping[str, Result]) -> list[Table]:
@@ -223,21 +210,11 @@ def _compared(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iter
 
 def difference_table(found: Sequence[Difference]) -> Table:
     """Return the largest differences along the track."""
-    columns = [
-        Column("quantity", "along the track, leading wheelset"),
-        Column("result"),
-        Column("side"),
-        Column("largest_difference", "largest difference", format=">"),
-        Column("distance", "s", "m", ".1f"),
-    ]
-    rows = [
-        [
-            one.quantity.words,
-            one.result,
-            one.labels.get("side", ""),
-            Amount(one.largest[0], Column.of(one.quantity)),
-            one.largest[1],
-        ]
-        for one in found
-    ]
-    return Table(columns, rows)
+    largest = Column("largest_difference", "largest difference", format=">")
+    where = Column("quantity", "along the track, leading wheelset"), "result", "side"
+    rows = []
+    for one in found:
+        value = Amount(one.largest[0], Column.of(one.quantity))
+        side = one.labels.get("side", "")
+        rows.append([one.quantity.words, one.result, side, value, one.largest[1]])
+    return Table([*where, largest, Column("distance", "s", "m", ".1f")], rows)

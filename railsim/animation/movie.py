@@ -40,14 +40,11 @@ def write_movie(
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
-    writer: Any
-    if path.suffix.lower() == ".mp4":
-        if shutil.which("ffmpeg") is None:
-            allowed = "install ffmpeg, or write a .gif or .html"
-            raise argument_error("path", "MP4 needs ffmpeg", allowed, key=path.name, option="--out")
-        writer = FFMpegWriter(fps=frames_per_second)
-    else:
-        writer = PillowWriter(fps=frames_per_second)
+    film = path.suffix.lower() == ".mp4"
+    if film and shutil.which("ffmpeg") is None:
+        allowed = "install ffmpeg, or write a .gif or .html"
+        raise argument_error("path", "MP4 needs ffmpeg", allowed, key=path.name, option="--out")
+    writer: Any = (FFMpegWriter if film else PillowWriter)(fps=frames_per_second)
     figure = Figure(figsize=(8.0, 4.5 if scene.sections else 3.6), dpi=100)
     FigureCanvasAgg(figure)
     view, sections = _axes(figure, scene)
@@ -77,11 +74,8 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
     view.clear()
     polygons = _polygons(scene, frame, gain)
     polygons.sort(key=lambda item: -item[0])
-    view.add_collection(PolyCollection(
-        [points for _, points, _, _ in polygons],
-        facecolors=[face for _, _, face, _ in polygons],
-        edgecolors=[edge for _, _, _, edge in polygons], linewidths=0.7,
-    ))  # fmt: skip
+    _, points, faces, edges = zip(*polygons, strict=True)
+    view.add_collection(PolyCollection(points, facecolors=faces, edgecolors=edges, linewidths=0.7))
     view.set(xlim=(-15.0, 15.0), ylim=(4.5, -4.5), aspect="equal")
     view.set_axis_off()
     at_s = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"

@@ -44,8 +44,8 @@ def scene_data(scene: Scene) -> dict[str, Any]:
         forces = {"Q": _list(scene.Q * 1e-3, 2), "Y": _list(scene.Y * 1e-3, 2)}
     patches = None
     if scene.patches is not None:
-        patches = {"y": _list(scene.patches["y"], 5), "z": _list(scene.patches["z"], 5),
-                   "N": _list(scene.patches["N"] * 1e-3, 2)}  # fmt: skip
+        patches = {name: _list(scene.patches[name], 5) for name in "yz"}
+        patches["N"] = _list(scene.patches["N"] * 1e-3, 2)
     return {
         "title": scene.title,
         "bodies": [
@@ -69,12 +69,9 @@ def scene_data(scene: Scene) -> dict[str, Any]:
 
 def _motion(scene: Scene) -> dict[str, Any]:
     """What differs between the modes of a vehicle."""
-    return {
-        "title": scene.title,
-        "name": scene.title.partition(" · ")[2],
-        "time": _list(scene.time, 5),
-        "pose": _list(scene.pose, 4),
-    }
+    times, poses = _list(scene.time, 5), _list(scene.pose, 4)
+    name = scene.title.partition(" · ")[2]
+    return {"title": scene.title, "name": name, "time": times, "pose": poses}
 
 
 def _words(name: str) -> str:

@@ -132,10 +132,8 @@ class Analysis:
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
             raise argument_error("at", found, allowed, key=quantity)
         k = crossed[0]
-        s = zeros(
-            solve(self.model, self.motion.s[k : k + 2]),
-            lambda motion: outputs(motion)[quantity] - value,
-        )
+        near = solve(self.model, self.motion.s[k : k + 2])
+        s = zeros(near, lambda motion: outputs(motion)[quantity] - value)
         motion = solve(self.model, s[:1])
         return {name: float(array[0]) for name, array in outputs(motion).items()}
 
@@ -171,25 +169,11 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     check_pressure(motion, output)
     at_zone = zone_drivers(dense)
     in_zone = outputs(solve(model, list(at_zone.values()))) if at_zone else {}
-    zone = {
-        name: {key: float(array[i]) for key, array in in_zone.items()}
-        for i, name in enumerate(at_zone)
-    }
-    return Analysis(
-        definition,
-        model,
-        motion,
-        output,
-        zone,
-        _force_zeros(dense),
-        positions_of_rest(dense),
-        _reactions(motion, output),
-        transitions(dense),
-        contact_of(dense, motion, at_zone),
-        driven_motion(dense) if definition.motion is not None else None,
-        _release(model),
-        case,
-    )
+    zone = {n: {k: float(v[i]) for k, v in in_zone.items()} for i, n in enumerate(at_zone)}
+    timed = driven_motion(dense) if definition.motion is not None else None
+    forces = _force_zeros(dense), positions_of_rest(dense), _reactions(motion, output)
+    found = *forces, transitions(dense), contact_of(dense, motion, at_zone), timed, _release(model)
+    return Analysis(definition, model, motion, output, zone, *found, case)
 
 
 def _force_zeros(dense: Motion) -> tuple[float, ...]:

@@ -65,9 +65,7 @@ def open_loop(
     """
     scales = _scales(model)
     q, residual = _closest(model, s, pose, arcs, scales)
-    sizes = {
-        name: float(np.max(np.abs(residual[a:b]))) for name, (a, b) in model.joint_rows.items()
-    }
+    sizes = {n: float(np.max(np.abs(residual[a:b]))) for n, (a, b) in model.joint_rows.items()}
     largest = max(sizes.values())
     if largest < CLOSED * model.linkage.size:
         return None
@@ -100,11 +98,8 @@ def dead_loop(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[str
     _, jacobian = constraints(model, s, pose, arcs)
     left, _, _ = np.linalg.svd(jacobian / _scales(model, columns=True))
     weight = np.abs(left[:, -1])
-    return tuple(
-        name
-        for name, (a, b) in model.joint_rows.items()
-        if np.max(weight[a:b]) > IN_LOOP * np.max(weight)
-    )
+    least, rows = IN_LOOP * np.max(weight), model.joint_rows
+    return tuple(name for name, (a, b) in rows.items() if np.max(weight[a:b]) > least)
 
 
 def _scales(model: Model, *, columns: bool = False) -> Floats:
@@ -150,8 +145,7 @@ def _closest(
     def slope(x: Floats) -> Any:
         return weights[:, None] * constraints(model, s, at(x), arcs)[1] / columns
 
-    found = least_squares(
-        residual, pose[1:].ravel() * columns, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15
-    )
+    accuracy: Any = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    found = least_squares(residual, pose[1:].ravel() * columns, slope, method="lm", **accuracy)
     q = at(found.x)
     return q, constraints(model, s, q, arcs)[0]

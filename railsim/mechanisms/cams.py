@@ -48,11 +48,11 @@ def roller_body(motion: Motion, joint: str) -> int:
 
 def transitions(dense: Motion) -> tuple[Transition, ...]:
     """All changes of arcs along a motion, in its order."""
-    return tuple(
-        _transition(dense, joint, row, int(k))
-        for joint, row in cam_rows(dense).items()
-        for k in np.flatnonzero(np.diff(dense.arcs[:, row]))
-    )
+    found: list[Transition] = []
+    for joint, row in cam_rows(dense).items():
+        changes = np.flatnonzero(np.diff(dense.arcs[:, row])).tolist()
+        found += [_transition(dense, joint, row, k) for k in changes]
+    return tuple(found)
 
 
 def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
@@ -75,11 +75,9 @@ def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
     unit = np.zeros((2, n, 1))
     unit[:, -1] = 1.0
     rates = np.linalg.solve(jacobian, unit)[:, 3 * (roller_body(dense, joint) - 1) + 2, 0]
-    first = int(model.linkage.joint[row, 4])
+    earlier = int(model.linkage.joint[row, 4]) - 1
     gap = abs(float(residual[1, model.linkage.joint[row, 3]]))
-    return Transition(
-        joint, low, before - first + 1, after - first + 1, gap, float(rates[0]), float(rates[1])
-    )
+    return Transition(joint, low, before - earlier, after - earlier, gap, *rates.tolist())
 
 
 def on_one_arc(motion: Motion, row: int, arc: int, beyond: float) -> Motion | None:

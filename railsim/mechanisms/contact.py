@@ -51,10 +51,8 @@ class Contact:
     @property
     def equilibria(self) -> tuple[tuple[float, bool], ...]:
         """Heights (the middle of each range) at which it rests, and whether they are stable."""
-        return tuple(
-            (0.5 * (low + high), rest.stable)
-            for (low, high), rest in zip(self.heights, self.rests, strict=True)
-        )
+        each = zip(self.heights, self.rests, strict=True)
+        return tuple((0.5 * (low + high), rest.stable) for (low, high), rest in each)
 
 
 Force = Callable[[Motion, int], Any]
@@ -152,10 +150,9 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     found = rests(dense, generalised)
     edges = [height_of(solve(dense.model, [rest.low, rest.high]))[0] for rest in found]
     in_zone = solve(dense.model, list(at_zone.values()))
-    zone, up, down = (
-        dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in (0, 1, -1)
-    )
-    curve, rising, falling = (force(motion, way) for way in (0, 1, -1))
+    ways = (0, 1, -1)
+    zone, up, down = (dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in ways)
+    curve, rising, falling = (force(motion, way) for way in ways)
     missing = not np.all(np.isfinite([*curve, *zone.values()]))
     reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
     heights = tuple((float(min(y)), float(max(y))) for y in edges)

@@ -64,13 +64,19 @@ def lines(motion: Motion) -> list[Line]:
     return found
 
 
-def _coiled(line: Line) -> Line:
-    """A spring as a zigzag between its ends, as wide as a twelfth of its length at first."""
+def _axes(line: Line) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Ends of a line, its length, and unit vectors along and across it (0 where both ends meet)."""
     first, last = line.xy[:, 0], line.xy[:, 1]
     along = last - first
     length = np.hypot(along[:, 0], along[:, 1])[:, None]
-    across = np.stack((-along[:, 1], along[:, 0]), axis=-1) / np.where(length > 0.0, length, 1.0)
-    across = across * length[0] / 24.0
+    along = along / np.where(length > 0.0, length, 1.0)
+    return first, last, length, along, np.stack((-along[:, 1], along[:, 0]), axis=-1)
+
+
+def _coiled(line: Line) -> Line:
+    """A spring as a zigzag between its ends, as wide as a twelfth of its length at first."""
+    first, last, length, _, across = _axes(line)
+    along, across = last - first, across * length[0] / 24.0
     turns = np.linspace(0.15, 0.85, 2 * COILS + 1)[1::2]
     shares = np.concatenate(([0.0, 0.15], turns, [0.85, 1.0]))
     sides = [0.0, 0.0, *(1.0 if k % 2 == 0 else -1.0 for k in range(COILS)), 0.0, 0.0]
@@ -81,13 +87,10 @@ def _coiled(line: Line) -> Line:
 def _telescope(line: Line, spring: GasSpring, motion: Motion) -> Line:
     """A gas spring as a tube, as long as the spring fully compressed, with its rod."""
     n = motion.model.number
-    first, last = line.xy[:, 0], line.xy[:, 1]
     if spring.rod_end == spring.gas_spring[0]:
-        first, last = last, first
-    along = last - first
-    length = np.hypot(along[:, 0], along[:, 1])[:, None]
-    along = along / np.where(length > 0.0, length, 1.0)
-    half = 0.03 * n(spring.extended) * np.stack((-along[:, 1], along[:, 0]), axis=-1)
+        line = Line(line.kind, line.name, line.xy[:, ::-1])
+    first, last, _, along, across = _axes(line)
+    half = 0.03 * n(spring.extended) * across
     end = first + 0.9 * (n(spring.extended) - n(spring.stroke)) * along
     xy = [first, first + half, end + half, end, last, end, end - half, first - half, first]
     return Line(line.kind, line.name, np.stack(xy, axis=1))
@@ -138,11 +141,9 @@ def _cam(motion: Motion, name: str) -> Line:
         angles = begin + turn * np.linspace(0.0, swept, ARC_POINTS)
         radius, k = linkage.arc_radius[0, arc], linkage.arc_point[arc]
         cx, cy = linkage.point[0, k]
-        positions = [
-            motion.at(linkage.point_body[k], cx + radius * np.cos(a), cy + radius * np.sin(a))[0]
-            for a in angles
-        ]
-        parts.append(np.stack(positions, axis=1))
+        x, y = cx + radius * np.cos(angles), cy + radius * np.sin(angles)
+        at = [motion.at(linkage.point_body[k], *xy)[0] for xy in zip(x, y, strict=True)]
+        parts.append(np.stack(at, axis=1))
     return Line("cam", name, np.concatenate(parts, axis=1))
 
 

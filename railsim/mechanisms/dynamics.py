@@ -64,11 +64,9 @@ def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float
         c3, c4, c5 = polynomial_345(duration, stroke)
 
         def smooth(t: Floats) -> tuple[Floats, Floats, Floats]:
-            return (
-                c3 * t**3 + c4 * t**4 + c5 * t**5,
-                3 * c3 * t**2 + 4 * c4 * t**3 + 5 * c5 * t**4,
-                6 * c3 * t + 12 * c4 * t**2 + 20 * c5 * t**3,
-            )
+            speed = 3 * c3 * t**2 + 4 * c4 * t**3 + 5 * c5 * t**4
+            acceleration = 6 * c3 * t + 12 * c4 * t**2 + 20 * c5 * t**3
+            return c3 * t**3 + c4 * t**4 + c5 * t**5, speed, acceleration
 
         return smooth, duration
     if law.law == "table":
@@ -198,9 +196,8 @@ def free_motion(
         return float(state[0] - until)
 
     there.terminal = True  # type: ignore[attr-defined]
-    found = solve_ivp(
-        rate, (0.0, duration), [start, speed], "DOP853", events=[there], rtol=ACCURACY, atol=1e-13
-    )
+    accuracy: Any = {"rtol": ACCURACY, "atol": 1e-13}
+    found = solve_ivp(rate, (0.0, duration), [start, speed], "DOP853", events=[there], **accuracy)
     if not found.success:
         raise model.refusal("release", "the motion has no solution", found.message)
     generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is reported here

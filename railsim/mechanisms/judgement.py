@@ -23,7 +23,7 @@ from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism, Optimise
 from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism.values import ends, number, parameter_values
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, Faults
 from railsim.mechanisms.forces import Rates, generalised_force, rubs, unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents
@@ -92,11 +92,8 @@ class Judge:
         self.every = every
         self.positions = Positions(full.s[::every], full.height[::every], full.ratio[::every])
         self.labels: list[tuple[str, float]] = []
-        self.fixed = {
-            n: self.values[n]
-            for n, written in definition.parameters.items()
-            if not isinstance(written, str) and n not in self.names
-        }
+        given = [n for n, text in definition.parameters.items() if not isinstance(text, str)]
+        self.fixed = {n: self.values[n] for n in given if n not in self.names}
 
     def _check_length(self) -> None:
         """Refuse what needs the length of an actuator or an output where there is none."""
@@ -106,17 +103,11 @@ class Judge:
             ratios = self.weights.keys() & {"follow", "constant", "linear"}
             found = [("objective", f"'{kind}': {missing}") for kind in sorted(ratios)]
         if self.pair is None:
-            found += [
-                (key, "no actuator between two points")
-                for key in ("min_length", "max_stroke")
-                if getattr(wanted, key) is not None
-            ]
-        if found:
-            remedy = "[solve] must name one; 'peak_force' and 'constant_force' do without"
-            name = self.definition.name
-            raise InputError(
-                [Fault(name, f"optimise.{key}", words, remedy) for key, words in found]
-            )
+            keys = [k for k in ("min_length", "max_stroke") if getattr(wanted, k) is not None]
+            found += [(key, "no actuator between two points") for key in keys]
+        remedy = "[solve] must name one; 'peak_force' and 'constant_force' do without"
+        name = self.definition.name
+        Faults(Fault(name, f"optimise.{key}", words, remedy) for key, words in found).check()
 
     def named(self, x: Sequence[float] | Floats) -> dict[str, float]:
         """Values of the parameters that may change, by their names."""
@@ -202,14 +193,9 @@ class Judge:
             whole.append(self._force(motion, -1)[..., grid])
         residuals, peak = self._objective(ratio, force_zone, np.concatenate(whole, axis=-1))
         margins = self._margins(motion, grid)
-        return Judgement(
-            np.real(residuals)[0],
-            derivative(residuals).T,
-            float(np.real(peak)[0]),
-            derivative(peak),
-            np.real(margins)[0],
-            derivative(margins).T,
-        )
+        peaks, kept = (float(np.real(peak)[0]), derivative(peak)), (np.real(margins)[0], margins)
+        slopes = derivative(residuals).T, derivative(kept[1]).T
+        return Judgement(np.real(residuals)[0], slopes[0], *peaks, kept[0], slopes[1])
 
     def _at_height(
         self, motion: Motion, model: Model, zone: Any, ratio: Any, force: Any
@@ -278,9 +264,7 @@ class Judge:
             stroke = np.where(np.real(stroke) > 0.0, 1.0, -1.0) * stroke
             limit = motion.model.number(self.wanted.max_stroke)
             found.append(("max_stroke", 1.0, limit - stroke))
-        self.labels = [
-            (name, scale) for name, scale, margin in found for _ in range(margin.shape[-1])
-        ]
+        self.labels = [(name, scale) for name, scale, m in found for _ in range(m.shape[-1])]
         return np.concatenate([margin for _, _, margin in found], axis=-1)
 
     def _everywhere(self, motion: Motion) -> Iterator[tuple[str, float, Any]]:

@@ -68,13 +68,8 @@ class Motion:
         w, w1 = self.q1[..., body, 2], self.q2[..., body, 2]
         r = np.stack((x + ax, y + ay), axis=-1)
         r1 = np.stack((self.q1[..., body, 0] - ay * w, self.q1[..., body, 1] + ax * w), axis=-1)
-        r2 = np.stack(
-            (
-                self.q2[..., body, 0] - ay * w1 - ax * w * w,
-                self.q2[..., body, 1] + ax * w1 - ay * w * w,
-            ),
-            axis=-1,
-        )
+        x2, y2 = self.q2[..., body, 0], self.q2[..., body, 1]
+        r2 = np.stack((x2 - ay * w1 - ax * w * w, y2 + ax * w1 - ay * w * w), axis=-1)
         return r, r1, r2
 
     def length(self, pair: Sequence[str]) -> Triple:
@@ -259,10 +254,8 @@ def tangents(motion: Motion, moved: Model, *, second: bool = True) -> Motion:
     Whether the second derivatives by the driver are wanted too.
     """
     count = moved.linkage.point.shape[0]
-    s, q, q1, q2 = (
-        np.repeat(array[None].astype(complex), count, axis=0)
-        for array in (motion.s, motion.q, motion.q1, motion.q2)
-    )
+    real = motion.s, motion.q, motion.q1, motion.q2
+    s, q, q1, q2 = (np.repeat(array[None].astype(complex), count, axis=0) for array in real)
     motion_kernel.tangents(motion.model.linkage, moved.linkage, s, q, q1, q2, motion.arcs, second)
     return Motion(moved, s, q, q1, q2, motion.arcs)
 

@@ -31,10 +31,8 @@ def links(motion: Motion) -> dict[str, Course]:
     """Angles of all bodies and rods by their names [rad], going on over full turns."""
     model = motion.model
     poses = (motion.q, motion.q1, motion.q2)
-    found = {
-        name: Course(*(array[:, model.bodies[name], 2] for array in poses))
-        for name in model.definition.bodies
-    }
+    numbers = {name: model.bodies[name] for name in model.definition.bodies}
+    found = {n: Course(*(array[:, k, 2] for array in poses)) for n, k in numbers.items()}
     for name, joint in model.definition.joints.items():
         if isinstance(joint, Link):
             first, second = (motion.point(point) for point in joint.link)
@@ -48,8 +46,5 @@ def links(motion: Motion) -> dict[str, Course]:
 
 def actuators(motion: Motion) -> dict[str, Course]:
     """Lengths of all actuators between two points by their names [m]."""
-    return {
-        name: Course(*motion.length(pair))
-        for name, actuator in motion.model.definition.actuators.items()
-        if (pair := ends(actuator)) is not None
-    }
+    pairs = {name: ends(one) for name, one in motion.model.definition.actuators.items()}
+    return {name: Course(*motion.length(pair)) for name, pair in pairs.items() if pair is not None}

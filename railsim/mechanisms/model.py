@@ -48,21 +48,15 @@ class Model:
     def lanes(self, names: Sequence[str]) -> "Model":
         """The same model with a lane for each parameter, moved by `1j * STEP`."""
         # expressions of the moved parameters follow; everything else keeps its value
-        fixed = {
-            name: self.values[name]
-            for name, written in self.definition.parameters.items()
-            if not isinstance(written, str)
-        }
+        given = [n for n, text in self.definition.parameters.items() if not isinstance(text, str)]
+        fixed = {name: self.values[name] for name in given}
         moved = {name: self.values[name] for name in names}
         return build(self.definition, {**fixed, **with_lanes(moved)})
 
     def real(self) -> "Model":
         """The real model of one with lanes."""
-        arrays: dict[str, Any] = {
-            name: np.ascontiguousarray(value[:1].real)
-            for name, value in self.linkage._asdict().items()
-            if np.iscomplexobj(value)
-        }
+        lanes = {n: v for n, v in self.linkage._asdict().items() if np.iscomplexobj(v)}
+        arrays: dict[str, Any] = {n: np.ascontiguousarray(v[:1].real) for n, v in lanes.items()}
         values = {name: real(value) for name, value in self.values.items()}
         return replace(self, values=values, linkage=self.linkage._replace(**arrays))
 
@@ -102,16 +96,9 @@ def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Mo
     complex_values = any(np.iscomplexobj(v) for v in values.values())
     arrays = _Arrays(definition, values, lanes, complex if complex_values else float)
     driver = definition.driver
-    return Model(
-        definition,
-        values,
-        arrays.linkage(),
-        arrays.points,
-        arrays.bodies,
-        _pose(definition, values, arrays),
-        real(number(driver.start, values)),
-        real(number(driver.end, values)),
-    )
+    ends = (real(number(end, values)) for end in (driver.start, driver.end))
+    pose = _pose(definition, values, arrays)
+    return Model(definition, values, arrays.linkage(), arrays.points, arrays.bodies, pose, *ends)
 
 
 def with_lanes(values: Mapping[str, float]) -> dict[str, Complexes]:

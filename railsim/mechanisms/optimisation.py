@@ -197,15 +197,9 @@ class _Problem:
             self.evaluations += 1
             try:
                 found = self.judge(self.judge.lower + u * self.span, self.choice, self.extra)
-                self.known = (
-                    key,
-                    replace(
-                        found,
-                        jacobian=found.jacobian * self.span,
-                        peak_gradient=found.peak_gradient * self.span,
-                        slopes=found.slopes * self.span,
-                    ),
-                )
+                names = "jacobian", "peak_gradient", "slopes"
+                by_u = {name: getattr(found, name) * self.span for name in names}
+                self.known = key, replace(found, **by_u)
             except InputError:
                 self.known = key, None
         return self.known[1]
@@ -307,14 +301,8 @@ def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats
         return np.vstack((known.slopes @ S, S, -S))
 
     inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}
-    found: Any = minimize(
-        objective,
-        np.zeros(m),
-        jac=gradient,
-        method="SLSQP",
-        constraints=inequality,
-        options={"maxiter": steps, "ftol": 1e-10},
-    )
+    how: Any = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": 1e-10}}
+    found: Any = minimize(objective, np.zeros(m), jac=gradient, constraints=inequality, **how)
     end: Floats = np.clip(u0 + S @ found.x, 0.0, 1.0)
     return end
 
@@ -338,15 +326,10 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
     def breach(y: Floats) -> tuple[float, Floats]:
         return float(y[m]), np.eye(m + 1)[m]
 
-    found: Any = minimize(
-        breach,
-        np.append(u0, here.violation),
-        jac=True,
-        method="SLSQP",
-        bounds=Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf)),
-        constraints=inequality,
-        options={"maxiter": 100, "ftol": 1e-9},
-    )
+    bounds = Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf))
+    how: Any = {"method": "SLSQP", "bounds": bounds, "options": {"maxiter": 100, "ftol": 1e-9}}
+    start = np.append(u0, here.violation)
+    found: Any = minimize(breach, start, jac=True, constraints=inequality, **how)
     u: Floats = np.clip(found.x[:m], 0.0, 1.0)
     after = problem(u)
     if after is None or after.violation >= here.violation:

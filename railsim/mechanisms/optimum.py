@@ -101,18 +101,9 @@ def optimum_of(
     for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
         if margin < -FEASIBLE:
             breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
-    return Optimum(
-        better,
-        before,
-        after,
-        judged.objective,
-        objective_before,
-        best.feasible and not breaches,
-        breaches,
-        _active(judge, judged, x),
-        starts,
-        seed,
-    )
+    kept, active = best.feasible and not breaches, _active(judge, judged, x)
+    values = judged.objective, objective_before
+    return Optimum(better, before, after, *values, kept, breaches, active, starts, seed)
 
 
 def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
@@ -140,7 +131,5 @@ def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0.0] = 1.0
     weights, _ = nnls(matrix / norms, judged.gradient * span)
-    return tuple(
-        Active(name, side, slack, float(weight))
-        for (name, side, slack, _), weight in zip(rows, weights / norms, strict=True)
-    )
+    each = zip(rows, (weights / norms).tolist(), strict=True)
+    return tuple(Active(*row[:3], weight) for row, weight in each)

@@ -108,10 +108,8 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
         rates = Rates(friction=sense * model.sense)
         found[f"force{way}"] = actuator_force(motion, unknown, rates)
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):
-        found |= {
-            name.replace("force", "pressure"): pressure_for(motion, unknown, force)
-            for name, force in found.items()
-        }
+        for name, force in list(found.items()):
+            found[name.replace("force", "pressure")] = pressure_for(motion, unknown, force)
     if definition.output is not None:
         along = motion.point(definition.output.point)[1][:, model.axis]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -162,16 +160,11 @@ def zone_drivers(dense: Motion) -> dict[str, float]:
     heights = np.array([model.number(getattr(zone, name)) for name in ZONE])
     found = dict(zip(ZONE, driver_at(dense, height_of, heights).tolist(), strict=True))
     y = height_of(dense)[0]
-    faults = Faults(
-        Fault(
-            model.definition.name,
-            f"zone.{name}",
-            f"a height of {height * 1e3:.1f} mm is never reached",
-            f"{y.min() * 1e3:.1f} to {y.max() * 1e3:.1f} mm",
-        )
-        for name, height in zip(ZONE, heights, strict=True)
-        if np.isnan(found[name])
-    )
+    allowed, faults = f"{y.min() * 1e3:.1f} to {y.max() * 1e3:.1f} mm", Faults()
+    for name, height in zip(ZONE, heights, strict=True):
+        if np.isnan(found[name]):
+            words = f"a height of {height * 1e3:.1f} mm is never reached"
+            faults.append(Fault(model.definition.name, f"zone.{name}", words, allowed))
     faults.check()
     return found
 

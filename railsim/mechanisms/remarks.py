@@ -25,14 +25,9 @@ NEAR = 0.05
 
 def remarks(result: Analysis) -> list[str]:
     """Remarks of the file, and on what its results are."""
-    return [
-        *result.definition.remarks,
-        *_forces(result),
-        *_rods(result),
-        *_gas_springs(result),
-        *_lid(result),
-        *(f"{r.key}: {r.text}" for r in bounds_remarks(result.definition)),
-    ]
+    own = [*_forces(result), *_rods(result), *_gas_springs(result), *_lid(result)]
+    bounds = [f"{r.key}: {r.text}" for r in bounds_remarks(result.definition)]
+    return [*result.definition.remarks, *own, *bounds]
 
 
 def _forces(result: Analysis) -> list[str]:
@@ -51,19 +46,11 @@ def _forces(result: Analysis) -> list[str]:
 def _rods(result: Analysis) -> list[str]:
     """A rod hardly longer than its crank: close to a dead point when they lie on each other."""
     model, joints = result.model, result.definition.joints
-    pivots = {
-        body_name(point): point
-        for joint in joints.values()
-        if isinstance(joint, Revolute) and "ground" in map(body_name, joint.revolute)
-        for point in joint.revolute
-        if body_name(point) != "ground"
-    }
-    slides = {
-        body_name(point)
-        for joint in joints.values()
-        if isinstance(joint, Prismatic)
-        for point in joint.prismatic
-    }
+    pairs = [joint.revolute for joint in joints.values() if isinstance(joint, Revolute)]
+    fixed = [pair for pair in pairs if "ground" in map(body_name, pair)]
+    pivots = {body_name(p): p for pair in fixed for p in pair if body_name(p) != "ground"}
+    guides = [joint.prismatic for joint in joints.values() if isinstance(joint, Prismatic)]
+    slides = {body_name(point) for pair in guides for point in pair}
     found = []
     for name, joint in joints.items():
         if not isinstance(joint, Link):

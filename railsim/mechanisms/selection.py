@@ -78,10 +78,8 @@ def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
         elif cylinder.pin_to_pin is not None:
             shortest_made = n(cylinder.pin_to_pin) + made
             if shortest < shortest_made * (1.0 - ROUNDING):
-                why.append(
-                    f"{shortest * 1e3:.1f} mm at the shortest, {shortest_made * 1e3:g} mm from "
-                    "pin to pin"
-                )
+                apart = f"{shortest_made * 1e3:g} mm from pin to pin"
+                why.append(f"{shortest * 1e3:.1f} mm at the shortest, {apart}")
         words = (f"stroke {made * 1e3:g} mm",) if made is not None else ()
         name = f"bore {size * 1e3:g} mm"
         found.append(Choice("cylinder", name, not why, tuple(why) or words, {}))
@@ -108,13 +106,9 @@ def _gas_spring(
     extended = n(spring.extended)
     if stroke is not None and row.extended is not None:
         factor, constant = (n(x) for x in row.extended)
-        fitting = [
-            c
-            for c in strokes
-            if factor * c + constant >= lengths.most + unlock
-            and (factor - 1.0) * c + constant <= lengths.least
-        ]
-        stroke = fitting[0] if fitting else None
+        long = (c for c in strokes if factor * c + constant >= lengths.most + unlock)
+        fitting = (c for c in long if (factor - 1.0) * c + constant <= lengths.least)
+        stroke = next(fitting, None)
         if stroke is None:
             least, most = lengths.least * 1e3, lengths.most * 1e3
             why.append(f"{least:.1f} to {most:.1f} mm is no range of its lengths")
@@ -166,10 +160,7 @@ def _with_row(
         values["lock_compression"] = n(row.lock_compression) * F1
     if rod is not None:
         section = 0.25 * np.pi * n(rod) ** 2
-        values["pressure_least"], values["pressure_most"] = (
-            F1 / section,
-            F1 * progression / section,
-        )
+        values |= {"pressure_least": F1 / section, "pressure_most": F1 * progression / section}
     if result.definition.solve is None:
         return values
     made = {"stroke": stroke, "extended": extended, "progression": progression, "rod": rod}
@@ -212,7 +203,5 @@ def _unknown_forces(
             elements[key] = part.model_copy(update={"temperature": temperature})
     model = replace(result.model, definition=definition.model_copy(update={"elements": elements}))
     motion: Motion = replace(result.motion, model=model, known={})
-    return [
-        actuator_force(motion, definition.solve.unknown, Rates(friction=way, trial=True))
-        for way in (1, -1)
-    ]
+    rates = [Rates(friction=way, trial=True) for way in (1, -1)]
+    return [actuator_force(motion, definition.solve.unknown, one) for one in rates]

@@ -71,22 +71,16 @@ def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
     if result.contact is not None:
         data["contact"] = _contact_data(result.contact)
     if (released := result.release) is not None:
-        data["release"] = {
-            "time": _list(released.time),
-            "travel": _list(released.s),
-            "speed": _list(released.speed),
-            "reached": released.reached,
-            "duration": float(released.time[-1]),
-        }
+        time, travel, speed = map(_list, (released.time, released.s, released.speed))
+        data["release"] = {"time": time, "travel": travel, "speed": speed}
+        data["release"] |= {"reached": released.reached, "duration": time[-1]}
     data["reactions"] = {
         name: {"max": r.max, "at": r.at, "components": [_list(row) for row in r.components.T]}
         for name, r in result.reactions.items()
     }
     data["transitions"] = [asdict(one) for one in result.transitions]
-    data["selection"] = [
-        {k: v for k, v in vars(choice).items() if k != "values"} | choice.values
-        for choice in selection(result)
-    ]
+    chosen = [dict(vars(choice)) for choice in selection(result)]
+    data["selection"] = [one | one.pop("values") for one in chosen]
     if definition.tolerances:
         data["scatter"] = [asdict(one) for one in scatter(definition)]
     made = checks(result)
@@ -114,11 +108,9 @@ def published_data(result: Analysis) -> dict[str, Data]:
     if changed or result.case is not None:
         return {}
     computed: Data = {"travel": result.travel, **result.min_angles, **_extremes(result)}
-    return {
-        name: {"published": float(result.model.number(value)), "ours": computed[name]}
-        for name, value in definition.published.items()
-        if name in computed
-    }
+    printed = {n: float(result.model.number(v)) for n, v in definition.published.items()}
+    both = {n: {"published": v, "ours": computed[n]} for n, v in printed.items() if n in computed}
+    return both
 
 
 def _contact_data(contact: Contact) -> Data:
@@ -139,15 +131,10 @@ def _contact_data(contact: Contact) -> Data:
 
 def _motion_data(result: Analysis, timed: TimedMotion, *, courses: bool) -> Data:
     """The motion in time as plain numbers."""
-    data: Data = {
-        "time": _list(timed.time),
-        "travel": _list(timed.motion.s),
-        "speed": _list(timed.speed),
-        "acceleration": _list(timed.acceleration),
-        "force": _list(timed.force),
-        "max_force": float(np.max(timed.force)),
-        "min_force": float(np.min(timed.force)),
-    }
+    arrays = {"time": timed.time, "travel": timed.motion.s, "speed": timed.speed}
+    arrays |= {"acceleration": timed.acceleration, "force": timed.force}
+    data: Data = {name: _list(values) for name, values in arrays.items()}
+    data |= {"max_force": float(np.max(timed.force)), "min_force": float(np.min(timed.force))}
     if courses:
         rates = ("speed", "acceleration")
         data["links"] = _courses(timed.in_time(links(timed.motion)), "angle", *rates)

@@ -44,12 +44,8 @@ SELECTION = [
 
 def position_table(result: Analysis) -> Table:
     """Return results at the start, in the zone and at the end; a row for each of them."""
-    rows: list[tuple[str, Mapping[str, Any]]] = [
-        ("start", {k: v[0] for k, v in result.output.items()}),
-        *result.zone.items(),
-        ("end", {k: v[-1] for k, v in result.output.items()}),
-    ]
-    return value_table(result, rows)
+    first, last = ({k: v[row] for k, v in result.output.items()} for row in (0, -1))
+    return value_table(result, [("start", first), *result.zone.items(), ("end", last)])
 
 
 def value_table(result: Analysis, at: Sequence[tuple[str, Mapping[str, Any]]]) -> Table:
@@ -111,13 +107,12 @@ def selection_table(choices: Sequence[Choice]) -> Table:
             "sizes": "/".join(f"{v[k] * 1e3:g}" for k in ("body", "rod") if k in v) or "-",
             "progression": v.get("progression", np.nan),
         }
-        for column, pair in (
-            ("F1", ("F1_low", "F1_high")),
-            ("force", ("force_least", "force_most")),
-            ("extreme", ("force_lowest", "force_highest")),
+        for column, low, high in (
+            ("F1", "F1_low", "F1_high"),
+            ("force", "force_least", "force_most"),
+            ("extreme", "force_lowest", "force_highest"),
         ):
-            known = pair[0] in v
-            row[column] = f"{v[pair[0]]:.1f} to {v[pair[1]]:.1f}" if known else "-"
+            row[column] = f"{v[low]:.1f} to {v[high]:.1f}" if low in v else "-"
         rows.append(row)
     return Table(SELECTION, rows)
 
@@ -125,13 +120,10 @@ def selection_table(choices: Sequence[Choice]) -> Table:
 def reaction_table(result: Analysis) -> Table:
     """Return the largest reaction of every joint."""
     travel = quantity("travel", result.definition)
-    columns = [
-        Column("joint"),
-        Column("largest reaction", unit="N", format=".1f"),
-        Column("at", "at the driver", travel.unit, travel.format),
-    ]
+    largest = Column("largest reaction", unit="N", format=".1f")
+    at = Column("at", "at the driver", travel.unit, travel.format)
     rows = [[name, r.max, r.at] for name, r in result.reactions.items()]
-    return Table(columns, rows, "Reactions")
+    return Table(["joint", largest, at], rows, "Reactions")
 
 
 def sentences(result: Analysis) -> list[str]:
@@ -160,26 +152,21 @@ def sentences(result: Analysis) -> list[str]:
         )
     for change in result.transitions:
         jump = change.rate_after / change.rate_before - 1.0
-        found.append(
-            f"{change.joint}: from arc {change.before} to {change.after} at "
-            f"{driver(change.travel)}, gap {change.gap * 1e3:.4f} mm, jump of the rate "
-            f"{jump * 100.0:z.3f} %"
-        )
+        arcs = f"from arc {change.before} to {change.after} at {driver(change.travel)}"
+        sizes = f"gap {change.gap * 1e3:.4f} mm, jump of the rate {jump * 100.0:z.3f} %"
+        found.append(f"{change.joint}: {arcs}, {sizes}")
     if result.contact is not None:
         found += _contact_sentences(result.contact)
     if (timed := result.timed) is not None:
         drives = driving(result.definition)
         unit = force_unit(drives, result.definition)
-        found.append(
-            f"motion in {timed.time[-1]:.3f} s: force of '{drives}' {timed.force[0]:.2f} {unit} at "
-            f"first, {np.min(timed.force):.2f} to {np.max(timed.force):.2f} {unit}"
-        )
+        low, high = f"{np.min(timed.force):.2f}", f"{np.max(timed.force):.2f} {unit}"
+        first = f"force of '{drives}' {timed.force[0]:.2f} {unit} at first"
+        found.append(f"motion in {timed.time[-1]:.3f} s: {first}, {low} to {high}")
     if (released := result.release) is not None:
         end = "reaches" if released.reached else "is then at"
-        found.append(
-            f"let go at {driver(released.s[0])} it {end} {driver(released.s[-1])} after "
-            f"{released.time[-1]:.5f} s"
-        )
+        where = f"{end} {driver(released.s[-1])} after {released.time[-1]:.5f} s"
+        found.append(f"let go at {driver(released.s[0])} it {where}")
     return found
 
 
@@ -254,27 +241,15 @@ def optimum_tables(optimum: "Optimum") -> list[Table]:
     number = Column("slack", "slack (SI)", format=".3g")
     multiplier = Column("multiplier", "multiplier (SI)", format=".4g")
     limits = [Column("active limit"), Column("side"), number, multiplier]
-    starts = [
-        [
-            start.number,
-            start.objective if np.isfinite(start.objective) else "not assembled",
-            "yes" if start.feasible else "no",
-            start.evaluations,
-        ]
-        for start in optimum.starts
-    ]
-    columns = [
-        Column("start", format="d"),
-        Column("objective", format=".5g"),
-        Column("constraints kept"),
-        Column("evaluations", format="d"),
-    ]
+    starts = []
+    for s in optimum.starts:
+        ended = s.objective if np.isfinite(s.objective) else "not assembled"
+        starts.append([s.number, ended, "yes" if s.feasible else "no", s.evaluations])
+    first, last = Column("start", format="d"), Column("evaluations", format="d")
+    columns = [first, Column("objective", format=".5g"), Column("constraints kept"), last]
     before_after = [Column("before", format=">"), Column("after", format=">")]
-    found = [
-        Table(["parameter", *before_after], changed),
-        Table(limits, [[a.name, a.side, a.slack, a.multiplier] for a in optimum.active]),
-        Table(columns, starts),
-    ]
+    active = Table(limits, [list(vars(a).values()) for a in optimum.active])
+    found = [Table(["parameter", *before_after], changed), active, Table(columns, starts)]
     return [table for table in found if len(table)]
 
 
@@ -282,9 +257,8 @@ def scatter_table(found: Sequence[Scatter]) -> Table:
     """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
     for one in found:
-        column = Column(
-            "", unit=SHOWN.get(one.unit, "" if one.unit == "1" else one.unit), format=".4f"
-        )
+        unit = SHOWN.get(one.unit, "" if one.unit == "1" else one.unit)
+        column = Column("", unit=unit, format=".4f")
         most = max(one.single, key=lambda name: abs(one.single[name]))
         values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
         change = one.single[most] * column.scale

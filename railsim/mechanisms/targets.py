@@ -1,6 +1,6 @@
 """What an optimisation compares with: ratios of a reference at given heights of the output."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 
 import numpy as np
@@ -9,7 +9,7 @@ from railsim.arrays import Floats
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number, parameter_values
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import InputError, input_error
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.model import Model, build
@@ -50,21 +50,14 @@ def reference_of(definition: Mechanism) -> Mechanism | None:
     try:
         reference = load_mechanism(optimise.reference)
     except InputError as error:
-        faults = [
-            fault
-            if fault.file != optimise.reference or fault.key
-            else Fault(definition.name, "optimise.reference", fault.found, fault.allowed)
-            for fault in error.faults
-        ]
-        raise InputError(faults) from None
+        own = [f.file == optimise.reference and not f.key for f in error.faults]
+        here = {"file": definition.name, "key": "optimise.reference"}
+        each = zip(error.faults, own, strict=True)
+        raise InputError(replace(f, **here) if ours else f for f, ours in each) from None
     values = parameter_values(definition)
-    shared = {
-        name: float(values[name])
-        for name in reference.parameters
-        if name in definition.parameters
-        and any(fnmatch(name, pattern) for pattern in optimise.share)
-    }
-    return reference.with_parameters(shared)
+    both = [name for name in reference.parameters if name in definition.parameters]
+    shared = [n for n in both if any(fnmatch(n, pattern) for pattern in optimise.share)]
+    return reference.with_parameters({name: float(values[name]) for name in shared})
 
 
 def positions(definition: Mechanism) -> Positions:

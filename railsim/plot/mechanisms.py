@@ -47,15 +47,8 @@ from railsim.plot.style import ABOVE, LIMIT, Picture, note
 __all__ = ["cases_figure", "comparison_figure", "held_figure", "search_figure"]
 
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
-WIDTHS = {
-    "body": 2.2,
-    "link": 1.3,
-    "guide": 0.8,
-    "cam": 1.8,
-    "actuator": 3.2,
-    "spring": 1.0,
-    "damper": 1.6,
-}
+WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8}
+WIDTHS |= {"actuator": 3.2, "spring": 1.0, "damper": 1.6}
 CENTRE: dict[str, Any] = {"marker": "$\\oplus$", "color": "k", "ms": 8, "ls": "", "zorder": 5}
 """Centre of gravity."""
 STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
@@ -112,16 +105,10 @@ def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> 
     """Draw the lines of a mechanism at one of its positions [mm]."""
     made = []
     for i, line in enumerate(drawn):
-        made += axes.plot(
-            *(line.xy[k] * 1e3).T,
-            color=colour,
-            lw=WIDTHS[line.kind],
-            ls=STYLES.get(line.kind, "-"),
-            solid_capstyle="round",
-            marker="o" if line.kind in ("body", "link") else "",
-            ms=2.5,
-            label=label if i == 0 else None,
-        )
+        look: Any = {"color": colour, "lw": WIDTHS[line.kind], "ls": STYLES.get(line.kind, "-")}
+        look |= {"marker": "o" if line.kind in ("body", "link") else "", "ms": 2.5}
+        named = label if i == 0 else None
+        made += axes.plot(*(line.xy[k] * 1e3).T, solid_capstyle="round", label=named, **look)
     return made
 
 

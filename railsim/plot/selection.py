@@ -13,7 +13,7 @@ from railsim.arrays import Floats
 from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.notation import Quantity
 from railsim.result import Result
-from railsim.result.labels import known_labels
+from railsim.result.labels import all_labels, chosen_names
 
 MOST_LINES = 24
 
@@ -82,34 +82,24 @@ def _panels(result: Result, selection: str) -> list[Panel]:
         raise _fault(selection, f"{len(lines)} lines", f"choose some of them, such as {example}")
     found = []
     for outer in product(*(wanted[dim] for dim in per_panel)):
-        drawn = tuple(
-            _line(result, name, dict(zip((*per_panel, *per_line), (*outer, *inner), strict=True)))
-            for inner in lines
-        )
-        found.append(Panel(quantity.component(*outer) if outer else quantity, drawn))
+        drawn = []
+        for inner in lines:
+            where = dict(zip((*per_panel, *per_line), (*outer, *inner), strict=True))
+            drawn.append(Line(result.series(name, **where), where))
+        found.append(Panel(quantity.component(*outer) if outer else quantity, tuple(drawn)))
     return found
-
-
-def _line(result: Result, name: str, labels: dict[str, str]) -> Line:
-    return Line(result.series(name, **labels), labels)
 
 
 def _wanted(
     result: Result, quantity: Quantity, selection: str, given: list[str]
 ) -> dict[str, list[str]]:
-    wanted = {dim: list(result.coordinates[dim]) for dim in quantity.dims[1:]}
-    known = {
-        label: (dim, names[index])
-        for dim, names in wanted.items()
-        for label, index in known_labels(dim, names).items()
-    }
-    chosen: dict[str, list[str]] = {}
+    dims = quantity.dims[1:]
+    known = all_labels(dims, result.coordinates)
     for name in filter(None, given):
         if name not in known:
             raise _fault(selection, f"no label '{name}'", nearest(name, known))
-        dim, label = known[name]
-        chosen.setdefault(dim, []).append(label)
-    return wanted | chosen
+    chosen = chosen_names(dims, result.coordinates, [*filter(None, given)])
+    return {d: chosen.get(k, list(result.coordinates[d])) for k, d in enumerate(dims)}
 
 
 def _fault(selection: str, found: str, allowed: str) -> InputError:

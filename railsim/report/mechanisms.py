@@ -267,25 +267,15 @@ def player(result: Analysis) -> tuple[str, dict[str, Any]]:
     margin = 0.06 * np.max(high - low)
     whole = [*(low - margin), *(high - low + 2 * margin)]
     a, b, c, d = (1e3 * edge for edge in drawing.working_box(motion))
-    fixed = [
-        [round(xy[0, 0] * 1e3, 1), round(-xy[0, 1] * 1e3, 1)]
-        for name, xy in drawing.points(motion).items()
-        if name.startswith("ground.")
-    ]
+    ground = [xy[0] for name, xy in drawing.points(motion).items() if name.startswith("ground.")]
+    moving = []
+    for line in drawn:
+        at = [" ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in points) for points in line.xy]
+        look = {"width": 1.4 * plots.WIDTHS[line.kind], "dash": DASHES.get(line.kind)}
+        moving.append({**look, "kind": line.kind, "points": at})
     data = {
-        "lines": [
-            {
-                "width": 1.4 * plots.WIDTHS[line.kind],
-                "dash": DASHES.get(line.kind),
-                "kind": line.kind,
-                "points": [
-                    " ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in points)
-                    for points in line.xy
-                ],
-            }
-            for line in drawn
-        ],
-        "fixed": fixed,
+        "lines": moving,
+        "fixed": [[round(x * 1e3, 1), round(-y * 1e3, 1)] for x, y in ground],
         "texts": _sentences(result, motion.s),
         "whole": [round(float(v), 1) for v in whole],
         "near": [round(float(v), 1) for v in (a, -d, b - a, d - c)],

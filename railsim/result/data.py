@@ -95,29 +95,22 @@ class Result:
         self._source = source
         self._arrays = arrays if isinstance(arrays, FrozenArrays) else FrozenArrays(arrays)
         self._quantities = MappingProxyType(dict(quantities))
-        self._coordinates = MappingProxyType(
-            {name: tuple(str(label) for label in labels) for name, labels in coordinates.items()}
-        )
+        named = {name: tuple(map(str, labels)) for name, labels in coordinates.items()}
+        self._coordinates = MappingProxyType(named)
         self._attributes = MappingProxyType(dict(attributes))
         self._profiles = MappingProxyType(dict(profiles))
-        self._groups = MappingProxyType(
-            {group: FrozenArrays(arrays) for group, arrays in groups.items()}
-        )
+        frozen_groups = {group: FrozenArrays(arrays) for group, arrays in groups.items()}
+        self._groups = MappingProxyType(frozen_groups)
         # read when they are first asked for
         self._vehicle: Vehicle | None = None
         self._track: Track | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what `pickle` restores the result from: all arrays, read if necessary."""
-        parts = (
-            {name: np.asarray(array) for name, array in self._arrays.items()},
-            dict(self._quantities),
-            dict(self._coordinates),
-            dict(self._attributes),
-            dict(self._profiles),
-            {group: dict(arrays) for group, arrays in self._groups.items()},
-        )
-        return _remade, (*parts, self._source)
+        arrays = {name: np.asarray(array) for name, array in self._arrays.items()}
+        about = self._quantities, self._coordinates, self._attributes, self._profiles
+        groups = {group: dict(arrays) for group, arrays in self._groups.items()}
+        return _remade, (arrays, *map(dict, about), groups, self._source)
 
     # -- the arrays ---------------------------------------------------------------------------
 
@@ -405,12 +398,8 @@ class Result:
         """
         package = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         variables = {
-            name: (
-                quantity.dims,
-                self[name],
-                {"units": quantity.unit, "long_name": quantity.long_name},
-            )
-            for name, quantity in self._quantities.items()
+            name: (q.dims, self[name], {"units": q.unit, "long_name": q.long_name})
+            for name, q in self._quantities.items()
         }
         coords: dict[str, Any] = {name: list(names) for name, names in self._coordinates.items()}
         for name in ("time", "distance"):
@@ -458,8 +447,9 @@ class Result:
             if name not in over_time:
                 raise KeyError(f"{name} is not over time; {nearest(name, over_time)}")
             quantity = self._quantities[name]
-            places = chosen_names(quantity.dims[1:], self._coordinates, wanted)
-            combinations = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
+            dims = quantity.dims[1:]
+            places = chosen_names(dims, self._coordinates, wanted)
+            combinations = product(*(self._coordinates[dim] for dim in dims))
             for labels, values in zip(combinations, array.reshape(len(array), -1).T, strict=True):
                 if any(labels[k] not in chosen for k, chosen in places.items()):
                     continue

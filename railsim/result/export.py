@@ -55,10 +55,10 @@ def selected(
     of SI. Raises InputError: A quantity that the result does not have; a section that was not run;
     a rate that is no number above 0.
     """
+    words = "no such quantity"
+    missing = [name for name in quantities if name not in result]
     faults = [
-        argument_fault("quantities", name, "no such quantity", nearest(name, result), "QUANTITY")
-        for name in quantities
-        if name not in result
+        argument_fault("quantities", n, words, nearest(n, result), "QUANTITY") for n in missing
     ]
     time, distance = result["time"], result["distance"]
     low, high = between or (-np.inf, np.inf)

@@ -16,23 +16,13 @@ from railsim.notation import Quantity
 from railsim.result.data import Result
 from railsim.result.filters import low_passed
 
-PEAK_QUANTITIES = (
-    "Q",
-    "dQ_over_Q0",
-    "Y",
-    "Y_over_Q",
-    "sum_Y",
-    "sum_abs_Y",
-    "wheelset_lateral",
-    "wheelset_roll",
-    "wheelset_yaw",
-    "T_gamma",
-)
+FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
+"""Quantities whose peaks are also given after the low pass."""
+PEAK_QUANTITIES = (*FORCES, "wheelset_lateral", "wheelset_roll", "wheelset_yaw", "T_gamma")
 """Default quantities of peak tables."""
 
 LOW_PASS = 20.0  # low pass of forces in EN 14363 [Hz]
-FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
-"""Quantities whose peaks are also given after that low pass."""
+
 LEAST_RATE = 2.5  # outputs per period of the low pass at least
 DEVIATION = (15.87, 84.13)
 """Percentiles that are one standard deviation from the median of a normal distribution."""
@@ -115,14 +105,9 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
         times, distances = result["time"][rows], result["distance"][rows]
         index = _extreme(values, kind)
         at = index[:1]
-    return Peak(
-        result.quantities[name],
-        float(values[index]),
-        _labels(result, name, index[1:]),
-        float(times[at]),
-        float(distances[at]),
-        kind,
-    )
+    value, where = float(values[index]), _labels(result, name, index[1:])
+    place = float(times[at]), float(distances[at])
+    return Peak(result.quantities[name], value, where, *place, kind)
 
 
 def evaluated(result: Result) -> slice:
@@ -198,11 +183,9 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     """
     if not len(result["time"]):
         return ()
-    if names is None:
-        names = [name for name in PEAK_QUANTITIES if name in result]
     known: dict[str, Floats] = {}
     found: list[Peak] = []
-    for name in names:
+    for name in _wanted(result, names):
         for kind in ("max", "min") if name in BY_SIGN else ("abs",):
             one = peak(result, name, kind)
             found.append(_with_low_pass(result, one, known) if name in FORCES else one)
@@ -281,7 +264,7 @@ def mid_curves(
     track : Track, optional
         That of the result; by default it is rebuilt from the text that the result carries.
     """
-    wanted = list(names) if names is not None else [n for n in PEAK_QUANTITIES if n in result]
+    wanted = _wanted(result, names)
     distance = result["distance"]
     found: list[MidCurve] = []
     if not len(distance):
@@ -294,6 +277,10 @@ def mid_curves(
             smooth = not on.irregularities
             found.append(curve if smooth else replace(curve, settling=False))
     return tuple(found)
+
+
+def _wanted(result: Result, names: Iterable[str] | None) -> list[str]:
+    return [n for n in PEAK_QUANTITIES if n in result] if names is None else list(names)
 
 
 def _full_curve(result: Result, section: Section) -> tuple[float, float]:
@@ -322,9 +309,8 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
     time = float(there("time"))
     largest = [_largest(result, name, array, time, middle) for name, array in values.items()]
     begin, end = _full_curve(result, section)
-    rows = slice(
-        int(np.searchsorted(distance, begin)), int(np.searchsorted(distance, end, "right"))
-    )
+    first, last = np.searchsorted(distance, begin), np.searchsorted(distance, end, "right")
+    rows = slice(int(first), int(last))
     medians: dict[str, Floats] = {}
     scatter: dict[str, Floats] = {}
     settling: list[Floats] = []
@@ -342,10 +328,9 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
         settling.append(_settling(over))
     changes = np.concatenate(settling) if settling else np.zeros(0)
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
-    return MidCurve(
-        radius, middle, time, values, tuple(largest), medians, scatter, steady, (begin, end),
-        bool(len(changes) and np.mean(changes) > 0.5),
-    )  # fmt: skip
+    found = values, tuple(largest), medians, scatter, steady, (begin, end)
+    unsettled = bool(len(changes) and np.mean(changes) > 0.5)
+    return MidCurve(radius, middle, time, *found, unsettled)
 
 
 def _settling(values: Floats) -> Floats:
@@ -359,9 +344,8 @@ def _settling(values: Floats) -> Floats:
     columns = values.reshape(len(values), -1)
     columns = columns[:, np.ptp(columns, axis=0) > 0.0]
     half, last = len(columns) // 2, columns[-max(1, len(columns) // 10) :].mean(axis=0)
-    before, after = (
-        np.mean((part - last) ** 2, axis=0) for part in (columns[:half], columns[half:])
-    )
+    square = (columns - last) ** 2
+    before, after = np.mean(square[:half], axis=0), np.mean(square[half:], axis=0)
     above = columns > np.median(columns, axis=0)
     crossings = np.count_nonzero(above[1:] != above[:-1], axis=0)
     return np.asarray((after < SETTLES * before) | (crossings < CROSSINGS))

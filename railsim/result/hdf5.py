@@ -55,6 +55,7 @@ PEAKS = "peaks"  # group of largest and smallest values over all steps
 CHUNK_BYTES = 2**18
 ROWS_AT_ONCE = 2048  # of the coach 4 MB
 DOUBLE = ("time", "distance", "mileage")
+GZIP = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 @dataclass(frozen=True)
@@ -264,11 +265,8 @@ def _of_quantities(
     """Groups of a result, with the peaks of the quantities that it keeps only."""
     kept: dict[str, Mapping[str, Any]] = dict(groups)
     if PEAKS in kept:
-        kept[PEAKS] = {
-            name: array
-            for name, array in kept[PEAKS].items()
-            if name.removesuffix("_time").removesuffix("_distance") in quantities
-        }
+        bases = {n: n.removesuffix("_time").removesuffix("_distance") for n in kept[PEAKS]}
+        kept[PEAKS] = {n: array for n, array in kept[PEAKS].items() if bases[n] in quantities}
     return {group: arrays for group, arrays in kept.items() if arrays}
 
 
@@ -313,11 +311,7 @@ def _create(
         chunks=(rows, *(max(1, size) for size in inner)),
         dtype=storage.kind(quantity.name),
         fletcher32=True,
-        **(
-            {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-            if storage.compress
-            else {}
-        ),
+        **(GZIP if storage.compress else {}),
     )
     if quantity.name == "time":
         dataset.make_scale("time")

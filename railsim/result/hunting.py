@@ -140,14 +140,9 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
     begin, end = min(each[2] for each in found), max(each[3] for each in found)
     swings = np.std(lateral[begin:end], axis=0)
     way = seen("distance")[[begin, min(end, len(grid) - 1)], 0]
-    return Hunting(
-        frequency * rate,
-        amplitude,
-        tuple(int(w) for w in np.flatnonzero(swings >= TOO * np.max(swings))),
-        float(way[0]),
-        float(way[1]),
-        lasts=end >= len(grid) - 2.0 / frequency,
-    )
+    hunt = tuple(np.flatnonzero(swings >= TOO * np.max(swings)).tolist())
+    lasts = end >= len(grid) - 2.0 / frequency
+    return Hunting(frequency * rate, amplitude, hunt, float(way[0]), float(way[1]), lasts)
 
 
 class _Cycles:

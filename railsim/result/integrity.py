@@ -92,12 +92,8 @@ def _datasets(group: h5py.Group, above: str = "") -> Iterator[tuple[str, h5py.Da
 
 def _attributes(thing: h5py.File | h5py.Dataset) -> str:
     """Return attributes as text, the same before and after they were stored."""
-    facts = {
-        name: _plain(value)
-        for name, value in thing.attrs.items()
-        if not name.startswith(("_", *_INTERNAL))
-    }
-    return json.dumps(facts, sort_keys=True)
+    names = [name for name in thing.attrs if not name.startswith(("_", *_INTERNAL))]
+    return json.dumps({name: _plain(thing.attrs[name]) for name in names}, sort_keys=True)
 
 
 def _plain(value: Any) -> Any:

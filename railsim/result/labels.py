@@ -21,10 +21,7 @@ def known_labels(dim: str, names: Sequence[str]) -> dict[str, int]:
 
 
 def index_of(dim: str, names: Sequence[str], label: str | int) -> int:
-    """Return the index of a label: a text, or an integer from 0.
-
-    Raises KeyError: there is no such label.
-    """
+    """Return the index of a label, a text or an integer from 0; KeyError: there is no such one."""
     if isinstance(label, str):
         known = known_labels(dim, names)
         if label not in known:
@@ -35,22 +32,29 @@ def index_of(dim: str, names: Sequence[str], label: str | int) -> int:
     return int(label)
 
 
+def all_labels(
+    dims: Sequence[str], coordinates: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[str, str]]:
+    """Return dimension and name of all texts that name a place along some dimensions."""
+    return {
+        label: (dim, coordinates[dim][index])
+        for dim in dims
+        for label, index in known_labels(dim, coordinates[dim]).items()
+    }
+
+
 def chosen_names(
     dims: Sequence[str], coordinates: Mapping[str, Sequence[str]], labels: Sequence[str]
 ) -> dict[int, list[str]]:
     """Return the names that labels choose, by the number of their dimension.
 
-    Raises KeyError: a label that no dimension has.
+    Raises KeyError: a label that is not known.
     """
-    known = {
-        label: (k, coordinates[dim][index])
-        for k, dim in enumerate(dims)
-        for label, index in known_labels(dim, coordinates[dim]).items()
-    }
+    known = all_labels(dims, coordinates)
     found: dict[int, list[str]] = {}
     for label in labels:
         if label not in known:
             raise KeyError(f"no label '{label}'; {nearest(label, known)}")
-        k, name = known[label]
-        found.setdefault(k, []).append(name)
+        dim, name = known[label]
+        found.setdefault(dims.index(dim), []).append(name)
     return found

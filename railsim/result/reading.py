@@ -231,20 +231,15 @@ class _Reader:
             unquote(key): self._profile(f"profiles/{key}", dataset)
             for key, dataset in inner.pop("profiles", {}).items()
         }
-        arrays = {
-            group: {
-                key: self._floats(f"{group}/{key}", each)
-                for key, each in some.items()
-                if each.dtype.kind != "S"
-            }
-            for group, some in inner.items()
-        }
+        arrays: dict[str, dict[str, Floats]] = {}
+        for group, some in inner.items():
+            numbers = {key: each for key, each in some.items() if each.dtype.kind != "S"}
+            arrays[group] = {k: self._floats(f"{group}/{k}", each) for k, each in numbers.items()}
         self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
         shapes = {name: datasets[name].shape for name in quantities}
         stored = StoredArrays(self._path, shapes, self._stamp)
-        return Result(
-            stored, quantities, coordinates, facts, profiles, arrays, source=str(self._path)
-        )
+        about = quantities, coordinates, facts, profiles, arrays
+        return Result(stored, *about, source=str(self._path))
 
     # -- before anything is read ------------------------------------------------------------------
 
@@ -337,11 +332,8 @@ class _Reader:
     def _described(
         self, datasets: Mapping[str, h5py.Dataset]
     ) -> tuple[dict[str, tuple[str, ...]], dict[str, Quantity]]:
-        coordinates = {
-            name: self._labels(name, dataset)
-            for name, dataset in datasets.items()
-            if dataset.dtype.kind == "S"
-        }
+        named = {name: each for name, each in datasets.items() if each.dtype.kind == "S"}
+        coordinates = {name: self._labels(name, each) for name, each in named.items()}
         numbers = {name: each for name, each in datasets.items() if name not in coordinates}
         sizes = {name: len(labels) for name, labels in coordinates.items()}
         if "time" in numbers:
@@ -377,16 +369,9 @@ class _Reader:
         scale = facts.get("shown_scale", 1.0)
         if isinstance(scale, str) or not math.isfinite(scale):
             raise self.fault(f"{name}.shown_scale", f"found {scale!r}", "a number")
-        return Quantity(
-            name=name,
-            long_name=str(facts.get("long_name", name)),
-            symbol=str(facts.get("symbol", "")),
-            unit=unit,
-            dims=dims,
-            shown_unit=str(facts.get("shown_units", unit)),
-            scale=float(scale),
-            sign=str(facts.get("comment", "")),
-        )
+        words, symbol = str(facts.get("long_name", name)), str(facts.get("symbol", ""))
+        shown, sign = str(facts.get("shown_units", unit)), str(facts.get("comment", ""))
+        return Quantity(name, words, symbol, unit, dims, shown, float(scale), sign)
 
     def _floats(self, name: str, dataset: h5py.Dataset) -> Floats:
         if dataset.dtype.kind == "S":
@@ -403,12 +388,6 @@ class _Reader:
             raise self.fault(f"{name}.kind", f"found {kind!r}", "wheel or rail")
         if isinstance(inclination, str) or inclination is None or not math.isfinite(inclination):
             raise self.fault(f"{name}.inclination", f"found {inclination!r}", "a number")
-        return Profile(
-            name=str(facts.get("name", "")),
-            kind=kind,
-            y=points[:, 0],
-            z=points[:, 1],
-            source=str(facts.get("source", "")),
-            inclination=float(inclination),
-            notes=tuple(str(facts.get("notes", "")).splitlines()),
-        )
+        called, source, notes = (str(facts.get(key, "")) for key in ("name", "source", "notes"))
+        origin = source, float(inclination), tuple(notes.splitlines())
+        return Profile(called, kind, points[:, 0], points[:, 1], *origin)

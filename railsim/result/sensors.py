@@ -102,10 +102,8 @@ def motions(
     accelerations in the axes of the body.
     """
     shape = (len(motion["distance"]), len(placed), 3)
-    found = {
-        f"sensor_{name}": np.zeros(shape)
-        for name in ("displacement", "velocity", "absolute_acceleration")
-    }
+    names = "displacement", "velocity", "absolute_acceleration"
+    found = {f"sensor_{name}": np.zeros(shape) for name in names}
     for number, sensor in enumerate(placed.values()):
         b = bodies.index(sensor.body)
         position, rates = motion["body_position"][:, b], motion["body_velocity"][:, b]
@@ -114,13 +112,11 @@ def motions(
         turned = _out_of_body(np.broadcast_to(arm, (len(roll), 3)), roll, pitch, yaw)
         found["sensor_displacement"][:, number] = position[:, :3] + turned - arm
         spin = _turning(sensor, rates)
-        found["sensor_velocity"][:, number] = rates[:, :3] + _out_of_body(
-            np.cross(spin, arm), roll, pitch, yaw
-        )
-        angular = _turning(sensor, absolute)
-        found["sensor_absolute_acceleration"][:, number] = (
-            absolute[:, :3] + np.cross(angular, arm) + np.cross(spin, np.cross(spin, arm))
-        )
+        moved = _out_of_body(np.cross(spin, arm), roll, pitch, yaw)
+        found["sensor_velocity"][:, number] = rates[:, :3] + moved
+        turning = np.cross(_turning(sensor, absolute), arm)
+        acceleration = absolute[:, :3] + turning + np.cross(spin, np.cross(spin, arm))
+        found["sensor_absolute_acceleration"][:, number] = acceleration
     return found
 
 
@@ -169,17 +165,11 @@ def _of_bodies(
     s = motion["distance"][:, None] + offset + position[..., 0]
     cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
     kappa = alignment.curvature(s)
-    down = np.stack(
-        [-np.sin(grade), np.sin(cant) * np.cos(grade), np.cos(cant) * np.cos(grade)], axis=-1
-    )
-    turning = speed[:, None, None] * np.stack(
-        [
-            alignment.cant_angle_rate(s),
-            alignment.grade_angle_rate(s) + kappa * np.sin(cant),
-            kappa * np.cos(cant),
-        ],
-        axis=-1,
-    )
+    c, sine = np.cos(cant), np.sin(cant)
+    down = np.stack([-np.sin(grade), sine * np.cos(grade), c * np.cos(grade)], axis=-1)
+    pitch_rate = alignment.grade_angle_rate(s) + kappa * sine
+    turned = np.stack([alignment.cant_angle_rate(s), pitch_rate, kappa * c], axis=-1)
+    turning = speed[:, None, None] * turned
     # an axlebox does not spin with its wheelset
     spins = np.array([not sensor.axlebox for sensor in sensors])
     roll, pitch, yaw = position[..., 3], np.where(spins, position[..., 4], 0.0), position[..., 5]

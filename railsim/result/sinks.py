@@ -90,15 +90,9 @@ class SinkBefore(SinkContext):
         """See `Sink.begin`."""
         self._sink.begin(coordinates, quantities)
 
-    def close(
-        self,
-        attributes: Attributes,
-        statics: Mapping[str, Any] = NOTHING,
-        profiles: Mapping[str, Profile] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
-    ) -> Result:
+    def close(self, attributes: Attributes, *held: Any, **more: Any) -> Result:
         """See `Sink.close`."""
-        return self._sink.close(self._ended(attributes), statics, profiles, groups)
+        return self._sink.close(self._ended(attributes), *held, **more)
 
     def _ended(self, attributes: Attributes) -> Attributes:
         """Hand on what was held back, and return the attributes of the run."""
@@ -129,11 +123,8 @@ class MemorySink(SinkContext):
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
     ) -> None:
         """See `Sink.begin`."""
-        self._quantities = {
-            quantity.name: quantity
-            for quantity in quantities
-            if self._only is None or quantity.name in self._only
-        }
+        only = self._only
+        self._quantities = {q.name: q for q in quantities if only is None or q.name in only}
         self._coordinates = full_coordinates(coordinates)
         self._chunks = {name: [] for name in timed(self._quantities)}
 
@@ -155,14 +146,8 @@ class MemorySink(SinkContext):
             for name, chunks in self._chunks.items()
         }
         arrays |= {name: statics[name] for name in self._quantities if name not in self._chunks}
-        return Result(
-            arrays,
-            self._quantities,
-            self._coordinates,
-            root_attributes(self._attributes, attributes),
-            profiles,
-            groups,
-        )
+        facts = root_attributes(self._attributes, attributes)
+        return Result(arrays, self._quantities, self._coordinates, facts, profiles, groups)
 
     def _shape(self, name: str) -> tuple[int, ...]:
         return tuple(len(self._coordinates[dim]) for dim in self._quantities[name].dims[1:])

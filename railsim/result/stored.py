@@ -58,11 +58,8 @@ def lost_peak(
     ('Between two outputs (20 per s) forces peak', 'tables of peaks list the former.')
     """
     whole = {name: float(np.nanmax(np.abs(of_steps[name]))) for name in stored}
-    shares = {
-        name: 1.0 - stored[name] / whole[name]
-        for name in stored
-        if whole[name] - stored[name] > LEAST
-    }
+    lost = [name for name in stored if whole[name] - stored[name] > LEAST]
+    shares = {name: 1.0 - stored[name] / whole[name] for name in lost}
     name = max(shares, key=lambda name: shares[name], default="")
     if not name or shares[name] <= LOST:
         return ""

@@ -24,27 +24,14 @@ def peak_table(result: Result, found: Sequence[Peak] | None = None) -> Table:
     rows = []
     for peak in peaks(result) if found is None else found:
         column = Column.of(peak.quantity)
-        rows.append(
-            [
-                peak.quantity.name,
-                f"{peak.quantity.words}{KINDS[peak.kind]}",
-                wheelset_number(result, peak.labels.get("wheelset", "")),
-                peak.labels.get("side", ""),
-                Amount(peak.value, column),
-                None if isnan(peak.smooth) else Amount(peak.smooth, column),
-                peak.time,
-                peak.distance,
-            ]
-        )
-    columns = [
-        Column("quantity", "Peaks"),
-        Column("words", "largest magnitude"),
-        Column("wheelset"),
-        Column("side"),
-        Column("value", format=">"),
-        Column("low_pass_20_hz", "20 Hz", format=">"),
-    ]
-    return Table([*columns, *PLACE], rows)
+        words = f"{peak.quantity.words}{KINDS[peak.kind]}"
+        wheelset = wheelset_number(result, peak.labels.get("wheelset", ""))
+        smooth = None if isnan(peak.smooth) else Amount(peak.smooth, column)
+        where = wheelset, peak.labels.get("side", ""), Amount(peak.value, column)
+        rows.append([peak.quantity.name, words, *where, smooth, peak.time, peak.distance])
+    heads = Column("quantity", "Peaks"), Column("words", "largest magnitude")
+    values = Column("value", format=">"), Column("low_pass_20_hz", "20 Hz", format=">")
+    return Table([*heads, "wheelset", "side", *values, *PLACE], rows)
 
 
 def full_curve_table(result: Result, curve: MidCurve) -> Table:
@@ -82,12 +69,11 @@ def full_curves_table(result: Result, curves: Sequence[MidCurve] | None = None) 
         begin, end = curve.full_curve
         where = f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}"
         rows.append([*where, *map(largest.get, names)])
-    columns = [
+    heads = (
         Column("radius", "Full curves, largest medians"),
         Column("distance", "s (m)", format=">"),
-        *(Column.of(result.quantities[name], name) for name in names),
-    ]
-    return Table(columns, rows)
+    )
+    return Table([*heads, *(Column.of(result.quantities[n], n) for n in names)], rows)
 
 
 def result_parts(result: Result, remarks: Sequence[str] = ()) -> list[str | Table]:
