@@ -96,17 +96,11 @@ def nest(
 
     The second begins to work at the file's engagement; the seats are the file's by default.
     """
-    arm = suspension.arm
-    starts = (start, start - suspension.engagement)
-    coils = tuple(
-        Coil(*spring, seat, each)
-        for spring, seat, each in zip(
-            springs, seats or suspension.seat_heights, starts[: len(springs)], strict=True
-        )
-    )
-    return Arm(
-        arm.length, arm.bush_torsional_stiffness, poisson_ratio(suspension), coils, arm.equilibrium
-    )
+    arm, nu = suspension.arm, poisson_ratio(suspension)
+    starts = (start, start - suspension.engagement)[: len(springs)]
+    each = zip(springs, seats or suspension.seat_heights, starts, strict=True)
+    coils = tuple(Coil(*spring, seat, begin) for spring, seat, begin in each)
+    return Arm(arm.length, arm.bush_torsional_stiffness, nu, coils, arm.equilibrium)
 
 
 def poisson_ratio(suspension: TrailingArmSuspension) -> float:
@@ -152,12 +146,8 @@ def unit_moment(arm: Arm, coil: Coil, phi: Values) -> Values:
             return _unit_energy(arm, coil, phi + 1j * _COMPLEX_STEP).imag / _COMPLEX_STEP
     state = coil_state(arm, replace(coil, K_V=1.0), phi)
     shearing = helical.seat_moment(state.deflection, state.K_L, state.height)
-    return (
-        state.deflection * arm.length
-        + state.K_L * state.lateral * coil.seat
-        + state.K_C * phi
-        + shearing * state.lateral
-    )
+    lifting = state.deflection * arm.length + state.K_L * state.lateral * coil.seat
+    return lifting + state.K_C * phi + shearing * state.lateral
 
 
 def moment(arm: Arm, phi: Values) -> Values:
@@ -191,9 +181,8 @@ def rotation(arm: Arm, P: Values) -> Values:
     nan where no rotation between lift-off and a spring pressed to a tenth of its free height
     carries the load; one of them where near lift-off on high seats several do.
     """
-    from scipy.optimize.elementwise import (
-        find_root,
-    )  # imported where it is needed: it takes a while
+    # imported where it is needed: it takes a while
+    from scipy.optimize.elementwise import find_root
 
     def excess(phi: Values, P: Values, bush: Values, *fields: Values) -> Values:
         coils = tuple(Coil(*fields[i : i + 5]) for i in range(0, len(fields), 5))

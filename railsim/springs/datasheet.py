@@ -51,16 +51,11 @@ def data_sheets(suspension: TrailingArmSuspension, result: Verification) -> dict
             state = case.springs[name]
             force = float(state.force)
             at = (coil.K_V, D, H0, state.deflection, result.arm.nu)
-            methods = (
-                state.K_L,
-                helical.beam_lateral_stiffness(*at),
-                helical.lateral_stiffness_wahl(*at),
-            )
-            lateral = dict(zip(LATERAL, map(float, methods), strict=True)) if force > 0.0 else {}
-            tau = checks.shear_stress(force, d, D)
-            loads[case.name] = Loaded(
-                force, float(state.height), tau, stress(spring, state), lateral
-            )
+            beam, wahl = helical.beam_lateral_stiffness(*at), helical.lateral_stiffness_wahl(*at)
+            methods = zip(LATERAL, map(float, (state.K_L, beam, wahl)), strict=True)
+            stresses = checks.shear_stress(force, d, D), stress(spring, state)
+            lateral = dict(methods) if force > 0.0 else {}
+            loads[case.name] = Loaded(force, float(state.height), *stresses, lateral)
         values = {
             "d": d,
             "D": D,

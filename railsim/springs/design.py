@@ -118,6 +118,10 @@ def design(suspension: TrailingArmSuspension) -> Design:
     coils = [replace(coil, K_V=k) for coil, k in zip(frame.coils, K_V, strict=True)]
     states = [trailing_arm.coil_state(frame, coil, phi) for coil in coils]
     low, high = target_load_range(frame, suspension.engagement, wanted)
+    n: list[float | None] = []
+    for spring, k in zip(suspension.springs.values(), K_V, strict=True):
+        d, D = spring.wire_diameter, spring.mean_diameter
+        n.append(helical.active_coils(suspension.material.G, d, D, k) if d else None)
     return Design(
         names=tuple(suspension.springs),
         rotation=phi,
@@ -125,13 +129,7 @@ def design(suspension: TrailingArmSuspension) -> Design:
         K_V=tuple(K_V),
         K_L=float(sum(state.K_L for state in states)),
         K_C=float(sum(state.K_C for state in states)),
-        n=tuple(
-            spring.wire_diameter
-            and helical.active_coils(
-                suspension.material.G, spring.wire_diameter, spring.mean_diameter, k
-            )
-            for spring, k in zip(suspension.springs.values(), K_V, strict=True)
-        ),
+        n=tuple(n),
         load_range=(float(low), float(high)),
     )
 
@@ -156,16 +154,12 @@ def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
         found = f"{target.deflection * 1e3:.2f} mm, the same as mounting.deflection"
         remedy = "choose a target that turns the arm, above or below the mounting load"
     elif target.deflection <= suspension.engagement:
-        found = (
-            f"{target.deflection * 1e3:.1f} mm: the inner spring starts to work at "
-            f"{suspension.engagement * 1e3:.1f} mm"
-        )
+        begin = f"the inner spring starts to work at {suspension.engagement * 1e3:.1f} mm"
+        found = f"{target.deflection * 1e3:.1f} mm: {begin}"
         remedy = "raise target.deflection, or let the inner spring start earlier"
     elif not faults and np.isnan(_at_target(frame, suspension.engagement, wanted)[0]):
-        found = (
-            f"{(target.deflection - mounting.deflection) * 1e3:.1f} mm from the mounting "
-            "deflection: the arm does not reach so far"
-        )
+        way = f"{(target.deflection - mounting.deflection) * 1e3:.1f} mm"
+        found = f"{way} from the mounting deflection: the arm does not reach so far"
         remedy = "bring target.deflection nearer to mounting.deflection, or raise arm.length"
     if found:
         faults.append(Fault(suspension.name, "target.deflection", found, remedy))
@@ -185,9 +179,8 @@ def _reach_faults(
             found = f"{deflection * 1e3:.1f} mm, of {name}.free_height {H0 * 1e3:.1f} mm"
             yield Fault(suspension.name, key, found, f"reduce it, or raise {name}.free_height")
         elif deflection >= buckling:
-            found = (
-                f"{deflection * 1e3:.1f} mm: the {name} spring buckles at {buckling * 1e3:.1f} mm"
-            )
+            end = f"{buckling * 1e3:.1f} mm"
+            found = f"{deflection * 1e3:.1f} mm: the {name} spring buckles at {end}"
             remedy = f"reduce {name}.free_height or raise {name}.mean_diameter"
             yield Fault(suspension.name, key, found, remedy)
 
@@ -202,27 +195,22 @@ def _unphysical(
     window = f"above {low * 1e-3:.3f} kN"
     if np.isfinite(high):
         window = f"between {low * 1e-3:.3f} and {high * 1e-3:.3f} kN"
-    yield Fault(
-        suspension.name,
-        "target.load",
-        f"{load:.3f} kN at {deflection} has no physical solution (K_V of the {name} spring would "
-        f"be {value * 1e-3:.1f} N/mm)",
+    K = f"K_V of the {name} spring would be {value * 1e-3:.1f} N/mm"
+    found = f"{load:.3f} kN at {deflection} has no physical solution ({K})"
+    allowed = (
         f"{'raise' if wanted.target_load < low else 'reduce'} target.load: a nest that carries "
-        f"mounting.load at mounting.deflection can reach {deflection} under loads {window} only",
+        f"mounting.load at mounting.deflection can reach {deflection} under loads {window} only"
     )
+    yield Fault(suspension.name, "target.load", found, allowed)
     shortest = min(coil.H0 for coil in frame.coils)
     tried = np.linspace(suspension.engagement + 1e-6, 0.6 * shortest, 4001)
-    low, high = target_load_range(
-        frame, suspension.engagement, replace(wanted, target_deflection=tried)
-    )
+    wanted_too = replace(wanted, target_deflection=tried)
+    low, high = target_load_range(frame, suspension.engagement, wanted_too)
     turned = np.abs(tried - wanted.mounting_deflection) > 1e-5
     fitting = tried[(low < wanted.target_load) & (wanted.target_load < high) & turned]
     if fitting.size:
         verb = "raise" if wanted.target_deflection < fitting[0] else "reduce"
-        yield Fault(
-            suspension.name,
-            "target.deflection",
-            f"{deflection} does not go with this load",
-            f"or {verb} target.deflection: for {load:.3f} kN between {fitting[0] * 1e3:.2f} and "
-            f"{fitting[-1] * 1e3:.2f} mm",
-        )
+        ends = f"{fitting[0] * 1e3:.2f} and {fitting[-1] * 1e3:.2f} mm"
+        allowed = f"or {verb} target.deflection: for {load:.3f} kN between {ends}"
+        found = f"{deflection} does not go with this load"
+        yield Fault(suspension.name, "target.deflection", found, allowed)

@@ -80,9 +80,8 @@ def task_of(suspension: TrailingArmSuspension) -> Task:
     if limits is not None and limits.objective == "fatigue" and suspension.fatigue is None:
         missing.append("fatigue")
     if limits is None or target is None or inner is None or missing:
-        raise InputError(
-            [Fault(suspension.name, name, "missing", "the search needs it") for name in missing]
-        )
+        words = "missing", "the search needs it"
+        raise InputError(Fault(suspension.name, name, *words) for name in missing)
     solid_load = max(suspension.loads.values())
     if suspension.checks.solid_load is not None:
         solid_load = suspension.loads[suspension.checks.solid_load]
@@ -111,10 +110,8 @@ def evaluate(task: Task, x: Dimensions, n: Pair | None = None) -> Evaluation:
         frame = _as_built(task, springs, n)
         at_target = trailing_arm.rotation(frame, task.wanted.target_load)
         deflection = trailing_arm.coil_state(frame, frame.coils[0], at_target).deflection
-        errors = (
-            frame.coils[0].start - task.wanted.mounting_deflection,
-            deflection - task.wanted.target_deflection,
-        )
+        mounted = frame.coils[0].start - task.wanted.mounting_deflection
+        errors = mounted, deflection - task.wanted.target_deflection
     # the same arms with a last axis for the loads
     coils = (Coil(*(np.expand_dims(v, -1) for v in vars(coil).values())) for coil in frame.coils)
     across = replace(frame, coils=tuple(coils))
@@ -131,10 +128,8 @@ def evaluate(task: Task, x: Dimensions, n: Pair | None = None) -> Evaluation:
         n_t = checks.total_coils(built, limits.dead_coils, limits.end_coils)
         mass = mass + checks.mass(spring.d, spring.D, n_t, density)
         margins.append(_margin(task, spring, state))
-        slack |= {
-            f"{limit}_{name}": value
-            for limit, value in _strength_slack(task, spring, built, n_t, state).items()
-        }
+        strength = _strength_slack(task, spring, built, n_t, state)
+        slack |= {f"{limit}_{name}": value for limit, value in strength.items()}
         slack[f"fatigue_{name}"] = margins[-1] / task.limits.fatigue_margin_min - 1.0
         slack[f"coils_{name}"] = built / task.limits.active_coils_min - 1.0
     return Evaluation(n, mass, (margins[0], margins[1]), slack, errors)
@@ -167,10 +162,8 @@ def _as_designed(task: Task, springs: tuple[_Spring, _Spring]) -> tuple[Pair, Ar
     K_outer, K_inner, _ = stiffnesses(frame, suspension.engagement, task.wanted)
     physical = (K_outer > 0.0) & (K_inner > 0.0)
     K_V = [np.where(physical, value, np.nan) for value in (K_outer, K_inner)]
-    n_outer, n_inner = (
-        helical.active_coils(suspension.material.G, spring.d, spring.D, k)
-        for spring, k in zip(springs, K_V, strict=True)
-    )
+    G, each = suspension.material.G, zip(springs, K_V, strict=True)
+    n_outer, n_inner = (helical.active_coils(G, spring.d, spring.D, k) for spring, k in each)
     built = tuple(replace(coil, K_V=k) for coil, k in zip(frame.coils, K_V, strict=True))
     return (n_outer, n_inner), replace(frame, coils=built)
 
@@ -178,10 +171,8 @@ def _as_designed(task: Task, springs: tuple[_Spring, _Spring]) -> tuple[Pair, Ar
 def _as_built(task: Task, springs: tuple[_Spring, _Spring], n: Pair) -> Arm:
     """The arm with stated numbers of coils, horizontal under the mounting load."""
     suspension = task.suspension
-    K_V = [
-        helical.vertical_stiffness(suspension.material.G, spring.d, spring.D, coils)
-        for spring, coils in zip(springs, n, strict=True)
-    ]
+    G, each = suspension.material.G, zip(springs, n, strict=True)
+    K_V = [helical.vertical_stiffness(G, spring.d, spring.D, coils) for spring, coils in each]
     start = trailing_arm.mounting_deflection(task.wanted.mounting_load, K_V, suspension.engagement)
     nest = [(k, spring.D, spring.H0) for k, spring in zip(K_V, springs, strict=True)]
     return trailing_arm.nest(suspension, nest, start)
@@ -215,10 +206,8 @@ def _strength_slack(
     nu = trailing_arm.poisson_ratio(task.suspension)
     buckling = helical.buckling_deflection(spring.H0, spring.D, nu, limits.seating)
     highest = np.max(state.deflection, axis=-1)
-    slack = {
-        "height": state.height[..., 0] / smallest - 1.0,
-        "buckling": 1.0 - highest / (search.buckling_ratio_max * buckling),
-    }
+    slack = {"height": state.height[..., 0] / smallest - 1.0}
+    slack["buckling"] = 1.0 - highest / (search.buckling_ratio_max * buckling)
     if material.tau_allowable is not None:
         K_V = helical.vertical_stiffness(material.G, spring.d, spring.D, n)
         stress = checks.solid_stress(K_V, spring.d, spring.D, spring.H0 - solid)

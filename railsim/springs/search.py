@@ -145,9 +145,8 @@ def candidates(limits: Search, wires: Floats) -> Dimensions:
     high = np.minimum(w_max * d_inner, D_outer - gap)
     D_inner = low_inner + unit[:, 3] * (high - low_inner)
     shortest, longest = limits.free_height
-    return Dimensions(
-        d_outer, d_inner, D_outer, D_inner, shortest + unit[:, 4] * (longest - shortest)
-    )
+    H0 = shortest + unit[:, 4] * (longest - shortest)
+    return Dimensions(d_outer, d_inner, D_outer, D_inner, H0)
 
 
 @dataclass(frozen=True)
@@ -194,9 +193,8 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
     x = np.stack([sample.D_outer, sample.D_inner, sample.H0], axis=-1)[chosen]
     d, merit = pairs[chosen], merit[chosen]
     shortest, longest = task.limits.free_height
-    reach = np.array([0.1, 0.1, 0.5]) * np.array(
-        [task.limits.outer_diameter_max, task.limits.outer_diameter_max, longest - shortest]
-    )
+    widest = task.limits.outer_diameter_max
+    reach = np.array([0.1, 0.1, 0.5]) * np.array([widest, widest, longest - shortest])
     for turn in range(_ROUNDS):
         if turn % 2 == 0:  # leave the worse half of the pairs, as long as enough are left
             kept = np.argsort(merit, kind="stable")[: max(len(merit) // 2, 4 * _SPARE)]
@@ -249,9 +247,8 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
     x = np.array([sample.D_outer[start], sample.D_inner[start], sample.H0[start]]) / scale
     here, reach = linearised(x), _FIRST_BOX
     for _ in range(_PROGRAMS):
-        step, promised = _linear_step(
-            here, np.maximum(low - x, -reach), np.minimum(high - x, reach)
-        )
+        box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
+        step, promised = _linear_step(here, *box)
         gain = here.merit - promised
         if gain < _CONVERGED or reach < _CONVERGED:
             break
@@ -286,18 +283,11 @@ def _linear_step(here: _Linearised, low: Floats, high: Floats) -> tuple[Floats, 
     Unknowns are the step, the bound t of the aims and the violation v; `min t + price v`.
     """
     aims, slacks = len(here.aims), len(here.slack)
-    rows = np.block(
-        [
-            [here.aim_slopes, -np.ones((aims, 1)), np.zeros((aims, 1))],
-            [-here.slack_slopes, np.zeros((slacks, 1)), -np.ones((slacks, 1))],
-        ]
-    )
-    solution = linprog(
-        [0.0, 0.0, 0.0, 1.0, _PRICE],
-        A_ub=rows,
-        b_ub=np.concatenate([-here.aims, here.slack]),
-        bounds=[*zip(low, np.maximum(low, high), strict=True), (None, None), (0.0, None)],
-    )
+    first = [here.aim_slopes, -np.ones((aims, 1)), np.zeros((aims, 1))]
+    rows = np.block([first, [-here.slack_slopes, np.zeros((slacks, 1)), -np.ones((slacks, 1))]])
+    ends = np.concatenate([-here.aims, here.slack])
+    bounds = [*zip(low, np.maximum(low, high), strict=True), (None, None), (0.0, None)]
+    solution = linprog([0.0, 0.0, 0.0, 1.0, _PRICE], A_ub=rows, b_ub=ends, bounds=bounds)
     if solution.x is None:
         return np.zeros(3), here.merit
     return solution.x[:3], float(solution.fun or 0.0)
@@ -316,19 +306,16 @@ def _built(task: Task, found: _Optimum) -> Nest | None:
         return None
     optimum = found.dimensions
     step, coil_step = task.limits.diameter_step, task.limits.coil_step
-    axes = [
-        [np.floor(value[0] / step) * step + k * step for k in (-1, 0, 1, 2)]
-        for value in (optimum.D_outer, optimum.D_inner, optimum.H0)
-    ]
+    sizes = (optimum.D_outer, optimum.D_inner, optimum.H0)
+    axes = [[np.floor(v[0] / step) * step + k * step for k in (-1, 0, 1, 2)] for v in sizes]
     D_outer, D_inner, H0 = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
     ones = np.ones_like(H0)
     rounded = Dimensions(optimum.d_outer * ones, optimum.d_inner * ones, D_outer, D_inner, H0)
     exact = evaluate(task, rounded).n
     x = Dimensions(*(np.repeat(value, 4) for value in vars(rounded).values()))
     up = np.tile([[0, 0], [0, 1], [1, 0], [1, 1]], (len(H0), 1))
-    n_outer, n_inner = (
-        (np.floor(np.repeat(n, 4) / coil_step) + up[:, i]) * coil_step for i, n in enumerate(exact)
-    )
+    below = (np.floor(np.repeat(n, 4) / coil_step) for n in exact)
+    n_outer, n_inner = ((n + up[:, i]) * coil_step for i, n in enumerate(below))
     result = evaluate(task, x, (n_outer, n_inner))
     error = np.max(np.abs(result.deflection_error), axis=0)
     fits = result.feasible & (error <= task.limits.height_error_max)
@@ -374,13 +361,9 @@ def _nothing_fits(
         missed = {name: count / result.tried for name, count in result.broken.items() if count}
         words = "keeps out {:.0%} of the candidates"
     names = sorted(missed, key=lambda name: -missed[name])[:3]
-    return [
-        Fault(
-            suspension.name,
-            LIMITS[name][0],
-            f"no nest fits: the limit '{name}' {words.format(missed[name])}",
-            LIMITS[name][1],
-        )
-        for name in names
-        if missed[name] > 0.5 * missed[names[0]]
-    ]
+    faults = []
+    for name in names:
+        if missed[name] > 0.5 * missed[names[0]]:
+            said = f"no nest fits: the limit '{name}' {words.format(missed[name])}"
+            faults.append(Fault(suspension.name, LIMITS[name][0], said, LIMITS[name][1]))
+    return faults

@@ -43,18 +43,14 @@ def coils_by_wire(suspension: TrailingArmSuspension, result: Design) -> dict[str
     search = suspension.search
     wires = (search.wire_diameters if search is not None else None) or EN_10060
     low, high = search.spring_index if search is not None else (3.0, 12.0)
-    return {
-        name: [
-            {
-                "wire_diameter": d,
-                "active_coils": active_coils(suspension.material.G, d, spring.mean_diameter, K_V),
-                "spring_index": spring.mean_diameter / d,
-            }
-            for d in wires
-            if low <= spring.mean_diameter / d <= high
-        ]
-        for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True)
-    }
+    found: dict[str, list[Data]] = {}
+    for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True):
+        D, found[name] = spring.mean_diameter, []
+        for d in wires:
+            if low <= D / d <= high:
+                n = active_coils(suspension.material.G, d, D, K_V)
+                found[name].append({"wire_diameter": d, "active_coils": n, "spring_index": D / d})
+    return found
 
 
 def verification_data(suspension: TrailingArmSuspension, result: Verification) -> Data:
@@ -67,11 +63,7 @@ def verification_data(suspension: TrailingArmSuspension, result: Verification) -
         "mounting_deflection": float(result.arm.coils[0].start),
         "cases": [case_data(case) for case in result.cases],
         "springs": {
-            name: {
-                **sheet.values,
-                "loads": {load: asdict(state) for load, state in sheet.loads.items()},
-            }
-            for name, sheet in sheets.items()
+            n: {**sheet.values, "loads": asdict(sheet)["loads"]} for n, sheet in sheets.items()
         },
         "checks": [check.data for check in result.checks],
         "ok": all(check.ok for check in result.checks),

@@ -71,10 +71,10 @@ def input_tables(suspension: TrailingArmSuspension) -> list[Table]:
         Column("start", "works from a deflection of", "mm", ".6g"),
     ]
     starts = (0.0, suspension.engagement)[: len(seats)]
-    rows = [
-        [name, s.mean_diameter, s.wire_diameter, s.active_coils, s.free_height, seat, start]
-        for (name, s), seat, start in zip(suspension.springs.items(), seats, starts, strict=True)
-    ]
+    rows = []
+    for (name, s), *where in zip(suspension.springs.items(), seats, starts, strict=True):
+        sizes = s.mean_diameter, s.wire_diameter, s.active_coils, s.free_height
+        rows.append([name, *sizes, *where])
     general = [
         (Column("arm length", unit="mm", format=".6g"), arm.length),
         (Column("bush", unit="N m/rad", format=".6g"), arm.bush_torsional_stiffness),
@@ -86,27 +86,17 @@ def input_tables(suspension: TrailingArmSuspension) -> list[Table]:
             general.append((Column(f"{name} load", unit="kN", format=".6g"), point.load))
             deflection = Column(f"deflection under {name} load", unit="mm", format=".6g")
             general.append((deflection, point.deflection))
-    arm_table = Table(
-        [Column("arm"), *(column for column, _ in general)], [["", *(v for _, v in general)]]
-    )
+    heads, values = zip(*general, strict=True)
+    arm_table = Table(["arm", *heads], [["", *values]])
     return [Table(columns, rows).transposed("spring"), arm_table.transposed("arm and loads")]
 
 
 def design_table(suspension: TrailingArmSuspension, result: Design) -> Table:
     """Return one row for each spring: designed stiffness, and coils for the file's wire."""
-    columns = [
-        Column("spring"),
-        Column("D", "", "mm", ".6g"),
-        Column("K_V", "", "N/mm", ".3f"),
-        Column("d", "", "mm", ".6g"),
-        Column("n", "", "", ".4f"),
-    ]
-    rows = [
-        [name, spring.mean_diameter, K_V, spring.wire_diameter, n]
-        for (name, spring), K_V, n in zip(
-            suspension.springs.items(), result.K_V, result.n, strict=True
-        )
-    ]
+    D, d = (Column(name, "", "mm", ".6g") for name in "Dd")
+    columns = [Column("spring"), D, Column("K_V", "", "N/mm", ".3f"), d, Column("n", "", "", ".4f")]
+    each = zip(suspension.springs.items(), result.K_V, result.n, strict=True)
+    rows = [[name, s.mean_diameter, K_V, s.wire_diameter, n] for (name, s), K_V, n in each]
     return Table(columns, rows)
 
 
@@ -152,16 +142,11 @@ def loaded_table(sheets: Mapping[str, Sheet]) -> Table:
         Column("tau_k", "", "MPa", ".1f"),
         *(Column(method, f"K_L {method}", "N/mm", ".2f") for method in LATERAL),
     ]
-    rows = [
-        {
-            "load case": load,
-            "spring": name,
-            **asdict(sheet.loads[load]),
-            **sheet.loads[load].lateral,
-        }
-        for load in next(iter(sheets.values())).loads
-        for name, sheet in sheets.items()
-    ]
+    rows = []
+    for load in next(iter(sheets.values())).loads:
+        for name, sheet in sheets.items():
+            own = sheet.loads[load]
+            rows.append({"load case": load, "spring": name, **vars(own), **own.lateral})
     return Table(columns, rows)
 
 

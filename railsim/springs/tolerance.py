@@ -60,19 +60,13 @@ def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
     lower, upper = heights(-alone), heights(alone)
     worst = heights(np.array(list(product((-1.0, 1.0), repeat=len(limits)))))
     random = np.sqrt(np.sum((0.5 * (upper - lower)) ** 2, axis=0))
-    return tuple(
-        RideHeight(
-            name=case.name,
-            load=case.load,
-            lowest=float(np.min(worst[:, i])),
-            highest=float(np.max(worst[:, i])),
-            random=float(random[i]),
-            single={
-                name: (float(lower[j, i]), float(upper[j, i])) for j, name in enumerate(limits)
-            },
-        )
-        for i, case in enumerate(cases)
-    )
+    found = []
+    for i, case in enumerate(cases):
+        alone_at = zip(lower[:, i].tolist(), upper[:, i].tolist(), strict=True)
+        single = dict(zip(limits, alone_at, strict=True))
+        ends = float(np.min(worst[:, i])), float(np.max(worst[:, i]))
+        found.append(RideHeight(case.name, case.load, *ends, float(random[i]), single))
+    return tuple(found)
 
 
 def deviations(suspension: TrailingArmSuspension) -> dict[str, float]:
@@ -80,11 +74,8 @@ def deviations(suspension: TrailingArmSuspension) -> dict[str, float]:
     table = suspension.tolerances
     if table is None:
         raise input_error(suspension.name, "missing", "needed: the scatter", "tolerances")
-    every = {
-        f"{spring}.{key}": float(getattr(table, key))
-        for spring in suspension.springs
-        for key in ("wire_diameter", "mean_diameter", "active_coils", "free_height")
-    }
+    keys = "wire_diameter", "mean_diameter", "active_coils", "free_height"
+    every = {f"{s}.{key}": float(getattr(table, key)) for s in suspension.springs for key in keys}
     every |= {"material.G": table.G, "arm.bush_torsional_stiffness": table.bush}
     return {name: value for name, value in every.items() if value > 0.0}
 
@@ -96,14 +87,9 @@ def _deviating(
     G = suspension.material.G * (1.0 + deviation.get("material.G", 0.0))
     coils = []
     for (name, spring), coil in zip(suspension.springs.items(), frame.coils, strict=True):
-        d, n, D, taller = (
-            nominal + deviation.get(f"{name}.{key}", 0.0)
-            for nominal, key in zip(
-                (*built(spring), spring.mean_diameter, 0.0),
-                ("wire_diameter", "active_coils", "mean_diameter", "free_height"),
-                strict=True,
-            )
-        )
+        keys = "wire_diameter", "active_coils", "mean_diameter", "free_height"
+        each = zip((*built(spring), spring.mean_diameter, 0.0), keys, strict=True)
+        d, n, D, taller = (x + deviation.get(f"{name}.{key}", 0.0) for x, key in each)
         K_V = helical.vertical_stiffness(G, d, D, n)
         coils.append(Coil(K_V, D, coil.H0 + taller, coil.seat, coil.start + taller))
     bush = frame.bush * (1.0 + deviation.get("arm.bush_torsional_stiffness", 0.0))

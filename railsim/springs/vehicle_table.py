@@ -131,11 +131,8 @@ def _axlebox(table: VehicleTable) -> dict[str, Any]:
 
 def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) -> dict[str, Any]:
     length = suspension.arm.length
-    hinge = [
-        -length * np.cos(case.rotation),
-        table.lateral_position,
-        -table.wheel_radius + length * np.sin(case.rotation),
-    ]
+    x, z = -length * np.cos(case.rotation), -table.wheel_radius + length * np.sin(case.rotation)
+    hinge = [x, table.lateral_position, z]
     return {
         "kind": "bushing",
         "bodies": [table.frame, "arm"],
@@ -168,10 +165,7 @@ def _nest(
     nest = {
         "kind": "shear_spring",
         "bodies": [table.frame, "arm"],
-        "points": [
-            _rounded([0.0, table.lateral_position, seat - height]),
-            _rounded([0.0, table.lateral_position, seat]),
-        ],
+        "points": [_rounded([0.0, table.lateral_position, z]) for z in (seat - height, seat)],
         "sides": "both",
         "stiffness": _rounded([case.K_L, case.K_L, K_V]),
         "bending_stiffness": _rounded([max(bending, 0.0)] * 2),

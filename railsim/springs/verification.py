@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension, radial_clearance
 from railsim.design_checks import Check
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import Fault, Faults, InputError, input_error
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
 from railsim.springs.arm import Arm, Coil, CoilState
@@ -83,11 +83,12 @@ def built(spring: HelicalSpring) -> tuple[float, float]:
 def solid_heights(suspension: TrailingArmSuspension) -> dict[str, float]:
     """Solid height of each spring [m]."""
     limits = suspension.checks
-    return {
-        name: checks.solid_height(checks.total_coils(n, limits.dead_coils, limits.end_coils), d)
-        for name, spring in suspension.springs.items()
-        for d, n in (built(spring),)
-    }
+    found = {}
+    for name, spring in suspension.springs.items():
+        d, n = built(spring)
+        n_t = checks.total_coils(n, limits.dead_coils, limits.end_coils)
+        found[name] = checks.solid_height(n_t, d)
+    return found
 
 
 def mounted(suspension: TrailingArmSuspension) -> Arm:
@@ -96,36 +97,26 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
     Raises InputError: A wire diameter or a number of coils is missing, or a spring is solid
     unloaded.
     """
-    needed = {
-        "wire_diameter": "the wire diameter [m]",
-        "active_coils": "the number of active coils; see design",
-    }
-    faults = [
-        Fault(suspension.name, f"{name}.{key}", "missing", f"needed: {meaning}")
-        for name, spring in suspension.springs.items()
-        for key, meaning in needed.items()
-        if getattr(spring, key) is None
-    ]
-    faults = faults or [
-        Fault(
-            suspension.name,
-            f"{name}.free_height",
-            f"{spring.free_height * 1e3:.1f} mm, but the spring is solid at {solid * 1e3:.1f} mm",
-            f"raise it, or reduce {name}.active_coils or {name}.wire_diameter",
-        )
-        for (name, spring), solid in zip(
-            suspension.springs.items(), solid_heights(suspension).values(), strict=True
-        )
-        if solid >= spring.free_height
-    ]
-    if faults:
-        raise InputError(faults)
-    G = suspension.material.G
-    springs = [
-        (helical.vertical_stiffness(G, d, s.mean_diameter, n), s.mean_diameter, s.free_height)
-        for s in suspension.springs.values()
-        for d, n in (built(s),)
-    ]
+    needed = {"wire_diameter": "the wire diameter [m]"}
+    needed["active_coils"] = "the number of active coils; see design"
+    faults = Faults()
+    for name, spring in suspension.springs.items():
+        for key in [key for key in needed if getattr(spring, key) is None]:
+            words = "missing", f"needed: {needed[key]}"
+            faults.append(Fault(suspension.name, f"{name}.{key}", *words))
+    faults.check()
+    for name, solid in solid_heights(suspension).items():
+        free = suspension.springs[name].free_height
+        if solid >= free:
+            found = f"{free * 1e3:.1f} mm, but the spring is solid at {solid * 1e3:.1f} mm"
+            remedy = f"raise it, or reduce {name}.active_coils or {name}.wire_diameter"
+            faults.append(Fault(suspension.name, f"{name}.free_height", found, remedy))
+    faults.check()
+    springs = []
+    for spring in suspension.springs.values():
+        (d, n), D = built(spring), spring.mean_diameter
+        K = helical.vertical_stiffness(suspension.material.G, d, D, n)
+        springs.append((K, D, spring.free_height))
     K_V = [stiffness for stiffness, _, _ in springs]
     load = suspension.mounting.load
     start = float(trailing_arm.mounting_deflection(load, K_V, suspension.engagement))
@@ -148,10 +139,8 @@ def load_cases(
         if (obstacle := _obstacle(suspension, frame, load, phi)) is not None:
             obstacles.setdefault(obstacle[0], []).append((name, *obstacle[1:]))
             continue
-        states = {
-            spring: trailing_arm.coil_state(frame, coil, phi)
-            for spring, coil in zip(suspension.springs, frame.coils, strict=True)
-        }
+        each = zip(suspension.springs, frame.coils, strict=True)
+        states = {s: trailing_arm.coil_state(frame, coil, phi) for s, coil in each}
         deflection = float(states["outer"].deflection)
         rate = _rate(frame, phi)
         cases.append(Case(name, load, phi, deflection, load / deflection, rate, states))
@@ -195,9 +184,8 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     1.327
     """
     if suspension.fatigue is None:
-        raise input_error(
-            suspension.name, "missing", "needed: goodman = [[0, ...], ...]", "fatigue"
-        )
+        words = "needed: goodman = [[0, ...], ...]"
+        raise input_error(suspension.name, "missing", words, "fatigue")
     _, cases = load_cases(suspension, dynamic_loads(suspension), "fatigue")
     results = {}
     for name, spring in suspension.springs.items():
@@ -223,9 +211,8 @@ def stress(spring: HelicalSpring, state: CoilState) -> float:
     """Largest corrected shear stress of a spring under load [Pa]."""
     shear = state.K_L * state.lateral
     dimensions = (built(spring)[0], spring.mean_diameter)
-    return float(
-        checks.corrected_stress(*dimensions, state.force, shear, state.height, state.lateral)
-    )
+    under = state.force, shear, state.height, state.lateral
+    return float(checks.corrected_stress(*dimensions, *under))
 
 
 def _rate(frame: Arm, phi: float) -> float:
@@ -254,16 +241,13 @@ def _obstacle(
     met: list[tuple[float, tuple[str, str, str]]] = []
     solid = solid_heights(suspension)
     for name, coil in zip(suspension.springs, frame.coils, strict=True):
-        rise, _ = trailing_arm.displacement(
-            frame.length, coil.seat, highest_phi if np.isnan(phi) else phi
-        )
+        turned = highest_phi if np.isnan(phi) else phi
+        rise, _ = trailing_arm.displacement(frame.length, coil.seat, turned)
         H0, seating = float(coil.H0), suspension.checks.seating
         buckling = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, seating))
         if coil.start + rise >= buckling:
-            found = (
-                f"{under} buckles the {name} spring: it buckles at {buckling * 1e3:.1f} mm, under "
-                f"{load_at(coil, buckling)}"
-            )
+            end = f"{buckling * 1e3:.1f} mm, under {load_at(coil, buckling)}"
+            found = f"{under} buckles the {name} spring: it buckles at {end}"
             remedy = (
                 f"reduce {name}.free_height, raise {name}.mean_diameter, or hold the seats against "
                 "sideways movement (checks.seating = 0.5)"
@@ -271,14 +255,10 @@ def _obstacle(
             met.append((buckling / H0, (f"{name} buckled", found, remedy)))
         travel = H0 - solid[name]
         if coil.start + rise >= travel:
-            found = (
-                f"{under} is beyond the solid height of the {name} spring: {solid[name] * 1e3:.1f} "
-                f"mm is reached under {load_at(coil, travel)}"
-            )
-            remedy = (
-                f"reduce this load, {name}.active_coils or {name}.wire_diameter, or raise "
-                f"{name}.free_height"
-            )
+            end = f"{solid[name] * 1e3:.1f} mm is reached under {load_at(coil, travel)}"
+            found = f"{under} is beyond the solid height of the {name} spring: {end}"
+            less = f"reduce this load, {name}.active_coils or {name}.wire_diameter"
+            remedy = f"{less}, or raise {name}.free_height"
             met.append((travel / H0, (f"{name} solid", found, remedy)))
     if met:
         return min(met, key=lambda item: item[0])[1]
@@ -305,10 +285,8 @@ def _checks(
     case = max(cases, key=lambda case: case.load)
     if limits.solid_load is not None:
         case = next(case for case in cases if case.name == limits.solid_load)
-    springs = {
-        name: (*built(spring), coil)
-        for (name, spring), coil in zip(suspension.springs.items(), frame.coils, strict=True)
-    }
+    each = zip(suspension.springs.items(), frame.coils, strict=True)
+    springs = {name: (*built(spring), coil) for (name, spring), coil in each}
     for kind, factor, origin in (
         ("solid_height", limits.clearance_factor, "solid height + {} n (D + d), Grossi (2025)"),
         ("coil_clearance", limits.standard_clearance_factor, "the same with {}, EN 13906-1 static"),
