@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, stretches
 from railsim.profiles import Profile
 
 
@@ -71,10 +71,8 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) ->
     >>> climb_distance(s, np.array([0.5, 1.3, 1.4, 1.3, 0.9, 0.2]), 1.2, 1e-3 * s)
     Climb(length=2.0, begin=1.0, rise=0.002)
     """
-    above = np.concatenate([[False], ~(Y_over_Q <= limit), [False]])
-    edges = np.flatnonzero(np.diff(above.astype(int)))
     best = Climb(0.0, math.nan, 0.0)
-    for first, behind in zip(edges[::2], edges[1::2], strict=True):
+    for first, behind in stretches(~(Y_over_Q <= limit)):
         length = float(s[behind - 1] - s[first])
         if length > best.length:
             rise = float(np.max(height[first:behind]) - height[first])

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from railsim.arrays import Complexes, Floats
+from railsim.arrays import Complexes, Floats, stretches
 from railsim.definitions.excitations.recording import ORDER
-from railsim.files.access import make_folder, whole_file
+from railsim.files.access import make_folder, whole_file, write_text
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation.pieces import STEP, Piece
 from railsim.table import Column, Table
@@ -86,8 +86,7 @@ class Irregularity:
                 k = piece.wave_numbers[1:]
                 assumed = piece.power[number, 1:] > 0.0
                 dark = assumed & (piece.seen[number, 1:] < 0.5)
-                edges = np.flatnonzero(np.diff(np.concatenate([[0], dark.astype(int), [0]])))
-                for first, last in zip(edges[::2], edges[1::2], strict=True):
+                for first, last in stretches(dark):
                     waves = 2.0 * np.pi / k[last - 1], 2.0 * np.pi / k[first]
                     ranges.add((round(waves[0], 1), round(waves[1], 1)))
             found[name] = _merged(sorted(ranges))
@@ -118,9 +117,7 @@ class Irregularity:
                    Column("rms", "rms about the mean", "kN", ".2f"),
                    Column("deviation", "standard deviation of the error", "kN", ".2f")]  # fmt: skip
         rows = []
-        for name, values, rest in zip(
-            self.outputs, self.forces, self.force_deviations, strict=True
-        ):
+        for name, values, rest in self._forces():
             if not name.startswith("lateral"):
                 k = int(np.argmax(np.abs(values)))
                 rows.append([name, abs(float(values[k])), float(self.s[k]), float(values.std()),
@@ -140,8 +137,7 @@ class Irregularity:
         for wheelset, begin, end in self.flanges[:20]:
             said.append(
                 f"A flange of wheelset {wheelset} touches from s = {begin:.0f} to {end:.0f} m: the "
-                "alignment there is less certain than its interval says."
-            )
+                "alignment there is less certain than its interval says.")  # fmt: skip
         if len(self.flanges) > 20:
             said.append(f"Flanges touch at {len(self.flanges) - 20} further places.")
         return tuple(said)
@@ -168,8 +164,7 @@ class Irregularity:
         recording = self.recording()
         _csv(path / FILES[0], {"s_m": recording.pop("s"),
                                **{f"{n}_mm": MILLI * v for n, v in recording.items()}})  # fmt: skip
-        with whole_file(path / FILES[1]) as partial:
-            partial.write_text(self._track(), encoding="utf-8")
+        write_text(path / FILES[1], self._track())
         columns: dict[str, Floats] = {"s_m": self.s}
         for q, name in enumerate(QUANTITIES):
             columns[f"{name}_mm"] = MILLI * self.values[q]
@@ -179,9 +174,7 @@ class Irregularity:
                 columns[f"{name}_{band}_deviation_mm"] = MILLI * self.band_deviations[band][q]
         _csv(path / FILES[2], columns)
         columns = {"s_m": self.s}
-        for name, values, rest in zip(
-            self.outputs, self.forces, self.force_deviations, strict=True
-        ):
+        for name, values, rest in self._forces():
             unit, factor = ("mm", MILLI) if name.startswith("lateral") else ("kN", KILO)
             columns[f"{name}_{unit}"] = factor * values
             columns[f"{name}_deviation_{unit}"] = factor * rest
@@ -213,8 +206,7 @@ def estimate_of(
     (float64[k, quantity]): Assumed before. `forces` ([output]): Names, response, and what they
     have beyond it [N, m].
     """
-    n, number = len(piece.grid), power.shape[1]
-    points = 2 * (len(covariance) - 1)
+    number, points = power.shape[1], 2 * (len(covariance) - 1)
     k: Floats = 2.0 * np.pi * np.fft.rfftfreq(points, STEP).astype(float)
     names, response, base = forces
     outputs = np.einsum("kcq,qk->ck", response, spectra, optimize=True)
@@ -226,32 +218,26 @@ def estimate_of(
     kept = seen >= SEEN
     error = np.where(kept, own, power)
     found = np.where(kept, spectra[:number], 0.0)
-    bands, deviations = {}, {}
-    for name, gain in _gains(k).items():
-        bands[name] = np.fft.irfft(gain * found, points, axis=1)[:, :n]
-        deviations[name] = rms(gain**2 * error, points)
+
+    def over(spectra: Complexes | Floats) -> Floats:
+        return np.fft.irfft(spectra, points, axis=1)[:, : len(piece.grid)]
+
+    gains = _gains(k)
+    bands = {name: over(gain * found) for name, gain in gains.items()}
+    deviations = {name: rms(gain**2 * error, points) for name, gain in gains.items()}
     return Estimate(
-        s=piece.grid,
-        speed=piece.speed,
-        values=np.fft.irfft(found, points, axis=1)[:, :n],
-        deviations=rms(error, points),
-        bands=bands,
-        band_deviations=deviations,
-        wave_numbers=k,
-        seen=seen,
-        power=power,
-        outputs=names,
-        forces=np.fft.irfft(outputs, points, axis=1)[:, :n] + base,
-        force_deviations=rms(rest, points),
-    )
+        s=piece.grid, speed=piece.speed,
+        values=over(found), deviations=rms(error, points), bands=bands, band_deviations=deviations,
+        wave_numbers=k, seen=seen, power=power,
+        outputs=names, forces=over(outputs) + base, force_deviations=rms(rest, points),
+    )  # fmt: skip
 
 
 def _gains(k: Floats) -> dict[str, Floats]:
     """Magnitude of the band passes over the wave number, see `recording.band_passed`."""
-    found = {}
+    found, f = {}, k / (2.0 * np.pi)
     with np.errstate(divide="ignore"):
         for name, (shortest, longest) in BANDS.items():
-            f = k / (2.0 * np.pi)
             below = np.where(f > 0.0, 1.0 / longest / f, np.inf) ** (2 * ORDER)
             found[name] = 1.0 / np.sqrt((1.0 + below) * (1.0 + (f * shortest) ** (2 * ORDER)))
     return found
@@ -290,26 +276,15 @@ def joined(
     touching = []
     for w, clearance in enumerate(clearances):
         beyond = np.abs(forces[outputs.index(f"lateral.{w + 1}")]) > clearance
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], beyond.astype(int), [0]])))
-        touching += [
-            (w + 1, float(s[a]), float(s[b - 1]))
-            for a, b in zip(edges[::2], edges[1::2], strict=True)
-        ]
+        touching += [(w + 1, float(s[a]), float(s[b - 1])) for a, b in stretches(beyond)]
     return Irregularity(
-        name,
-        vehicle,
-        s,
-        together([piece.values for piece in pieces]),
-        together([piece.deviations for piece in pieces]),
-        {band: together([piece.bands[band] for piece in pieces]) for band in BANDS},
-        {band: together([piece.band_deviations[band] for piece in pieces]) for band in BANDS},
-        outputs,
-        forces,
-        together([piece.force_deviations for piece in pieces]),
-        tuple(pieces),
-        tuple(touching),
-        tuple(dict.fromkeys(remarks)),
-    )
+        name, vehicle, s,
+        together([p.values for p in pieces]), together([p.deviations for p in pieces]),
+        {band: together([p.bands[band] for p in pieces]) for band in BANDS},
+        {band: together([p.band_deviations[band] for p in pieces]) for band in BANDS},
+        outputs, forces, together([p.force_deviations for p in pieces]),
+        tuple(pieces), tuple(touching), tuple(dict.fromkeys(remarks)),
+    )  # fmt: skip
 
 
 def _share(piece: Estimate, number: int, band: tuple[float, float]) -> float:

@@ -25,20 +25,13 @@ from railsim.errors import InputError, ModelError, argument_fault, input_error, 
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
+from railsim.observation import innovations
 from railsim.observation.contact import Noise, in_the_mean
 from railsim.observation.estimate import Estimate, Irregularity, estimate_of, joined, rms
-from railsim.observation.innovations import (
-    KINDS,
-    Powers,
-    Sizes,
-    disagreeing,
-    level_of,
-    likely_sizes,
-    spectra_of,
-)
+from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
 from railsim.observation.pieces import READ, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refined
-from railsim.observation.smoother import Fields
+from railsim.observation.smoother import Fields, filtered
 from railsim.result.sensors import all_sensors
 from railsim.simulation.remarks import silent
 
@@ -149,19 +142,14 @@ def irregularity(
 def _curves(track: Track, measurement: Measurement) -> list[str]:
     """Remark on curves, which the linear model does not have."""
     begin, end = measurement.distance[[0, -1]]
-    curved = [
-        section
-        for section in curvature_sections(track)
-        if (section.start_value or section.end_value)
-        and section.begin < end
-        and section.end > begin
-    ]
+    curved = [c for c in curvature_sections(track)
+              if (c.start_value or c.end_value) and c.begin < end and c.end > begin]  # fmt: skip
     if not curved:
         return []
     low, high = min(c.begin for c in curved), max(c.end for c in curved)
     return [
-        f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear model is one on "
-        "straight track: alignment, Y and sum Y there are not to be relied upon."
+        f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear model is one "
+        "on straight track: alignment, Y and sum Y there are not to be relied upon."
     ]
 
 
@@ -169,14 +157,9 @@ class _Smooth:
     """The smoother of a vehicle for its channels, at any speed."""
 
     def __init__(
-        self,
-        vehicle: Vehicle,
-        track: Track,
-        assumed: Assumed,
-        measurement: Measurement,
-        used: dict[str, str],
-        simulations: int,
-    ) -> None:
+        self, vehicle: Vehicle, track: Track, assumed: Assumed, measurement: Measurement,
+        used: dict[str, str], simulations: int,
+    ) -> None:  # fmt: skip
         self.vehicle, self.track, self.assumed = vehicle, track, assumed
         self.simulations, self.name = simulations, measurement.name
         self.linear = LinearVehicle(vehicle, track)
@@ -201,12 +184,8 @@ class _Smooth:
     def model(self, speed: float) -> tuple[TrackResponse, Noise]:
         """Linear vehicle and noise of its state at a speed [m/s]."""
         if speed not in self._models:
-            tangent = track_response(self.linear, self.known, speed)
-            rough = {
-                "spectrum": self.assumed.spectrum,
-                "wavelengths": list(self.assumed.wavelengths),
-                "scale": self.assumed.scale,
-            }
+            tangent, a = track_response(self.linear, self.known, speed), self.assumed
+            rough = {"spectrum": a.spectrum, "wavelengths": list(a.wavelengths), "scale": a.scale}
             with silent():
                 self._models[speed] = in_the_mean(
                     self.vehicle, self.track, self.linear, tangent, rough
@@ -217,9 +196,8 @@ class _Smooth:
         """H of all outputs, that of a constant left out; the last one is kept."""
         key = speed, len(k)
         if self._last is None or self._last[0] != key:
-            H = np.zeros(
-                (len(k), len(response.outputs), len(QUANTITIES) + response.rows.size), complex
-            )
+            shape = len(k), len(response.outputs), len(QUANTITIES) + response.rows.size
+            H = np.zeros(shape, complex)
             H[1:] = response.over(k[1:])
             H[-1] = H[-1].real
             self._last = key, H
@@ -262,15 +240,9 @@ class _Smooth:
         )  # fmt: skip
 
     def _refined(
-        self,
-        piece: Piece,
-        run: SimulatedRun,
-        powers: Powers,
-        sizes: Sizes,
-        forces: Complexes,
-        mean: Floats,
-        there: Flags,
-    ) -> tuple[Fields, Floats, Floats] | None:
+        self, piece: Piece, run: SimulatedRun, powers: Powers, sizes: Sizes, forces: Complexes,
+        mean: Floats, there: Flags,
+    ) -> tuple[Fields, Floats, Floats] | None:  # fmt: skip
         """Fields about the simulated run that agrees with the measured one.
 
         Returns float64[field, points]: With the sizes of errors that are left; their mean; what
@@ -281,19 +253,13 @@ class _Smooth:
         H = powers.response[:, :, :count]
         gain = powers.fields(replace(sizes, contact=np.full(len(KINDS), REMAINDER))).gain(count)
         found = refined(
-            run,
-            lambda data: _applied(gain, data),
-            lambda r: _applied(H, r),
-            (piece.signals, there),
-            (mean[:count], rms(powers.track.T, points)),
-            self.simulations,
-        )
+            run, lambda data: filtered(gain, data), lambda r: filtered(H, r),
+            (piece.signals, there), (mean[:count], rms(powers.track.T, points)), self.simulations,
+        )  # fmt: skip
         place = f"s = {piece.grid[0]:.0f} to {piece.grid[-1]:.0f} m"
         if isinstance(found, str):
-            self.said.append(
-                f"{place}: the run simulated on the linear estimate is {found}. The linear "
-                "estimate is given."
-            )
+            self.said.append(f"{place}: the run simulated on the linear estimate is {found}. "
+                             "The linear estimate is given.")  # fmt: skip
             return None
         if found.change > CHANGE:
             self.said.append(
@@ -302,19 +268,19 @@ class _Smooth:
             )
         sizes = likely_sizes(powers, spectra_of(found.data[:, :n], there, points))
         fields = powers.fields(sizes)
-        mean = _applied(fields.gain(fields.power.shape[1]), found.data)
-        base = found.reading.forces - _applied(forces[:, :, :count], found.fields)[:, :n]
+        mean = filtered(fields.gain(fields.power.shape[1]), found.data)
+        base = found.reading.forces - filtered(forces[:, :, :count], found.fields)[:, :n]
         return fields, mean, base
 
     def _there(self, powers: Powers, piece: Piece, read: Floats) -> Flags:
         """Where the channels say something; the first piece tells which of them are wrong."""
         if self._wrong is None:
-            level = level_of(powers, spectra_of(read, piece.there, powers.points))
+            level = innovations.level_of(powers, spectra_of(read, piece.there, powers.points))
             if not 1.0 / LEVEL < level < LEVEL:
                 found = f"{level:.3g} times what the vehicle reads on '{self.assumed.spectrum}'"
                 allowed = f"1/{LEVEL:g} to {LEVEL:g} times; the 'unit' of all channels, or 'scale'?"
                 raise input_error(self.name, found, allowed, "channels")
-            self._wrong, said = disagreeing(powers, piece, read, self.channels)
+            self._wrong, said = innovations.disagreeing(powers, piece, read, self.channels)
             self.said += said
         there = piece.there.copy()
         there[list(self._wrong)] = False
@@ -323,25 +289,12 @@ class _Smooth:
 
 def _flanges(linear: LinearVehicle, track: Track) -> Floats:
     """Lateral displacement of each wheelset at which a flange touches [m]; inf where unknown."""
-    found = []
+    bodies, found = {body.name: body for body in linear.model.flat.bodies}, []
     for b in linear.model.system.contact.body:
-        body = next(
-            body
-            for body in linear.model.flat.bodies
-            if body.name == linear.model.index.bodies[int(b)]
-        )
-        assert body.wheelset is not None  # it has contacts
-        geometry = geometry_of(body.wheelset, track, linear.model.profiles)
-        touching = np.inf
-        if geometry is not None:
-            steep = np.nanmax(geometry.contact_angle, axis=1) > FLANGE
-            if steep.any():
-                touching = float(np.min(np.abs(geometry.lateral[steep])))
-        found.append(touching)
+        wheelset = bodies[linear.model.index.bodies[int(b)]].wheelset
+        assert wheelset is not None  # it has contacts
+        geometry = geometry_of(wheelset, track, linear.model.profiles)
+        steep = [] if geometry is None else np.abs(
+            geometry.lateral[np.nanmax(geometry.contact_angle, axis=1) > FLANGE])  # fmt: skip
+        found.append(float(np.min(steep, initial=np.inf)))
     return np.array(found)
-
-
-def _applied(matrix: Complexes, values: Floats) -> Floats:
-    """complex128[k, row, column] on float64[column, points]."""
-    spectra = np.einsum("krc,ck->rk", matrix, np.fft.rfft(values, axis=1), optimize=True)
-    return np.asarray(np.fft.irfft(spectra, values.shape[1], axis=1))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Flags, Floats
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.measurement import Measurement
 from railsim.observation.grid import HALF, on_grid
 
@@ -62,24 +62,18 @@ def used_channels(measurement: Measurement, known: dict[str, Any]) -> dict[str, 
 def pieces_of(measurement: Measurement, names: list[str]) -> list[Piece]:
     """Divide a run where its speed changes."""
     s, v = measurement.distance, measurement.speed
-    fault = None
-    if s[-1] - s[0] < SHORTEST + 2.0 * MARGIN:
-        fault = Fault(
-            measurement.name, "distance", f"{s[-1] - s[0]:.0f} m", f"{SHORTEST:g} m at least"
-        )
-    elif v.min() < SLOWEST:
-        fault = Fault(measurement.name, "speed", f"{v.min():.3g} m/s", f"{SLOWEST:g} m/s at least")
-    if fault:
-        raise InputError([fault])
-    pieces, begin = [], float(s[0]) + MARGIN
-    last = float(s[-1]) - MARGIN
+    length, name = s[-1] - s[0], measurement.name
+    if length < SHORTEST + 2.0 * MARGIN:
+        raise input_error(name, f"{length:.0f} m", f"{SHORTEST:g} m at least", "distance")
+    if v.min() < SLOWEST:
+        raise input_error(name, f"{v.min():.3g} m/s", f"{SLOWEST:g} m/s at least", "speed")
+    pieces, begin, last = [], float(s[0]) + MARGIN, float(s[-1]) - MARGIN
     while True:
         inside = (s >= begin) & (s <= min(begin + LONGEST, last))
         speeds = v[inside]
         spread = np.maximum.accumulate(speeds) / np.minimum.accumulate(speeds) - 1.0
         count = int(np.searchsorted(spread, SPEEDS))
-        end = float(s[inside][min(count, len(speeds)) - 1])
-        end = min(max(end, begin + SHORTEST), last)
+        end = min(max(float(s[inside][min(count, len(speeds)) - 1]), begin + SHORTEST), last)
         if last - end < SHORTEST - OVERLAP:
             end = last
         pieces.append(_piece(measurement, names, begin, end))

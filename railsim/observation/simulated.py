@@ -99,9 +99,7 @@ class SimulatedRun:
         rails = RAILS.T @ fields
         first = np.outer(rails[:, 0], np.linspace(0.0, 1.0, len(before), endpoint=False))
         last = np.outer(rails[:, -1], np.linspace(1.0, 0.0, len(after)))
-        rows = np.column_stack(
-            [np.concatenate([before, s, after]), np.hstack([first, rails, last]).T]
-        )
+        rows = np.vstack([np.concatenate([before, s, after]), np.hstack([first, rails, last])]).T
         irregularity = {"type": "measured", "rows": rows.tolist(), "fade": 0.0}
         changes: dict[str, Any] = {"irregularities": [irregularity]}
         end = float(s[-1]) + 0.5 * AFTER
@@ -109,14 +107,11 @@ class SimulatedRun:
             changes["plan"] = [{"type": "STR", "length": end + AFTER}]
             changes["cant"] = [{"type": "CST", "length": end + AFTER, "cant": 0.0}]
         with silent():
+            speed = float(np.mean(self.piece.speeds)) if self.is_steady else None
             result = simulate(
-                self.vehicle,
-                self._track.replace(**changes),
-                speed=float(np.mean(self.piece.speeds)) if self.is_steady else None,
-                start=self._start,
-                until=end,
-                settings=self._settings(s),
-            )
+                self.vehicle, self._track.replace(**changes), speed=speed,
+                start=self._start, until=end, settings=self._settings(s),
+            )  # fmt: skip
         if result.status != "complete":
             return f"{result.status}: {result.status_reason}"
         return Reading(*(self._read(result, names) for names in (self.outputs, self.forces)))

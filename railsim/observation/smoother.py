@@ -29,6 +29,12 @@ RESIDUAL = 1e-2  # of the linear equations, over the rms of the errors
 MOST_ITERATIONS = 2000
 
 
+def filtered(matrix: Complexes, values: Floats) -> Floats:
+    """Apply complex128[bin, row, column] to float64[column, points]."""
+    spectra = np.einsum("kcd,dk->ck", matrix, np.fft.rfft(values, axis=1), optimize=True)
+    return np.asarray(np.fft.irfft(spectra, values.shape[1], axis=1))
+
+
 @dataclass(frozen=True)
 class Fields:
     """Gaussian fields on a periodic grid, and how channels see them.
@@ -47,17 +53,14 @@ class Fields:
         """Cov[r | y] of (1) per bin, complex128[bin, field, field]."""
         N = 1.0 / self.errors
         seen = np.einsum("kcp,kc,kcq->kpq", self.response.conj(), N, self.response, optimize=True)
-        one = np.eye(self.power.shape[1])
-        return np.asarray(
-            np.linalg.solve(one + self.power[:, :, None] * seen, self.power[:, :, None] * one)
-        )
+        one, P = np.eye(self.power.shape[1]), self.power[:, :, None]
+        return np.asarray(np.linalg.solve(one + P * seen, P * one))
 
     def gain(self, fields: int) -> Complexes:
         """P H* G^-1 of (1) for the first fields, complex128[bin, field, channel]."""
-        return np.asarray(np.einsum(
-            "kp,kcp,kcd->kpd", self.power[:, :fields], self.response[:, :, :fields].conj(),
-            self._inverse(), optimize=True,
-        ))  # fmt: skip
+        P, H = self.power[:, :fields], self.response[:, :, :fields]
+        found = np.einsum("kp,kcp,kcd->kpd", P, H.conj(), self._inverse(), optimize=True)
+        return np.asarray(found)
 
     def mean(self, data: Floats, there: Flags | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].
@@ -68,26 +71,16 @@ class Fields:
         `MOST_ITERATIONS`.
         """
         there = np.ones_like(data, dtype=bool) if there is None else there
-        weights = self._weights(data, there, residual)
-        back = np.einsum(
-            "kcq,ck->qk", self.response.conj(), np.fft.rfft(weights, axis=1), optimize=True
-        )
+        weights = np.fft.rfft(self._weights(data, there, residual), axis=1)
+        back = np.einsum("kcq,ck->qk", self.response.conj(), weights, optimize=True)
         return np.asarray(np.fft.irfft(self.power.T * back, self.points, axis=1))
-
-    def seen(self, fields: Floats) -> Floats:
-        """What the channels read of fields, float64[channel, points]."""
-        spectra = np.fft.rfft(fields, axis=1)
-        read = np.einsum("kcq,qk->ck", self.response, spectra, optimize=True)
-        return np.asarray(np.fft.irfft(read, self.points, axis=1))
 
     def _weights(self, data: Floats, there: Flags, residual: float) -> Floats:
         """Weights of the samples, w of (2), zero where no sample exists."""
         forth, back = self.data_covariance(), self._inverse()
 
         def applied(matrix: Complexes, values: Floats) -> Floats:
-            spectra = np.fft.rfft(values, axis=1)
-            spectra = np.einsum("kcd,dk->ck", matrix, spectra, optimize=True)
-            return np.where(there, np.fft.irfft(spectra, self.points, axis=1), 0.0)
+            return np.where(there, filtered(matrix, values), 0.0)
 
         data = np.where(there, data, 0.0)
         if there.all():
