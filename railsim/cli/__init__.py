@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from importlib import import_module
-from typing import Any
+from typing import Any, cast
 
 import click
 from click.shell_completion import CompletionItem
@@ -65,7 +65,8 @@ COMMANDS = {
     "bench": "The runtime benchmark on this machine.",
 }
 SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
-MODULES = {"list": "library"}  # others are called as their commands
+# others are called as their commands
+MODULES = {"list": "library", "rail-wear": "wear:rails"}
 
 
 class LazyGroup(click.Group):
@@ -79,9 +80,9 @@ class LazyGroup(click.Group):
         """Import and return a command."""
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"railsim.cli.{MODULES.get(cmd_name, cmd_name.replace('-', '_'))}")
-        command: click.Command = module.command
-        return command
+        module, _, name = MODULES.get(cmd_name, cmd_name.replace("-", "_")).partition(":")
+        found = getattr(import_module(f"railsim.cli.{module}"), name or "command")
+        return cast(click.Command, found)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

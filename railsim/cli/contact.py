@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -9,15 +10,21 @@ import click
 from railsim.cli.common import COUNT, collected, echo, flag, option
 from railsim.cli.output import Output, output_options
 from railsim.cli.progress import progress_bar
-from railsim.errors import Fault, Faults
+from railsim.errors import Fault, Faults, input_error
+from railsim.files.access import check_folder
 
 if TYPE_CHECKING:
+    from railsim.contact.creep_curves import Patch
     from railsim.contact.summary import Array, ContactSummary
     from railsim.description import Description
 
 TABLES = ("functions.csv", "conicity.csv", "patches.csv")
 MAP, OVERLAY = ("conicity_over_gauge.png", "conicity_over_gauge.csv"), "overlay.png"
 PICTURES = ("profiles.png", "functions.png", "conicity.png", "patches.png")
+CREEP = ("creep_curves.png", "traction.png", "creep_curves.csv")
+CREEP_TABLE = "creep_table.npz"
+FIELD_SIZE = 1.2
+"""Magnitude of the normalised creepage of the traction fields."""
 NORMAL = ("hertz", "kik-piotrowski")
 
 RANGES = {
@@ -137,7 +144,6 @@ def command(
       railsim contact measured.whl 54E1 --overlay S1002 --out worn
       railsim contact --creep --friction 0.35 --out creep
     """  # noqa: D301 - click reads the escape
-    from railsim.cli import creep as creep_part
     from railsim.cli.inputs import values_of
     from railsim.contact import tables
     from railsim.contact.creep_curves import forces_by_law
@@ -145,7 +151,7 @@ def command(
     from railsim.profiles import load_profile
 
     if build_creep_table:
-        creep_part.build_table(workers, output)
+        _build_creep_table(workers, output)
         return
     if len(profiles) > 2:
         raise click.UsageError("give a wheel and a rail; --wheel and --rail twice for both sides")
@@ -153,14 +159,14 @@ def command(
         geometry, wheel=profiles[:1] or geometry.wheel, rail=profiles[1:] or geometry.rail
     )
     geometry.check()
-    if creep:
-        creep_part.check_friction(friction)
+    if creep and not 0.0 < friction <= 1.0:
+        raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
     over = values_of(gauges, "--gauges") if gauges else []
     if len(over) == 1:
         raise click.UsageError("--gauges needs two gauges at least")
     compared = load_profile(overlay) if overlay else None
     written = [*PICTURES, *TABLES]
-    written += [*creep_part.PICTURES, *creep_part.TABLES] if creep else []
+    written += [*CREEP] if creep else []
     written += [*MAP] if over else []
     written += [OVERLAY] if compared else []
     output.reserve(*written)
@@ -187,7 +193,7 @@ def command(
         described.data.update(creep=rows)
         described.parts.extend(["", tables.creep_table(patch, rows)])
         if output.folder:
-            creep_part.write(output, patch, rows)
+            _write_creep(output, patch, rows)
     if compared is not None:
         from railsim.plot.contact import overlay_figure
 
@@ -275,3 +281,39 @@ def _write_map(
     picture, table = MAP
     output.write(picture, lambda: conicity_map_figure(gauges, found.amplitudes, values))
     output.write(table, conicity_map_table(found, gauges, values))
+
+
+def _write_creep(output: Output, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
+    """Write pictures and table."""
+    from railsim.contact.creep import LAWS
+    from railsim.contact.creep_curves import CASES, exact_force
+    from railsim.plot.creep import creep_curves_figure, traction_figure
+    from railsim.table import Table
+
+    fields = {
+        case: exact_force(patch, FIELD_SIZE * patch.unit_creepages(direction))
+        for case, direction in CASES.items()
+    }
+    figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
+    for name, content in zip(CREEP, (*figures, Table(list(rows[0]), rows)), strict=True):
+        output.write(name, content)
+
+
+def _build_creep_table(workers: int, output: Output) -> None:
+    """Recompute the table of the full theory, in ``creep_table`` by default, and compare it."""
+    import numpy as np
+
+    from railsim.contact.creep_table import build_nodes, gather_nodes, shipped_nodes, write_nodes
+
+    folder = output.folder or Path("creep_table")
+    check_folder(folder)
+    with progress_bar("creep table", quiet=output.quiet) as show:
+        for done, count in build_nodes(folder, workers):
+            show(done / count)
+    nodes = gather_nodes(folder)
+    write_nodes(nodes, folder / CREEP_TABLE)
+    difference = float(np.abs(nodes.force - shipped_nodes().force).max())
+    words = f"largest difference from the shipped table {difference:.1e} of mu N"
+    output.written.append(folder / CREEP_TABLE)
+    record = {"file": str(folder / CREEP_TABLE), "largest_difference": difference}
+    output.answer(record, [words])

@@ -1,5 +1,6 @@
 """``railsim study``: every combination of vehicles, tracks and speeds."""
 
+from collections.abc import Sequence
 from contextlib import chdir
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,6 +19,7 @@ from railsim.cli.common import (
     names_of,
     option,
     scheduler_option,
+    show,
     workers_option,
 )
 from railsim.cli.inputs import Given, given_options
@@ -202,14 +204,12 @@ def command(
       railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.campaign import run_campaign
-
     kept = {name: how.pop(name) for name in ("keep", "compress", "single")}
     taken = {**vars(asked), **kept, "keep": kept["keep"] != "all", "settings": given.settings}
     taken |= {"STUDY": file, "quantities": quantities, "plots": how["plots"], "vehicles": None}
     taken["together"] = how["together"] > 1
     campaign = partial(
-        run_campaign,
+        _campaign,
         taken=[name for name, value in taken.items() if value],
         report=report,
         workers=how["workers"],
@@ -264,6 +264,61 @@ def command(
         _print_end(outcome)
     output.answer({"folder": str(outcome.folder), "runs": list(outcome.records)})
     return _status(outcome)
+
+
+def _campaign(
+    scenario: str,
+    vehicles: Sequence[str],
+    output: Output,
+    *,
+    taken: Sequence[str],
+    report: bool,
+    **how: Any,
+) -> int:
+    """Run a scenario for vehicles, print and write its assessment; return the exit status.
+
+    `taken`: options and arguments that are given although the scenario, which knows its tracks and
+    speeds, holds them; `report`: write the page too; `how`: assignments, workers, scheduler, resume
+    of `railsim.studies.campaign`.
+    """
+    from railsim.assessment.tables import assessment_lines
+    from railsim.cli import DONE
+    from railsim.cli.assess import write_assessments
+    from railsim.errors import Fault, Faults
+    from railsim.studies.campaign import campaign
+
+    options = [name if name.isupper() else f"--{name}" for name in taken]
+    found, allowed = "given together with --scenario", "the scenario's file holds it"
+    faults = Faults(Fault(name, "", found, allowed) for name in options)
+    if not vehicles:
+        faults.append(Fault("--vehicles", "", "not given", "give one vehicle at least"))
+    faults.check()
+    lines = RunLines()
+    with progress_bar(scenario, quiet=output.quiet) as progress:
+        done = campaign(
+            scenario,
+            list(vehicles),
+            out=str(output.out),
+            overwrite=output.overwrite,
+            progress=progress,
+            on_record=None if output.quiet or output.as_json else lines,
+            on_remark=output.remark,
+            **how,
+        )
+    write_assessments(output, done.assessments)
+    if report:
+        from railsim.cli.report import write_report
+
+        page = Path(done.folder, "report.html")
+        write_report([str(done.folder)], page, assessments=done.assessments)
+        output.written.append(page)
+    if not output.as_json:
+        lines.end(remarks=False)  # the assessments repeat them
+        for assessment in done.assessments:
+            show("", *assessment_lines(assessment, quiet=output.quiet))
+    records = [assessment.record() for assessment in done.assessments]
+    output.answer({"folder": str(done.folder), "assessments": records})
+    return DONE
 
 
 def _spec(
