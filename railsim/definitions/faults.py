@@ -179,4 +179,4 @@ def _tag(member: Any) -> str | None:
         field = member.model_fields.get(key)
         if field is not None and typing.get_origin(field.annotation) is typing.Literal:
             return str(typing.get_args(field.annotation)[0])
-    return None
+    return f"a {next(iter(member.model_fields), '')}"  # see mechanisms

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from railsim.definitions.mechanism.definition import Actuator
-from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring, Piston
+from railsim.definitions.mechanism.parts import Actuator, AirSpring, Cylinder, GasSpring, Piston
 from railsim.definitions.mechanism.values import points_of
 from railsim.design_checks import ROUNDING, Check
 from railsim.mechanisms.analysis import Analysis

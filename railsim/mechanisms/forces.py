@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.definitions.mechanism.definition import Actuator, Element
 from railsim.definitions.mechanism.parts import (
+    Actuator,
     AirSpring,
     Cylinder,
     Damper,
+    Element,
     Force,
     GasSpring,
     HandForce,

@@ -16,86 +16,25 @@ from railsim.definitions.base import EMPTY_TABLE, Count, Definition, Name, Remar
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism.parts import (
     AUTO,
+    Actuator,
     ActuatorName,
-    AirSpring,
     Angle,
     Body,
     BodyName,
-    Cam,
     CatalogueName,
-    Cylinder,
-    Damper,
     Driver,
-    Force,
-    GasSpring,
+    Element,
     GasSpringName,
     Ground,
-    HandForce,
-    HandTorque,
-    JointFriction,
-    Link,
-    Piston,
-    PointMass,
+    Joint,
     PointName,
-    Prismatic,
     Quantity,
     QuantityOrAuto,
-    Revolute,
-    Slot,
-    Spring,
     Start,
-    Stop,
-    Torque,
-    TorsionSpring,
-    by_key,
 )
 from railsim.errors import Fault, argument_error, nearest
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
-
-
-Joint = Annotated[
-    Annotated[Revolute, Tag("a revolute")]
-    | Annotated[Link, Tag("a link")]
-    | Annotated[Slot, Tag("a slot")]
-    | Annotated[Prismatic, Tag("a prismatic")]
-    | Annotated[Cam, Tag("a cam")],
-    by_key("revolute", "link", "slot", "prismatic", "cam"),
-]
-
-
-Actuator = Annotated[
-    Annotated[Cylinder, Tag("a cylinder")]
-    | Annotated[AirSpring, Tag("a air_spring")]
-    | Annotated[Piston, Tag("a piston")]
-    | Annotated[HandForce, Tag("a push")]
-    | Annotated[HandTorque, Tag("a turn")],
-    by_key("cylinder", "air_spring", "piston", "push", "turn"),
-]
-
-
-Element = Annotated[
-    Annotated[PointMass, Tag("a point_mass")]
-    | Annotated[Force, Tag("a force")]
-    | Annotated[Torque, Tag("a torque")]
-    | Annotated[Spring, Tag("a spring")]
-    | Annotated[TorsionSpring, Tag("a torsion_spring")]
-    | Annotated[JointFriction, Tag("a joint_friction")]
-    | Annotated[Damper, Tag("a damper")]
-    | Annotated[Stop, Tag("a stop")]
-    | Annotated[GasSpring, Tag("a gas_spring")],
-    by_key(
-        "point_mass",
-        "force",
-        "torque",
-        "spring",
-        "torsion_spring",
-        "joint_friction",
-        "damper",
-        "stop",
-        "gas_spring",
-    ),
-]
 
 
 class Sampling(Definition):

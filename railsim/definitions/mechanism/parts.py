@@ -2,9 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Union, get_args
 
-from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    PlainValidator,
+    Tag,
+    WithJsonSchema,
+)
 
 from railsim.definitions.base import EMPTY_TABLE, Definition, Flag, Name, check
 from railsim.definitions.mechanism.expressions import Expression
@@ -199,23 +207,6 @@ class Cam(Definition):
             raise ValueError("all arcs with 'length', or all with 'centre'")
         if tangent[0] == (self.path is None) or tangent[0] != (self.body is None):
             raise ValueError("'path' goes with arcs of a 'length', 'body' with arcs of a 'centre'")
-
-
-def by_key(*keys: str) -> Any:
-    """A discriminator: the first of these keys that a table has."""
-
-    def tag(value: Any) -> str | None:
-        for key in keys:
-            if (key in value) if isinstance(value, Mapping) else hasattr(value, key):
-                return f"a {key}"
-        return None
-
-    listed = ", ".join(keys)
-    return Discriminator(
-        tag,
-        custom_error_type="one_of",
-        custom_error_message=f"one of the keys {listed} must say what it is",
-    )
 
 
 class Cylinder(Definition):
@@ -466,3 +457,31 @@ class Angle(Definition):
     """Added to the angle of the first line less that of the second [rad]"""
     limited: Flag = True
     """Whether it is a transmission angle that the least one of `[optimise]` holds for"""
+
+
+class _ByKey:
+    """Tells the members of a union apart by their first keys."""
+
+    @staticmethod
+    def __get_pydantic_core_schema__(source: Any, handler: GetCoreSchemaHandler) -> Any:
+        kinds = {next(iter(kind.model_fields)): kind for kind in get_args(source)}
+
+        def tag(value: Any) -> str | None:
+            for key in kinds:
+                if (key in value) if isinstance(value, Mapping) else hasattr(value, key):
+                    return f"a {key}"
+            return None
+
+        told = Discriminator(
+            tag,
+            custom_error_type="one_of",
+            custom_error_message=f"one of the keys {', '.join(kinds)} must say what it is",
+        )
+        tagged = (Annotated[kind, Tag(f"a {key}")] for key, kind in kinds.items())
+        return handler.generate_schema(Annotated[Union[tuple(tagged)], told])  # noqa: UP007
+
+
+Joint = Annotated[Revolute | Link | Slot | Prismatic | Cam, _ByKey]
+Actuator = Annotated[Cylinder | AirSpring | Piston | HandForce | HandTorque, _ByKey]
+_Forces = PointMass | Force | Torque | Spring | TorsionSpring | JointFriction
+Element = Annotated[_Forces | Damper | Stop | GasSpring, _ByKey]
