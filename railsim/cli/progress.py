@@ -21,6 +21,7 @@ COMPILING = "preparing: compiling (after an installation; about a minute, kept f
 UNCACHED = "not kept: there is no folder for it, give one by RAILSIM_CACHE_DIR"
 CAUSES = {
     "numba.core.compiler_machinery": COMPILING,  # runs the passes; loading is elsewhere
+    "railsim.kernels.lock": "preparing: waiting for what another process compiles or builds",
     "railsim.contact.table": "preparing: the contact table of new profiles (kept for later)",
 }
 """What takes long before a run, by the module that is at work."""

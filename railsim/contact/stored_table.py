@@ -15,6 +15,7 @@ from railsim.contact.table import ContactTable, Normal, TableGrid, build_contact
 from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
 from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
+from railsim.kernels.lock import alone
 from railsim.profiles.profile import Profile
 
 MOST_OPEN = 16  # stored tables that a process keeps open, mapped and checked
@@ -85,10 +86,14 @@ def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
     """Return the table stored under a hash of all that enters, or build and store it."""
     folder = cache.own_folder("tables")
     path = folder and folder / f"{digest[:32]}.npy"
-    if path and (stored := _stored_table(path)):
+    if folder is None or path is None:
+        return build()
+    if stored := _stored_table(path):
         return stored
-    table = build()
-    if path:
+    with alone(folder):
+        if stored := _stored_table(path):  # by the process that was waited for
+            return stored
+        table = build()
         _store_table(table, path)
     return table
 

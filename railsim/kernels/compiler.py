@@ -17,6 +17,7 @@ import hashlib
 import os
 import pickle
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from numba.core import config as _config
 from numba.extending import intrinsic, overload
 
 from railsim.kernels.cache import discard, notice, store, stored
+from railsim.kernels.lock import alone
 
 try:
     from llvmlite.binding import Linkage, parse_bitcode
@@ -150,6 +152,14 @@ if PRIVATE:
     class _PartCompiler(_Compiler):
         library = _Part
 
+    class _Kept(CPUDispatcher):  # type: ignore[misc]
+        """Compiled function whose code is on disk: what is missing there one process compiles."""
+
+        def compile(self, sig):
+            with ExitStack() as until_stored:
+                self._cache.until_stored = until_stored
+                return super().compile(sig)
+
     class _Internal(CPUDispatcher):  # type: ignore[misc]
         """Compiled function without an entry for Python, where a call of it would crash."""
 
@@ -170,6 +180,7 @@ class KernelCache:
         self._name = f"{module}.{function.__qualname__}"
         closure = [cell.cell_contents for cell in function.__closure__ or ()]
         self._code = hashlib.sha256(function.__code__.co_code + repr(closure).encode()).hexdigest()
+        self.until_stored = ExitStack()
 
     @property
     def cache_path(self) -> str:
@@ -186,6 +197,9 @@ class KernelCache:
         codegen = target_context.codegen()
         path = self._path(signature, codegen)
         data = stored(path)
+        if data is None:
+            self.until_stored.enter_context(alone(self._folder))
+            data = stored(path)  # by the process that was waited for
         if data is not None:
             rtsys.initialize(target_context)
             usual, codegen._library_class = codegen._library_class, _Stored
@@ -261,6 +275,7 @@ def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **o
     if not python:
         compiled.__class__ = _Internal
     elif folder is not None:
+        compiled.__class__ = _Kept
         compiled._cache = KernelCache(function, folder)
     return compiled
 

@@ -25,6 +25,7 @@ from itertools import pairwise
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from railsim.errors import InputError, ModelError, RailsimError, argument_error, argument_fault
 from railsim.files.access import remove_partial_files, sweep, whole_file
@@ -313,6 +314,12 @@ def cluster(address: str) -> Any:
         found = f"no scheduler answers at {address} ({error})"
         fault = argument_fault("scheduler", "", found, "such as tcp://host:8786")
         raise InputError([fault]) from None
+
+
+def machines_that_compile(client: Any) -> int:
+    """Return the number of machines of a dask cluster that compile before their first run."""
+    ready = client.run(is_compiled, on_error="ignore")  # by the addresses of the workers
+    return len({urlsplit(address).hostname for address, is_ready in ready.items() if not is_ready})
 
 
 def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:

@@ -9,7 +9,7 @@ import pytest
 import railsim
 from railsim.result import open_run
 from railsim.studies.case import load_case
-from railsim.studies.execute import Job, perform_there
+from railsim.studies.execute import Job, machines_that_compile, perform_there
 from railsim.studies.spec import RunSpec
 
 distributed = pytest.importorskip("distributed")
@@ -35,6 +35,15 @@ def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
     assert not job.path.parent.exists()
     (tmp_path / "here.h5").write_bytes(files[case.file_name])
     assert open_run(tmp_path / "here.h5").status == "complete"
+
+
+def test_machines_that_compile_are_counted_each_once():
+    class Client:
+        def run(self, function, **_):
+            ready = {"tcp://one:1": False, "tcp://one:2": False, "tcp://two:1": False}
+            return {**ready, "tls://three:1": True}
+
+    assert machines_that_compile(Client()) == 2
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,25 @@ def test_second_process_compiles_nothing(copied_kernels):
     folder = copied_kernels.parent.parent
     assert run(folder) == (0.0, 1)
     assert run(folder) == (0.0, 0)
+
+
+@pytest.mark.slow
+def test_processes_that_begin_at_once_compile_once(copied_kernels):
+    """The others wait and load; so it is for all workers of a machine, of a pool or a cluster."""
+    folder = copied_kernels.parent.parent
+    with ThreadPoolExecutor(3) as threads:
+        found = list(threads.map(run, [folder] * 3))
+    assert sorted(found) == [(0.0, 0), (0.0, 0), (0.0, 1)]
+
+
+@pytest.mark.slow
+def test_process_that_ends_while_it_compiles_lets_the_next_one_compile(copied_kernels):
+    folder = copied_kernels.parent.parent
+    dies = "import os\nfrom railsim.kernels import compiler\nKernel = compiler.KernelCache\n"
+    dies += "Kernel.save_overload = lambda *of_one: os._exit(1)\n" + PROGRAM
+    with pytest.raises(subprocess.CalledProcessError):
+        output(dies, folder)
+    assert run(folder) == (0.0, 1)
 
 
 @pytest.mark.slow
