@@ -48,12 +48,11 @@ from railsim.kernels.system import (
     WHEELSET,
     System,
 )
-from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.model.assembly import Model
 from railsim.model.preloads import least_squares, with_preloads, with_these_preloads
 from railsim.model.solutions import solution
-from railsim.model.time_step import empty_recorder
+from railsim.model.time_step import empty_recorder, observed
 from railsim.model.work import components_of, level_track, work_arrays
 from railsim.notation import COMPONENTS, SIDES
 
@@ -378,19 +377,7 @@ class _Balance:
         deflections, patches = [], []
         for each in (state, after):
             recorder = empty_recorder(self.model, 1, chosen, patches=True)
-            trial, derivative = each.copy(), np.zeros_like(each)
-            status, *_ = time_loop(
-                system,
-                work_arrays(system),
-                trial,
-                derivative,
-                np.zeros((3, len(each))),
-                recorder,
-                FAST,
-                1.0,
-                Chunk(0, 0, 1, closing=1),
-            )
-            if status != RUNNING:
+            if observed(system, each, recorder) != RUNNING:
                 return []
             deflections.append(recorder.element[0, :, DEFLECTION : DEFLECTION + 3])
             patches.append(recorder.patch[0, :, :, :, NORMAL] > 0.0)

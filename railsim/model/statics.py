@@ -18,13 +18,11 @@ from railsim.definitions.elements.base import two_sided
 from railsim.definitions.loading import check_types, load_track
 from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.kernels.element_outputs import DEFLECTION, FORCE, LINK, MOUNT
-from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.laws import permitted_part
 from railsim.model.assembly import Model, assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.preloads import nominal_forces
-from railsim.model.time_step import empty_recorder
-from railsim.model.work import work_arrays
+from railsim.model.time_step import empty_recorder, observed
 from railsim.profiles import Profile
 from railsim.table import Column, Table
 
@@ -237,18 +235,7 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
 def _outputs(model: Model, state: Floats, members: list[tuple[int, int]]) -> Floats:
     """Return deflections and forces of elements, float64[element, column of their outputs]."""
     recorder = empty_recorder(model, 1, np.array(members, dtype=np.int64).reshape(-1, 2))
-    trial, derivative = state.copy(), np.zeros_like(state)
-    time_loop(
-        model.system,
-        work_arrays(model.system),
-        trial,
-        derivative,
-        np.zeros((3, len(state))),
-        recorder,
-        FAST,
-        1.0,
-        Chunk(0, 0, 1, closing=1),
-    )
+    observed(model.system, state, recorder)
     return np.asarray(recorder.element[0])
 
 

@@ -86,6 +86,14 @@ def empty_recorder(
     )
 
 
+def observed(system: System, state: Floats, recorder: Recorder) -> int:
+    """Record a state in one row without a step; return the status."""
+    work, rest = work_arrays(system), np.zeros((3, len(state)))
+    once = FAST, 1.0, Chunk(0, 0, 1, closing=1)
+    status, *_ = time_loop(system, work, state.copy(), rest[0].copy(), rest, recorder, *once)
+    return int(status)
+
+
 def divide_strikes(work: Work, scheme: int, step: float, longest: float = math.inf) -> None:
     """Have the time loop divide the steps over which a wheel lifts or strikes.
 

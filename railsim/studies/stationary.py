@@ -192,13 +192,15 @@ def stationary(
     curve = f"R {limits.guiding.radius:g} m"
     force = found(f"{curve}, level", lambda: _force(vehicle, balance, track, settings, limits))
     force = np.nan if force is None else force
-    values.append(_guiding(f"{curve}, level", "guiding Y/Q", float(force / load), limits))
+    values.append(_judged(f"{curve}, level", "guiding Y/Q", float(force / load), limits.guiding))
     quotients = [
         np.nan if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
         for state in (rolling(f"{curve}, {name}", sign * heights) for sign in (1.0, -1.0))
     ]
     values.append(
-        _guiding(f"{curve}, {name}", "guiding Y/Q, combined", float(np.max(quotients)), limits)
+        _judged(
+            f"{curve}, {name}", "guiding Y/Q, combined", float(np.max(quotients)), limits.guiding
+        )
     )
     name = f"cant {1e3 * cant:g} mm"
     standing = found(name, lambda: on_cant(balance, track, cant, held=held))
@@ -252,9 +254,7 @@ def _unloading(
         wheelset, side = loop.worst
         wheel = f"wheelset {wheelset + 1} {SIDES[side]}"
         worst, left = float(np.max(loop.unloading)), loop.on_level
-    values = [
-        StationaryValue(case, UNLOADING, worst, limit.value, wheel, limit.source, limit.checked)
-    ]
+    values = [_judged(case, UNLOADING, worst, limit, wheel)]
     if friction:
         values += [
             StationaryValue(case, name, value, None, wheel)
@@ -289,14 +289,10 @@ def _force(
     return float("nan") if Y is None else -float(Y[0, 0])
 
 
-def _guiding(
-    case: str, quantity: str, quotient: float, limits: StationaryLimits
+def _judged(
+    case: str, quantity: str, value: float, limit: Value, place: str = "wheelset 1 outer"
 ) -> StationaryValue:
-    """Y/Q of the leading outer wheel, the left one in a right-hand curve."""
-    limit = limits.guiding
-    return StationaryValue(
-        case, quantity, quotient, limit.value, "wheelset 1 outer", limit.source, limit.checked
-    )
+    return StationaryValue(case, quantity, value, limit.value, place, limit.source, limit.checked)
 
 
 def _lean(
@@ -308,7 +304,6 @@ def _lean(
     limits: StationaryLimits,
 ) -> list[StationaryValue]:
     """Unloading, angle of the floor and roll coefficient on a cant [m]; nan without a state."""
-    unloading, angle = limits.lean_unloading, limits.lean_angle
     worst, wheel, share = np.nan, "", np.nan
     if standing is not None:
         shares = (standing.Q0 - standing.Q) / standing.Q0
@@ -317,11 +312,7 @@ def _lean(
         share = roll_coefficient(model, standing, cant, body)
     floor = float(np.arcsin(cant / CANT_BASE)) * (1.0 + share)
     return [
-        StationaryValue(
-            case, UNLOADING, worst, unloading.value, wheel, unloading.source, unloading.checked
-        ),
-        StationaryValue(
-            case, "angle of the floor", floor, angle.value, body, angle.source, angle.checked
-        ),
+        _judged(case, UNLOADING, worst, limits.lean_unloading, wheel),
+        _judged(case, "angle of the floor", floor, limits.lean_angle, body),
         StationaryValue(case, "roll coefficient", share, None, body),
     ]

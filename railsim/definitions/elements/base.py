@@ -17,7 +17,7 @@ from railsim.definitions.base import (
     check,
     rising,
 )
-from railsim.definitions.elements.rows import NOTHING, Row, Rows, Triple
+from railsim.definitions.elements.rows import NOTHING, Mount, Row, Rows, Triple
 
 Signs = Triple
 Compression = Annotated[
@@ -250,3 +250,8 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
         force = self.compression(self.stiffness[2], abs(point2[2] - point1[2]))
         up = -1.0 if point1[2] < point2[2] else 1.0
         return self.model_copy(update={"preload": (0.0, 0.0, up * force)})
+
+    def mount(self, **more: Any) -> Mount:
+        """The row of its spring with what a kind adds."""
+        own = {"stiffness": self.stiffness, "damping": self.damping}
+        return Mount(**{**own, "preload": self.known_preload, **more})

@@ -42,12 +42,10 @@ class Bushing(VerticalSpring, PointElement):
         x, y, z = (State("maxwell", (c, k, 0.0)) if k > 0.0 else None for c, k in pairs)
         cx, cy, cz = (c if k == 0.0 else 0.0 for c, k in pairs)
         return [
-            Mount(
-                stiffness=self.stiffness,
+            self.mount(
                 damping=(cx, cy, cz),
                 states=(x, y, z),
                 rotation=self.rotational_stiffness,
                 rotation_damping=self.rotational_damping,
-                preload=self.known_preload,
             )
         ]

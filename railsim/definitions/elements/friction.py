@@ -81,11 +81,7 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         x, y, z = (self.limit(force, coefficient) for force, coefficient in pairs)
         together = self.friction_limit == "circle"
         return [
-            Mount(
-                stiffness=self.stiffness,
-                damping=self.damping,
-                friction=(x, y, z),
-                states=pads(self.stick_stiffness, (x, y, z), together=together),
-                preload=self.known_preload,
+            self.mount(
+                friction=(x, y, z), states=pads(self.stick_stiffness, (x, y, z), together=together)
             )
         ]

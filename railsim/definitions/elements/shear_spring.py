@@ -35,11 +35,5 @@ class ShearSpring(VerticalSpring, SidedElement):
     def rows(self) -> list[Mount]:
         """One mount in the middle between the seats, in the axes of both bodies."""
         return [
-            Mount(
-                stiffness=self.stiffness,
-                damping=self.damping,
-                rotation=(*self.bending_stiffness, self.torsional_stiffness),
-                both_ends=True,
-                preload=self.known_preload,
-            )
+            self.mount(rotation=(*self.bending_stiffness, self.torsional_stiffness), both_ends=True)
         ]

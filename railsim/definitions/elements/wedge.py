@@ -75,12 +75,9 @@ class Wedge(VerticalSpring, PointElement):
         sliding = FrictionLimit(coefficient=self.share)
         friction = (FrictionLimit(), sliding, sliding)
         return [
-            Mount(
-                stiffness=self.stiffness,
-                damping=self.damping,
+            self.mount(
                 friction=friction,
                 states=pads((0.0, *self.stick_stiffness), friction, skew=self.share),
                 one_sided=True,
-                preload=self.known_preload,
             )
         ]
