@@ -37,6 +37,7 @@ CLOSE, MOST_TIMES = 0.1, 4  # standard deviations; times that derivatives are ta
 SAME = 3e-3  # change of a coordinate up to which derivatives are the same
 PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
+STRETCHED = 1e-3  # of the arc length, from which it is said
 ALONG = 20.0  # m, within which the place of a run is looked for
 SCALE = 5.0  # weight of a residual in units of the noise beyond which a robust loss yields
 
@@ -328,6 +329,12 @@ def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> 
         for one, (shift, stretch) in zip(
             problem.runs, np.reshape(x[count:], (-1, 2)) if problem.place else [], strict=False
         )
+    ]
+    remarks += [
+        f"{place.run}: its arc length is stretched by {1e3 * place.stretch:+.2f} m/km: distance, "
+        "speed or clock are off by as much; where it is the clock, so are all frequencies."
+        for place in places
+        if abs(place.stretch) > STRETCHED
     ]
     return Identified(
         problem.model.vehicle, tuple(problem.parameters), x[:count], covariance[:count, :count],

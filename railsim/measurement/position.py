@@ -12,7 +12,7 @@ from railsim.errors import Fault, InputError
 
 Floats = NDArray[np.float64]
 BACKWARDS = 1.0  # m, by which a counter may step back
-APART = 0.005  # of the distance: remarked on
+APART = 0.002  # of the distance: remarked on
 WRONG = 0.5  # of the distance: refused
 
 

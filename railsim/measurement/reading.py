@@ -138,8 +138,10 @@ def _read(how: MeasurementFile, wanted: list[str]) -> _Raw:
             if count > MOST_VALUES:
                 found, allowed = "too many values", f"{MOST_VALUES:g} at most; name fewer channels"
                 raise InputError([Fault(file, "", found, allowed)])
-        for name, parts in own.items():
+        for name in wanted:
+            parts = own.pop(name)  # freed as it is joined
             raw.parts[name].append(np.concatenate(parts) if parts else np.empty(0))
+            del parts
     rows = sum(map(len, raw.parts[wanted[0]]))
     if rows < FEWEST:
         raise InputError([Fault(how.file[0], "", f"{rows} values", f"{FEWEST} at least")])
@@ -172,8 +174,7 @@ def _channel(
 
 
 def _zero(name: str, how: MeasurementFile, channel: Channel, x: Floats, time: Floats) -> float:
-    if channel.zero is None:
-        return 0.0
+    assert channel.zero is not None
     inside = (time >= channel.zero[0]) & (time <= channel.zero[1]) & np.isfinite(x)
     if not inside.any():
         found = f"no value between {channel.zero[0]:g} and {channel.zero[1]:g} s"
@@ -229,9 +230,9 @@ def _measurement(
         mileage = track.mileage, track.falling_mileage
     s, speed, said = position(path, how, clock.time, axes, mileage)
     values = _mounted(how, values, remarks)
-    values = {
-        name: x - _zero(name, how, how.channels[name], x, clock.time) for name, x in values.items()
-    }
+    for name, x in values.items():
+        if how.channels[name].zero is not None:
+            values[name] = x - _zero(name, how, how.channels[name], x, clock.time)
     return Measurement(how, clock.time, s, speed, values, (*remarks, *said))
 
 

@@ -11,6 +11,9 @@ the linear system with the smallest mean square error (statistical linearisation
 What remains, and all of e in z and roll, is noise of the state with the spectrum found.  The
 wheelsets come over the same place one after the other, and what remains of them is alike there;
 the spectrum is that of independent noises with the same effect on their sum, where it is larger.
+
+In a curve a wheelset moves about another place of its profiles; the same fit about the means of a
+run through it.  A mirror image changes neither the gains nor the spectra.
 """
 
 from collections.abc import Callable
@@ -61,16 +64,20 @@ def in_the_mean(
     linear: LinearVehicle,
     tangent: TrackResponse,
     irregularity: dict[str, object],
+    curve: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[TrackResponse, Noise]:
     """Return the response with the contact of a rough track, and the noise that remains.
 
     `vehicle`, `track`: The track's rails and friction count. `linear`, `tangent`: About steady
     rolling, at the speed in question. `irregularity`: Of the type ``random``, as in a track file.
+    `curve`: Curvature and cant of the run [1/m, m]; what moves about its mean is fitted.
     Raises ModelError: The vehicle does not complete the run.
     """
+    curvature, cant = curve
+    element = {"type": "CIR", "radius": 1.0 / curvature} if curvature else {"type": "STR"}
     rough = track.replace(
-        plan=[{"type": "STR", "length": LENGTH}],
-        cant=[{"type": "CST", "length": LENGTH, "cant": 0.0}],
+        plan=[{**element, "length": LENGTH}],
+        cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
         vertical=[],
         irregularities=[{**irregularity, "type": "random", "seed": SEED}],
     )

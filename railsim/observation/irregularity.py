@@ -6,7 +6,8 @@ are alignment, level, cross level and gauge with the powers of a spectrum, and f
 accelerations in y, z, roll and yaw that the linear contact leaves out (`contact.py`).
 
 The linear model is one of straight track and constant speed; what it lacks is in the simulated runs
-by which its estimate is put right (`simulated.py`).  A run is divided into pieces (`pieces.py`).
+by which its estimate is put right (`simulated.py`).  In curves the contact of the linear model is
+that of the sharpest place of a piece.  A run is divided into pieces (`pieces.py`).
 """
 
 from collections.abc import Callable
@@ -16,6 +17,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from railsim.arrays import Complexes, Flags, Floats
+from railsim.constants import CANT_BASE
 from railsim.contact.geometry import geometry_of
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
@@ -31,9 +33,10 @@ from railsim.observation.estimate import Estimate, Irregularity, estimate_of, jo
 from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
 from railsim.observation.pieces import READ, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refined
-from railsim.observation.smoother import Fields, filtered
+from railsim.observation.smoother import filtered
 from railsim.result.sensors import all_sensors
 from railsim.simulation.remarks import silent
+from railsim.track.alignment import Alignment
 
 Progress = Callable[[float], None]
 
@@ -41,11 +44,13 @@ PERIOD = 60.0  # by which the period is longer than a piece [m]
 NOISE = dict(zip(READ, (0.05, 1e-3), strict=True))  # m/s2, rad/s, of one value
 BIAS = dict(zip(READ, (0.2, 5e-3), strict=True))
 REMAINDER = 0.04  # of the power of what the linear contact leaves out, about a simulated run
+# least power of it in y and yaw for the errors: intervals of twins cover their share
+LOCAL = 0.08
 SIMULATIONS = 25  # at most, for each piece
 LEVEL = 30.0  # rms of what channels read over what is assumed: beyond this a unit is wrong
 FLANGE = 0.7  # rad, contact angle
 CHANNELS = ("lateral", "vertical", "cross_level", "gauge")  # of a spectrum, as `QUANTITIES`
-CANT = 1.5  # m, between the rails
+STRAIGHT = 1e-5  # 1/m, curvature that counts as none
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ class Assumed:
         found = np.zeros((len(wave_numbers), len(CHANNELS)))
         for number, channel in enumerate(CHANNELS):
             if channel in spectrum.channels:
-                factor = self.scale**2 * (CANT**2 if channel == "cross_level" else 1.0)
+                factor = self.scale**2 * (CANT_BASE**2 if channel == "cross_level" else 1.0)
                 shares = spectrum.bin_variances(channel, low, high)
                 found[:, number] = 0.5 * points * factor * shares
         return found
@@ -149,7 +154,8 @@ def _curves(track: Track, measurement: Measurement) -> list[str]:
     low, high = min(c.begin for c in curved), max(c.end for c in curved)
     return [
         f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear model is one "
-        "on straight track: alignment, Y and sum Y there are not to be relied upon."
+        "on straight track: neither the estimate nor its standard deviations are to be relied "
+        "upon there; simulated runs know the curves."
     ]
 
 
@@ -171,30 +177,43 @@ class _Smooth:
         )
         bias = {**BIAS, "sensor_acceleration": assumed.bias}
         self.bias = np.array([bias[kind] for kind in kinds])
-        self._models: dict[float, tuple[TrackResponse, Noise]] = {}
+        self._alignment = Alignment(track)
+        self._models: dict[tuple[float, float, float], tuple[TrackResponse, Noise]] = {}
         self.said: list[str] = []
         self._wrong: set[int] | None = None
         self.flanges = _flanges(self.linear, track)
-        self._last: tuple[tuple[float, int], Complexes] | None = None
+        self._last: tuple[tuple[float, ...], Complexes] | None = None
 
     def remarks(self) -> list[str]:
         """Remarks on the model, and on channels that read another thing than they should."""
         return [*self.linear.remarks, *self.said]
 
-    def model(self, speed: float) -> tuple[TrackResponse, Noise]:
-        """Linear vehicle and noise of its state at a speed [m/s]."""
-        if speed not in self._models:
+    def model(
+        self, speed: float, curvature: float = 0.0, cant: float = 0.0
+    ) -> tuple[TrackResponse, Noise]:
+        """Linear vehicle and noise of its state at a speed [m/s], in a curve [1/m, m]."""
+        key = speed, curvature, cant
+        if key not in self._models:
             tangent, a = track_response(self.linear, self.known, speed), self.assumed
             rough = {"spectrum": a.spectrum, "wavelengths": list(a.wavelengths), "scale": a.scale}
             with silent():
-                self._models[speed] = in_the_mean(
-                    self.vehicle, self.track, self.linear, tangent, rough
+                self._models[key] = in_the_mean(
+                    self.vehicle, self.track, self.linear, tangent, rough, key[1:]
                 )
-        return self._models[speed]
+        return self._models[key]
 
-    def _response(self, response: TrackResponse, k: Floats, speed: float) -> Complexes:
+    def _sharpest(self, piece: Piece) -> tuple[float, float]:
+        """Curvature and cant where a piece is sharpest [1/m, m], three digits."""
+        curvature = self._alignment.curvature(piece.grid)
+        k = int(np.argmax(np.abs(curvature)))
+        if abs(curvature[k]) < STRAIGHT:
+            return 0.0, 0.0
+        cant = CANT_BASE * np.sin(self._alignment.cant_angle(piece.grid[k : k + 1])[0])
+        return float(f"{curvature[k]:.3g}"), float(f"{cant:.3g}")
+
+    def _response(self, response: TrackResponse, k: Floats, at: tuple[float, ...]) -> Complexes:
         """H of all outputs, that of a constant left out; the last one is kept."""
-        key = speed, len(k)
+        key = *at, len(k)
         if self._last is None or self._last[0] != key:
             shape = len(k), len(response.outputs), len(QUANTITIES) + response.rows.size
             H = np.zeros(shape, complex)
@@ -205,11 +224,12 @@ class _Smooth:
 
     def estimate(self, piece: Piece) -> Estimate:
         """Return fields and forces of a piece with their standard deviations."""
-        response, noise = self.model(piece.speed)
+        curve = self._sharpest(piece) if self.simulations else (0.0, 0.0)
+        response, noise = self.model(piece.speed, *curve)
         n = len(piece.grid)
         points = 2 * next_fast_len((n + int(PERIOD / STEP) + 1) // 2, real=True)
         k: Floats = 2.0 * np.pi * np.fft.rfftfreq(points, STEP).astype(float)
-        whole = self._response(response, k, piece.speed)
+        whole = self._response(response, k, (piece.speed, *curve))
         chosen = [response.outputs.index(name) for name in self.used]
         forces = [i for i, o in enumerate(response.outputs) if o[:2] in ("Q.", "Y.", "su", "la")]
         names = tuple(response.outputs[i] for i in forces)
@@ -228,26 +248,27 @@ class _Smooth:
         sizes = likely_sizes(powers, spectra_of(read, there, points))
         # what the contact leaves out goes with the irregularities: its size does not show yet
         fields = powers.fields(replace(sizes, contact=np.ones(len(KINDS))))
+        covariance = fields.covariance()
         padded = (0, 0), (0, points - n)
         mean = fields.mean(np.pad(read, padded), np.pad(there, padded))
         base = np.tile(response.steady[forces][:, None], n)
         if self.simulations:
             found = self._refined(piece, run, powers, sizes, whole[:, forces], mean, there)
-            fields, mean, base = found or (fields, mean, base)
+            covariance, mean, base = found or (covariance, mean, base)
         return estimate_of(
-            piece, np.fft.rfft(mean, axis=1), fields.covariance(), powers.track,
+            piece, np.fft.rfft(mean, axis=1), covariance, powers.track,
             (names, whole[:, forces], base),
         )  # fmt: skip
 
     def _refined(
         self, piece: Piece, run: SimulatedRun, powers: Powers, sizes: Sizes, forces: Complexes,
         mean: Floats, there: Flags,
-    ) -> tuple[Fields, Floats, Floats] | None:  # fmt: skip
+    ) -> tuple[Complexes, Floats, Floats] | None:  # fmt: skip
         """Fields about the simulated run that agrees with the measured one.
 
-        Returns float64[field, points]: With the sizes of errors that are left; their mean; what
-        the forces have beyond the linear ones.  None where the first simulated run was not
-        complete.
+        Returns their covariance complex128[k, field, field], with the errors that are left; their
+        mean float64[field, points]; what the forces have beyond the linear ones.  None where the
+        first simulated run was not complete.
         """
         n, points, count = len(piece.grid), powers.points, len(QUANTITIES)
         H = powers.response[:, :, :count]
@@ -269,8 +290,13 @@ class _Smooth:
         sizes = likely_sizes(powers, spectra_of(found.data[:, :n], there, points))
         fields = powers.fields(sizes)
         mean = filtered(fields.gain(fields.power.shape[1]), found.data)
+        # the data agree with the run, but the contact about it is not the one in the mean
+        blunt = np.maximum(sizes.contact, (LOCAL, 0.0))
+        covariance = powers.fields(replace(sizes, contact=blunt)).covariance()
+        own = np.arange(count)
+        covariance[:, own, own] += found.change**2 * powers.track
         base = found.reading.forces - filtered(forces[:, :, :count], found.fields)[:, :n]
-        return fields, mean, base
+        return covariance, mean, base
 
     def _there(self, powers: Powers, piece: Piece, read: Floats) -> Flags:
         """Where the channels say something; the first piece tells which of them are wrong."""

@@ -82,11 +82,12 @@ class SimulatedRun:
         self._track = track
         self._start = max(0.0, float(s[0]) - LEAD - self._moved)
 
+        self._constant = bool(np.ptp(piece.speeds) < STEADY * np.mean(piece.speeds))
+
     @property
     def is_steady(self) -> bool:
         """Whether nothing but irregularities is read: straight and level, at a constant speed."""
-        speeds = self.piece.speeds
-        return self._straight and float(np.ptp(speeds)) < STEADY * float(np.mean(speeds))
+        return self._straight and self._constant
 
     def __call__(self, fields: Floats) -> Reading | str:
         """Return what is read over irregularities at the grid, or why the run ended before.
@@ -107,7 +108,7 @@ class SimulatedRun:
             changes["plan"] = [{"type": "STR", "length": end + AFTER}]
             changes["cant"] = [{"type": "CST", "length": end + AFTER, "cant": 0.0}]
         with silent():
-            speed = float(np.mean(self.piece.speeds)) if self.is_steady else None
+            speed = float(np.mean(self.piece.speeds)) if self._constant else None
             result = simulate(
                 self.vehicle, self._track.replace(**changes), speed=speed,
                 start=self._start, until=end, settings=self._settings(s),
@@ -117,7 +118,7 @@ class SimulatedRun:
         return Reading(*(self._read(result, names) for names in (self.outputs, self.forces)))
 
     def _settings(self, s: Floats) -> Settings:
-        if self.is_steady:
+        if self._constant:
             return Settings(output_rate=RATE, outputs=OUTPUTS)
         # a run whose speed varies hands over every value by itself: not more than are needed
         rate = min(RATE, OVERSAMPLED * float(self.piece.speeds.max()) / STEP)

@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 
 from railsim.plot.style import styled
 
+LABELS = {"Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "floor y", "body_z": "floor z"}
+
 
 class Assessed(Protocol):
     """What is drawn, such as `railsim.studies.assess_track.TrackAssessment`."""
@@ -32,7 +34,9 @@ def heat_strip(found: Assessed) -> Figure:
         shares, rows = np.array([found.shares[name] for name in names]), np.arange(len(names) + 1)
         mesh = axes.pcolormesh(edges, rows, shares, cmap="inferno_r", vmin=0.0, vmax=1.2)
         figure.colorbar(mesh, ax=axes, label="share of the limit (1)")
-    words = [f"{vehicle}, {3.6 * speed:.0f} km/h, {q}" for vehicle, speed, q in names]
+    words = [
+        f"{vehicle}, {3.6 * speed:.0f} km/h, {LABELS.get(q, q)}" for vehicle, speed, q in names
+    ]
     axes.set_yticks(np.arange(len(names)) + 0.5, words)
     axes.set(xlabel="s (km)")
     axes.invert_yaxis()

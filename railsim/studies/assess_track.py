@@ -10,7 +10,7 @@ alignment in D1 over 200 m, and isolated defects.  A section of 200 m that only 
 complain of is a miss of the geometry, one that only the geometry complains of a false alarm.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -30,6 +30,7 @@ from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.files.access import check_folder, write_text
 from railsim.result import Result, open_result
+from railsim.result.hunting import HUNTS
 from railsim.studies.carry_out import carry_out
 from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, Flags, RecordedGeometry
@@ -191,8 +192,23 @@ def assess_track(
         f"{record['name']}: {record['status']}, {record['status_reason']}"
         for record in outcome.records
         if record["status"] != "complete"
-    ]
+    ] + _hunting(outcome.records)
     return _judged(track, cases, pieces, folder, share, outcome.computed, remarks)
+
+
+def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Remark on vehicles that hunt: what they exceed is not the track's."""
+    runs: dict[tuple[str, float], list[bool]] = {}
+    for record in records:
+        labels = record["labels"]
+        hunts = any(words.startswith(HUNTS) for words in record.get("remarks", ()))
+        runs.setdefault((labels["vehicle"], labels["speed"]), []).append(hunts)
+    return [
+        f"{vehicle} hunts at {3.6 * speed:.0f} km/h in {sum(hunts)} of {len(hunts)} pieces: what "
+        "it exceeds there is due to the vehicle, and where a piece begins it need not hunt yet."
+        for (vehicle, speed), hunts in runs.items()
+        if any(hunts)
+    ]
 
 
 def recorded(recording: str | Path) -> Track:

@@ -97,6 +97,15 @@ def test_command(judged, recording, capsys, monkeypatch):
     assert "missed" in data["flagged"]
 
 
+def test_vehicles_that_hunt_are_said():
+    """What they exceed is not the track's; a vehicle that does not hunt is not named."""
+    labels = {"vehicle": "wagon", "speed": 40.0}
+    other = {"labels": {"vehicle": "coach", "speed": 40.0}, "remarks": ["Values are low-passed."]}
+    hunts = {"labels": labels, "remarks": ["The vehicle hunts at 5.7 Hz, 7.4 mm, ..."]}
+    (words,) = module._hunting([hunts, {"labels": labels, "remarks": []}, other])
+    assert words.startswith("wagon hunts at 144 km/h in 1 of 2 pieces")
+
+
 def test_wrong_input(recording, tmp_path, capsys):
     start = ["assess-track", str(recording), "--vehicles", "coach_manchester", "--speeds"]
     end = ["--out", str(tmp_path / "x")]

@@ -8,8 +8,10 @@ import pytest
 from scipy.io import savemat
 
 import railsim
+from railsim.definitions.measurement import MeasurementFile
 from railsim.measurement.alignment import aligned
 from railsim.measurement.clock import clock_of, delayed
+from railsim.measurement.position import position
 from railsim.track.alignment import Alignment
 
 RATE, COUNT = 500.0, 3000
@@ -152,6 +154,20 @@ def test_coarse_mileage_against_speed(tmp_path):
     run = railsim.load_measurement(path, ["start=100.0"])
     assert np.abs(run.distance - 100.0 - 50.0 * t).max() < 5.0
     assert np.diff(run.distance).min() > 0.0
+
+
+def test_a_clock_0_3_per_cent_off_is_said_beside_distance_and_speed():
+    """Both are measured, in their own time; the record's clock runs 0.3 % fast."""
+    how = MeasurementFile(
+        format="railsim-measurement/1", name="run", file="-", rate=100.0,
+        channels={"Q": {"quantity": "Q:1:left"}, "v": {"quantity": "speed"}},
+    )  # fmt: skip
+    time = np.linspace(0.0, 40.0, 4001)
+    for clock, words in ((1.0, []), (1.003, ["run apart by -0.30 %"])):
+        axes = {"speed": np.full(4001, 50.0), "distance": 50.0 * time}
+        said = position("-", how, clock * time, axes, None)[2]
+        assert len(said) == len(words)
+        assert all(w in s for w, s in zip(words, said, strict=True))
 
 
 def test_mounting_takes_gravity_back(tmp_path):

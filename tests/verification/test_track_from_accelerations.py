@@ -63,6 +63,27 @@ def measured(result, vehicle, points, speed, seed=0):
     return Measurement(definition, time, s, np.gradient(s, time), channels)
 
 
+def canted_curve(radius, cant, length=1200.0):
+    """Straight, clothoid, curve, clothoid and straight, with irregularities."""
+    plan = [
+        {"type": "STR", "length": 250.0},
+        {"type": "CLO", "length": 100.0, "radius_start": np.inf, "radius_end": radius},
+        {"type": "CIR", "length": length - 700.0, "radius": radius},
+        {"type": "CLO", "length": 100.0, "radius_start": radius, "radius_end": np.inf},
+        {"type": "STR", "length": 250.0},
+    ]
+    ramp = {"type": "LIR", "length": 100.0}
+    level = {"type": "CST", "length": 250.0, "cant": 0.0}
+    canted = [
+        level,
+        {**ramp, "cant_start": 0.0, "cant_end": cant},
+        {**level, "length": length - 700.0, "cant": cant},
+        {**ramp, "cant_start": cant, "cant_end": 0.0},
+        level,
+    ]
+    return rough(length).replace(plan=plan, cant=canted)
+
+
 def errors(found, track, margin=60.0):
     """Truth, error and standard deviation by quantity and band, margins left out."""
     rows = (found.s > found.s[0] + margin) & (found.s < found.s[-1] - margin)
@@ -222,6 +243,54 @@ def test_gaps_signs_and_units(short, coach):
     assert "another 'unit'" in said
     assert "axlebox_3_left_z" not in said
     assert "axlebox_1_left_z" not in said
+
+
+def test_a_curve_without_simulated_runs_is_said(short, coach):
+    curve = canted_curve(600.0, 0.1, 800.0).replace(irregularities=[])
+    found = irregularity(short[2], coach, curve, simulations=0)
+    assert any("curves between s = 250 and 550 m" in words for words in found.remarks)
+
+
+@pytest.mark.further
+@pytest.mark.parametrize(("radius", "cant", "speed"), [(600.0, 0.1, 27.8), (2500.0, 0.1, 50.0)])
+def test_twins_through_curves(coach, radius, cant, speed):
+    """What is asked for on straight track holds with clothoids, cant and flanges that touch."""
+    track = canted_curve(radius, cant)
+    settings = Settings(output_rate=RATE, outputs={"sensors": "readings"})
+    result = railsim.simulate(coach, track, speed=speed, settings=settings)
+    read = measured(result, coach, ("axlebox", "frame", "floor"), speed)
+    found = irregularity(read, coach, track.replace(irregularities=[]))
+    holds(found, result, track)
+
+
+@pytest.mark.further
+def test_twin_that_gains_speed(coach):
+    """From 30 to 40 m/s: pieces with their own modes."""
+    track = rough(1200.0)
+    s = np.linspace(0.0, 1200.0, 200)
+    table = np.column_stack([s, np.sqrt(900.0 + 700.0 * s / 1200.0)]).tolist()
+    outputs, drive = {"sensors": "readings"}, {"mode": "table", "speed_table": table}
+    settings = Settings(output_rate=RATE, outputs=outputs, drive=drive)
+    result = railsim.simulate(coach, track, settings=settings)
+    read = measured(result, coach, ("axlebox", "frame", "floor"), 35.0)
+    found = irregularity(read, coach, track.replace(irregularities=[]))
+    assert len({piece.speed for piece in found.pieces}) > 3
+    holds(found, result, track)
+
+
+def holds(found, result, track):
+    """Assert what is asked for: level, alignment, Q, sum Y, and what intervals cover."""
+    by = errors(found, track, 100.0)
+    assert rms(by["level", "D1"][1]) < 0.15e-3
+    assert rms(by["alignment", "D1"][1]) < 0.30e-3
+    for name in ("level", "alignment", "cross_level"):
+        assert rms(by[name, "D2"][1]) < 1e-3
+    true, error, _ = force_errors(found, result, "Q.", "Q", 100.0)
+    assert rms(error) < 0.02 * true.mean()
+    true, error, _ = force_errors(found, result, "sum_Y", "sum_Y", 100.0)
+    assert rms(error) < 0.10 * true.std()
+    inside = [np.abs(e) < 1.96 * sd for (_, e, sd) in by.values()]
+    assert 0.90 < np.mean(inside) < 0.995
 
 
 def test_wrong_input(short, coach):
