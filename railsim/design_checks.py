@@ -34,20 +34,18 @@ class Check:
     @property
     def data(self) -> dict[str, Any]:
         """The check as plain values."""
-        return {
-            "name": self.name,
-            "value": self.value,
-            "limit": self.limit,
-            "ok": self.ok,
-            "unit": self.unit,
-            "must_be": self.sense,
-            "note": self.note,
-        }
+        return {"name": self.name, "value": self.value, "limit": self.limit, "ok": self.ok,
+            "unit": self.unit, "must_be": self.sense, "note": self.note}  # fmt: skip
+
+
+def shown_unit(unit: str) -> str:
+    """Return the unit in which values of an SI unit are shown."""
+    return SHOWN.get(unit, "" if unit == "1" else unit)
 
 
 def shown(value: float, unit: str, digits: int = 6) -> str:
     """Return an SI value in the unit in which it is shown, with that unit."""
-    name = SHOWN.get(unit, "" if unit == "1" else unit)
+    name = shown_unit(unit)
     return f"{value * SHOWN_UNITS.get(name, ('', 1.0))[1]:.{digits}g} {name}".rstrip()
 
 
@@ -56,7 +54,7 @@ def check_table(checks: Sequence[Check], *, notes: bool = False) -> Table:
     signs = {"above": ">=", "below": "<=", "about": "about"}
     rows = []
     for check in checks:
-        unit = SHOWN.get(check.unit, "" if check.unit == "1" else check.unit)
+        unit = shown_unit(check.unit)
         column = Column("", unit=unit, format=".2f" if unit else ".3f")
         met = "-" if check.sense == "about" else "pass" if check.ok else "fail"
         limit = f"{signs[check.sense]} {column.text(check.limit)}"

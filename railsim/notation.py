@@ -109,13 +109,8 @@ class Quantity:
         if self.name == "element_force":
             symbol = f"{'M' if rotation else 'F'}_{'xyz'[COMPONENTS.index(name) % 3]}"
         dots = {"body_velocity": r"\dot ", "body_acceleration": r"\ddot "}.get(self.name, "")
-        return replace(
-            self,
-            long_name=f"{self.long_name}, {name}",
-            symbol=f"{dots}{symbol}",
-            unit=own(self.unit),
-            shown_unit=own(self.shown_unit),
-        )
+        return replace(self, long_name=f"{self.long_name}, {name}", symbol=f"{dots}{symbol}",
+                       unit=own(self.unit), shown_unit=own(self.shown_unit))  # fmt: skip
 
 
 _RUN = ("time",)
@@ -129,13 +124,9 @@ PATCHES = ("tread", "flange root", "flange")
 
 
 def _row(
-    name: str,
-    words: str,
-    symbol: str,
-    shown: str,
-    dims: tuple[str, ...],
+    name: str, words: str, symbol: str, shown: str, dims: tuple[str, ...],
     formula: Formula | None = None,
-) -> Quantity:
+) -> Quantity:  # fmt: skip
     known = [SHOWN_UNITS.get(unit, (unit, 1.0)) for unit in shown.split(", ")]
     unit = ", ".join(stored for stored, _ in known)
     return Quantity(
@@ -275,36 +266,18 @@ QUANTITIES = {
 REQUESTED = {
     row.name: row
     for row in (
-        *_requested(
-            "elements",
+        *_requested("elements",
             _row("element_deflection", "deflection of the element", "d", "mm, mrad", _ELEMENT),
             _row("element_force", "force of the element", "F", "kN, kN m", _ELEMENT),
             _row("element_power", "power of the element", "P", "kW", ("time", "element")),
-            _row("element_command", "command of the element", "u", "SI", ("time", "element")),
-        ),
-        *_requested(
-            "frictional_power",
-            _row(
-                "frictional_power",
-                "frictional power of the wheel",
-                "P_f",
-                "kW",
-                _WHEEL,
-                frictional_power,
-            ),
-        ),
-        *_requested(
-            "drives",
-            _row(
-                "axle_torque",
-                "torque of drives, brakes and actuators on the wheelset",
-                "M_d",
-                "kN m",
-                _AXLE,
-            ),
-        ),
-        *_requested(
-            "contact_patches",
+            _row("element_command", "command of the element", "u", "SI", ("time", "element"))),
+        *_requested("frictional_power",
+            _row("frictional_power", "frictional power of the wheel", "P_f", "kW", _WHEEL,
+                 frictional_power)),
+        *_requested("drives",
+            _row("axle_torque", "torque of drives, brakes and actuators on the wheelset", "M_d",
+                 "kN m", _AXLE)),
+        *_requested("contact_patches",
             _row("patch_N", "normal force of the patch", "N", "kN", _PATCH),
             _row("patch_pressure", "largest pressure of the patch", "p_{max}", "MPa", _PATCH),
             _row("patch_a", "semi-axis of the patch along the rail", "a", "mm", _PATCH),
@@ -316,61 +289,32 @@ REQUESTED = {
             _row("patch_T_x", "longitudinal creep force", "T_x", "kN", _PATCH),
             _row("patch_T_y", "lateral creep force", "T_y", "kN", _PATCH),
             _row("patch_T_gamma", "wear number of the patch", r"T\gamma_c", "N", _PATCH),
-            _row("patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH),
-        ),
-        *_requested(
-            "check_rail",
+            _row("patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH)),
+        *_requested("check_rail",
             _row("check_rail_force", "force of the check rail", "F_c", "kN", _WHEEL),
-            _row(
-                "check_rail_T_gamma", "wear number of the check rail", r"T\gamma_{cr}", "N", _WHEEL
-            ),
-        ),
-        *_requested(
-            "sensors",
+            _row("check_rail_T_gamma", "wear number of the check rail", r"T\gamma_{cr}", "N",
+                 _WHEEL)),
+        *_requested("sensors",
             _row("sensor_acceleration", "reading of the accelerometer", "a", "m/s2", _SENSOR),
-            _row(
-                "sensor_roll_rate",
-                "roll velocity of the body",
-                r"\dot\varphi",
-                "rad/s",
-                ("time", "sensor"),
-            ),
-            _row(
-                "sensor_absolute_acceleration",
-                "acceleration of the point",
-                "a_{abs}",
-                "m/s2",
-                _SENSOR,
-            ),
+            _row("sensor_roll_rate", "roll velocity of the body", r"\dot\varphi", "rad/s",
+                 ("time", "sensor")),
+            _row("sensor_absolute_acceleration", "acceleration of the point", "a_{abs}", "m/s2",
+                 _SENSOR),
             _row("sensor_velocity", "velocity of the point", "v", "m/s", _SENSOR),
-            _row("sensor_displacement", "displacement of the point", "u", "mm", _SENSOR),
-        ),
-        *_requested(
-            "track",
-            _row(
-                "wheelset_lateral_on_track",
-                "wheelset lateral displacement from the design track",
-                "y_0",
-                "mm",
-                _AXLE,
-            ),
-            _row(
-                "wheelset_roll_on_track",
-                "wheelset roll angle against the design track",
-                r"\varphi_0",
-                "mrad",
-                _AXLE,
-            ),
+            _row("sensor_displacement", "displacement of the point", "u", "mm", _SENSOR)),
+        *_requested("track",
+            _row("wheelset_lateral_on_track",
+                 "wheelset lateral displacement from the design track", "y_0", "mm", _AXLE),
+            _row("wheelset_roll_on_track", "wheelset roll angle against the design track",
+                 r"\varphi_0", "mrad", _AXLE),
             _row("track_curvature", "curvature at the wheelset", r"\kappa", "1/km", _AXLE),
             _row("track_cant", "cant at the wheelset", "h", "mm", _AXLE),
             _row("track_gradient", "gradient at the wheelset", "i", "per mille", _AXLE),
             _row("rail_lateral", "lateral displacement of the rail", "y_r", "mm", _WHEEL),
             _row("rail_vertical", "vertical displacement of the rail", "z_r", "mm", _WHEEL),
             _row("rail_deflection_lateral", "lateral deflection of the rail", "u_y", "mm", _WHEEL),
-            _row(
-                "rail_deflection_vertical", "vertical deflection of the rail", "u_z", "mm", _WHEEL
-            ),
-        ),
+            _row("rail_deflection_vertical", "vertical deflection of the rail", "u_z", "mm",
+                 _WHEEL)),
     )
-}
+}  # fmt: skip
 """Quantities that a run outputs only where its settings ask for them."""

@@ -13,7 +13,7 @@ from railsim.assessment.comfort_report import (
 from railsim.assessment.conditions import Condition, SectionRow
 from railsim.assessment.influences import Influence
 from railsim.assessment.record import Record
-from railsim.assessment.running import Options, Running, assessed_runs, group_key, limits_checked
+from railsim.assessment.running import Options, Running, assessed_runs, by_vehicle, limits_checked
 from railsim.assessment.safety_report import SafetyReport, safety_report
 from railsim.assessment.verdict import DERAILED, FAIL, Verdict, overall
 from railsim.assessment.wear_report import WheelWear, wear_report
@@ -200,11 +200,8 @@ def assess(
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
-    groups: dict[str, dict[str, Result]] = {}
-    for name, result in results.items():
-        groups.setdefault(group_key(result), {})[name] = result
     found = []
-    for runs in groups.values():
+    for runs in by_vehicle(results):
         if standard in RUNNING:
             name = str(limits or standard)
             known = limits_checked(load_running_limits(limits or standard), name)

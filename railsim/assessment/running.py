@@ -1,6 +1,5 @@
 """Running tests after EN 14363 and UIC 518: all runs of a vehicle to zones and verdicts."""
 
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -67,16 +66,20 @@ class _Run:
     values: list[SectionValues] = field(default_factory=list)
 
 
-def group_key(result: Result) -> str:
-    """Key of the runs that belong to one assessment.
+def by_vehicle(results: Mapping[str, Result]) -> list[dict[str, Result]]:
+    """Return the runs that belong to one assessment together.
 
-    The same vehicle; or vehicles of the same name, each in a condition that its service table
-    states.
+    Those of the same vehicle; or of vehicles of the same name, each in a condition that its
+    service table states.
     """
-    service = result.vehicle().service
-    if service is not None and service.condition is not None:
-        return f"name {result.vehicle().name}"
-    return hashlib.sha256(str(result.attributes["vehicle_toml"]).encode()).hexdigest()
+    groups: dict[str, dict[str, Result]] = {}
+    for name, result in results.items():
+        vehicle = result.vehicle()
+        key = f"file {result.attributes['vehicle_toml']}"
+        if vehicle.service is not None and vehicle.service.condition is not None:
+            key = f"name {vehicle.name}"
+        groups.setdefault(key, {})[name] = result
+    return list(groups.values())
 
 
 def _kind(result: Result) -> tuple[str, ...]:

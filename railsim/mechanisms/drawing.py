@@ -180,6 +180,11 @@ def working_box(motion: Motion) -> tuple[float, float, float, float]:
     heavy = definition.output.point.partition(".")[0] if definition.output else ""
     names = [n for n in names if n.partition(".")[0] != heavy] or list(motion.model.points)
     xy = np.concatenate([motion.point(name)[0][:1] for name in names])
+    return box(xy, 0.12)
+
+
+def box(xy: Floats, share: float) -> tuple[float, float, float, float]:
+    """Ends in x and y of what holds points, with a margin of a share of its size."""
     (x0, y0), (x1, y1) = xy.min(axis=0), xy.max(axis=0)
-    margin = 0.12 * max(x1 - x0, y1 - y0)
+    margin = share * max(x1 - x0, y1 - y0)
     return float(x0 - margin), float(x1 + margin), float(y0 - margin), float(y1 + margin)

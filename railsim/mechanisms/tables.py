@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from railsim.design_checks import SHOWN, shown
+from railsim.design_checks import shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.contact import Contact, moved
 from railsim.mechanisms.dynamics import driving
@@ -257,8 +257,7 @@ def scatter_table(found: Sequence[Scatter]) -> Table:
     """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
     for one in found:
-        unit = SHOWN.get(one.unit, "" if one.unit == "1" else one.unit)
-        column = Column("", unit=unit, format=".4f")
+        column = Column("", unit=shown_unit(one.unit), format=".4f")
         most = max(one.single, key=lambda name: abs(one.single[name]))
         values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
         change = one.single[most] * column.scale

@@ -18,7 +18,7 @@ from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
 from railsim.contact.summary import Pair
-from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, key, note, styled
+from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, key, label_grid, note, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
 
@@ -45,8 +45,8 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     unique = list(dict.fromkeys(measured))
     rows = 1 + bool(unique)
     height = 3.0 + 2.4 * bool(unique)
-    figure = Picture(9.6, height, layout=None)
-    figure.subplots_adjust(0.06, 0.45 / height, 0.99, 1.0 - 0.3 / height, 0.14, 0.28)
+    edges = 0.06, 0.45 / height, 0.99, 1.0 - 0.3 / height, 0.14, 0.28
+    figure = Picture(9.6, height, edges=edges)
     grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
     for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
         axes = figure.add_subplot(grid[0, side])
@@ -122,8 +122,7 @@ def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
 def functions_figure(geometry: ContactGeometry) -> Figure:
     """Rolling radius difference, radii, contact angles, positions and roll over displacement."""
     y = 1e3 * geometry.lateral
-    figure = Picture(9.6, 5.4, layout=None)
-    figure.subplots_adjust(0.06, 0.085, 0.99, 0.985, 0.24, 0.08)
+    figure = Picture(9.6, 5.4, edges=(0.06, 0.085, 0.99, 0.985, 0.24, 0.08))
     axes = figure.subplots(2, 3, sharex=True)
     axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
     panels = (
@@ -174,8 +173,7 @@ def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
     conicity : mapping of str to (amplitudes [m], values [1])
         Curves by their name.
     """
-    figure = Picture(5.6, 3.6, layout=None)
-    figure.subplots_adjust(0.11, 0.13, 0.985, 0.975)
+    figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
     axes = figure.subplots()
     for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
         words = unformatted(name)
@@ -199,8 +197,7 @@ def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Flo
     values : float64[gauge, amplitude]
         [1].
     """
-    figure = Picture(5.6, 3.6, layout=None)
-    figure.subplots_adjust(0.11, 0.13, 0.985, 0.975)
+    figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
     axes = figure.subplots()
     # the flange's slopes beyond would hide the tread's
     levels = np.linspace(0.0, 0.8, 17)
@@ -215,8 +212,7 @@ def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Flo
 def overlay_figure(profiles: Sequence[Profile]) -> Figure:
     """Profiles of one kind on each other, and how far the others are off the first."""
     first, *others = profiles
-    figure = Picture(9.6, 5.0, layout=None)
-    figure.subplots_adjust(left=0.07, right=0.99, bottom=0.09, top=0.98, hspace=0.12)
+    figure = Picture(9.6, 5.0, edges=(0.07, 0.09, 0.99, 0.98, None, 0.12))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     order = np.argsort(first.y, kind="stable")
     for colour, profile in zip(DISTINCT, profiles, strict=False):
@@ -251,9 +247,9 @@ def patches_figure(
     columns = 4
     rows = -(-len(contacts) // columns)
     height = 1.75 * rows + 1.1
-    figure = Picture(9.6, height, layout=None)
     right = 0.90 if exact else 0.99
-    figure.subplots_adjust(0.06, 0.45 / height, right, 1.0 - 0.85 / height, 0.08, 0.32)
+    edges = 0.06, 0.45 / height, right, 1.0 - 0.85 / height, 0.08, 0.32
+    figure = Picture(9.6, height, edges=edges)
     title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN"
     figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
     _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
@@ -273,12 +269,7 @@ def patches_figure(
             _draw_ellipses(panel, other[y], TABLE_LINES[1])
         panel.set(title=f"$y$ = {1e3 * y:g} mm".replace("-", "−"), xlim=(low, high))
         panel.set(ylim=(-22.0, 22.0), aspect="equal")
-    for panel in axes[len(contacts) :]:
-        panel.set_visible(False)
-    for panel in axes[::columns]:
-        panel.set_ylabel("along the rail (mm)")
-    for panel in axes[max(len(contacts) - columns, 0) : len(contacts)]:
-        panel.set_xlabel("lateral position (mm)")
+    label_grid(axes, len(contacts), columns, ("lateral position (mm)", "along the rail (mm)"))
     if image is not None:
         bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
         figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")

@@ -18,7 +18,7 @@ from railsim.contact.creep import creep_force
 from railsim.contact.creep_curves import CASES, Patch, exact_force
 from railsim.contact.exact_creep import ExactCreepForce
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
-from railsim.plot.style import DISTINCT, Picture, note, styled
+from railsim.plot.style import DISTINCT, Picture, label_grid, note, styled
 
 LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
 STICK, HELD = "#2a6f97", "stick; elsewhere slip"
@@ -45,8 +45,7 @@ def creep_curves_figure(
         Points of the full theory in each picture (half a second each); 0 for none.
     """
     scale = np.linspace(0.0, 1.0, 121) ** 1.5 * LARGEST
-    figure = Picture(9.6, 6.2, layout=None)
-    figure.subplots_adjust(left=0.06, right=0.99, bottom=0.13, top=0.90, wspace=0.18, hspace=0.36)
+    figure = Picture(9.6, 6.2, edges=(0.06, 0.13, 0.99, 0.90, 0.18, 0.36))
     ratio = patch.a / patch.b
     words = f"Creep forces, a/b = {ratio:.3g}, N = {1e-3 * patch.N:.3g} kN, μ = {patch.mu:.3g}"
     figure.suptitle(words)
@@ -136,16 +135,11 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
     width = float(np.clip(3.2 * (reach_y / reach_x) ** 0.5, 1.6, 3.4))
     panel_height = width * reach_x / reach_y
     height = rows * (panel_height + 0.75) + 0.25 + KEY
-    figure = Picture(columns * (width + 0.3) + 1.5, height, layout=None)
-    axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
-    figure.subplots_adjust(
-        left=0.55 / figure.get_figwidth(),
-        right=1.0 - 0.95 / figure.get_figwidth(),
-        bottom=(0.45 + KEY) / height,
-        top=1.0 - 0.45 / height,
-        wspace=0.3 / width,
-        hspace=0.75 / panel_height,
-    )
+    wide = columns * (width + 0.3) + 1.5
+    edges = (0.55 / wide, (0.45 + KEY) / height, 1.0 - 0.95 / wide, 1.0 - 0.45 / height,
+                      0.3 / width, 0.75 / panel_height)  # fmt: skip
+    figure = Picture(wide, height, edges=edges)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
     top = 1e-6 * max(float(s.bound.max()) for s in solutions.values())
     for panel, (title, solution) in zip(axes, solutions.items(), strict=False):
         image = _draw_traction(panel, solution, top)
@@ -153,13 +147,8 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
         panel.grid(False)
         T_x, T_y = (f"{T / friction_force:+.2f}" for T in (solution.T_x, solution.T_y))
         panel.set_title(f"{title}\n$T_x$ {T_x}, $T_y$ {T_y} $\\mu N$".replace("-", "−"))
-    for panel in axes[max(len(solutions) - columns, 0) : len(solutions)]:
-        panel.set_xlabel("to the right (mm)")
-    for panel in axes[len(solutions) :]:
-        panel.set_visible(False)
-    for panel in axes[::columns]:
-        panel.set_ylabel("forward (mm)")
-    bar = figure.add_axes((1.0 - 0.8 / figure.get_figwidth(), 0.2, 0.12 / width * 0.3, 0.6))
+    label_grid(axes, len(solutions), columns, ("to the right (mm)", "forward (mm)"))
+    bar = figure.add_axes((1.0 - 0.8 / wide, 0.2, 0.12 / width * 0.3, 0.6))
     figure.colorbar(image, cax=bar, label="traction on the rail (MPa)")
     handles = [
         Rectangle((0, 0), 1, 1, fc="none", ec=STICK, hatch="////", lw=0.0, label=HELD),

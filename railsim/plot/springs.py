@@ -36,9 +36,8 @@ SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 def stiffness_figure(result: Verification) -> Figure:
     """System stiffness, and the rate that small movements feel, over load and deflection."""
-    figure = Picture(7.6, 3.2, layout=None)
+    figure = Picture(7.6, 3.2, edges=(0.085, 0.15, 0.985, 0.97, 0.06))
     over_load, over_deflection = figure.subplots(1, 2, sharey=True)
-    figure.subplots_adjust(left=0.085, right=0.985, bottom=0.15, top=0.97, wspace=0.06)
     curve = _curve(result)
     loads = [case.load * 1e-3 for case in result.cases]
     deflections = [case.deflection * 1e3 for case in result.cases]
@@ -59,10 +58,8 @@ def stiffness_figure(result: Verification) -> Figure:
 
 def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """Deflection, rotation of the arm and heights of the springs over the load."""
-    figure = Picture(7.6, 5.4, layout=None)
-    grid = figure.add_gridspec(
-        2, 2, left=0.085, right=0.985, bottom=0.09, top=0.98, wspace=0.2, hspace=0.38
-    )
+    figure = Picture(7.6, 5.4, edges=(0.085, 0.09, 0.985, 0.98, 0.2, 0.38))
+    grid = figure.add_gridspec(2, 2)
     deflection, rotation = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
     heights = figure.add_subplot(grid[1, :])
     curve = _curve(result)
@@ -98,9 +95,8 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
 
 def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     """Active coils that give the designed stiffness, over the wire diameter."""
-    figure = Picture(5.6, 3.7, layout=None)
+    figure = Picture(5.6, 3.7, edges=(0.1, 0.13, 0.98, 0.85))
     axes = figure.subplots()
-    figure.subplots_adjust(left=0.1, right=0.98, bottom=0.13, top=0.85)
     listed = coils_by_wire(suspension, result)
     for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True):
         colour = SPRING_COLOURS[name]
@@ -128,9 +124,8 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
     if suspension.fatigue is None:
         raise ValueError("the suspension has no fatigue table")
     line = np.array(suspension.fatigue.goodman) * 1e-6
-    figure = Picture(4.8, 4.9, layout=None)
+    figure = Picture(4.8, 4.9, edges=(0.13, 0.1, 0.97, 0.98))
     axes = figure.subplots()
-    figure.subplots_adjust(left=0.13, right=0.97, bottom=0.1, top=0.98)
     end = float(line[-1, 1])
     axes.plot([0.0, end], [0.0, end], color="0.35", lw=1.0)
     axes.plot(*line.T, color=LIMIT, lw=1.6, label="Goodman-Smith line")
@@ -171,9 +166,8 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
 
 def search_figure(result: "SearchResult") -> Figure:
     """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
-    figure = Picture(5.6, 3.6, layout=None)
+    figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.98, 0.97))
     axes = figure.subplots()
-    figure.subplots_adjust(left=0.11, right=0.98, bottom=0.13, top=0.97)
     cloud = result.cloud[np.all(np.isfinite(result.cloud), axis=1)]
     axes.plot(*cloud.T, ".", color=FAINT, ms=4, label="feasible candidates", zorder=1)
     mass = [nest.mass for nest in result.nests]
@@ -188,9 +182,8 @@ def search_figure(result: "SearchResult") -> Figure:
 
 def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -> Figure:
     """Ride height by single deviation under one load, and its range under every load."""
-    figure = Picture(7.6, 3.5, layout=None)
+    figure = Picture(7.6, 3.5, edges=(0.235, 0.19, 0.985, 0.97, 0.22))
     single, every = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-    figure.subplots_adjust(left=0.235, right=0.985, bottom=0.19, top=0.97, wspace=0.22)
     shown = next((result for result in results if result.name == tare), results[0])
     ends = sorted(shown.single.items(), key=lambda item: abs(item[1][1] - item[1][0]))
     names = [name.replace("_", " ").replace(".", ": ") for name, _ in ends]
@@ -289,12 +282,9 @@ def _draw_arm(
         _draw_spring(axes, seat, head, along, 1e3 * spring.mean_diameter, wire, float(turns))
     for centre, radius, face in ((hinge, 26.0, "0.82"), (hinge, 9.0, "w"), (axle, 60.0, "0.92")):
         axes.add_patch(Circle(tuple(centre), radius, fc=face, ec="0.25", lw=1.0, zorder=3))
-    axes.annotate(
-        "",
-        xy=tuple(_moved(axle, 0.0, -62.0)),
-        xytext=tuple(_moved(axle, 0.0, -62.0 - 110.0 * case.load / 8e4)),
-        arrowprops={"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4},
-    )
+    look = {"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4}
+    tail = _moved(axle, 0.0, -62.0 - 110.0 * case.load / 8e4)
+    axes.annotate("", tuple(_moved(axle, 0.0, -62.0)), tuple(tail), arrowprops=look)
     degrees = f"{np.degrees(phi):+.2f}°".replace("-", "−") if case.theta > 1e-5 else "0°"
     words = f"{unformatted(case.name)}  {case.load * 1e-3:.1f} kN"
     words += f"\n{case.deflection * 1e3:.1f} mm, {degrees}"

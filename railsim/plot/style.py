@@ -50,13 +50,8 @@ STYLE: Any = {
     "svg.hashsalt": "railsim",
 }
 
-HUES = (
-    ("#004a80", "#56a8e0"),
-    ("#b8450a", "#f0a13c"),
-    ("#00664b", "#5cc0a0"),
-    ("#7d3a68", "#d493bd"),
-    ("#4d4d4d", "#a6a6a6"),
-)
+HUES = (("#004a80", "#56a8e0"), ("#b8450a", "#f0a13c"), ("#00664b", "#5cc0a0"),
+        ("#7d3a68", "#d493bd"), ("#4d4d4d", "#a6a6a6"))  # fmt: skip
 """Dark and light shade of the first, second, ... bogie."""
 
 DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#555555", "#8c2d19")
@@ -79,8 +74,14 @@ def distinct(number: int) -> str:
 class Picture(Figure):
     """A figure that a notebook displays, without pyplot; width and height in inches."""
 
-    def __init__(self, width: float, height: float, title: str = "", **how: Any) -> None:
-        super().__init__(figsize=(width, height), **{"layout": "constrained"} | how)
+    def __init__(
+        self, width: float, height: float, title: str = "", edges: Sequence[Any] = (), **how: Any
+    ) -> None:
+        """`edges`: Left, bottom, right, top, space across and down, in place of what fits."""
+        layout = None if edges else "constrained"
+        super().__init__(figsize=(width, height), **{"layout": layout} | how)
+        if edges:
+            self.subplots_adjust(*edges)
         if title:
             self.suptitle(title, x=0.012, ha="left")
 
@@ -191,6 +192,16 @@ def grid_of(
     for axes in cells[count:]:
         axes.remove()
     return figure, cells[:count]
+
+
+def label_grid(axes: Any, count: int, across: int, words: tuple[str, str]) -> None:
+    """Label the outer ones of the axes in use, and hide the others."""
+    for one in axes[count:]:
+        one.set_visible(False)
+    for one in axes[max(count - across, 0) : count]:
+        one.set_xlabel(words[0])
+    for one in axes[::across]:
+        one.set_ylabel(words[1])
 
 
 def say(axes: Axes, words: str) -> None:

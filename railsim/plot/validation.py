@@ -1,6 +1,7 @@
 """Pictures of a model against a test, and of an identification: overlays, scatter, spectra."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +13,6 @@ from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
 from railsim.plot.style import grid_of
 
-WORDS = ("measured", "before", "after")
 MOST = 12  # channels of a picture
 LONGEST = 20_000  # values of a line
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
@@ -35,9 +35,8 @@ def scatter(validation: ModelValidation) -> Figure:
         scale = one.quantity.column.scale
         measured = scale * np.array([pair.measured for pair in one.pairs])
         simulated = scale * np.array([pair.simulated for pair in one.pairs])
-        ends = np.array(
-            [min(measured.min(), simulated.min()), max(measured.max(), simulated.max())]
-        )
+        both = np.concatenate([measured, simulated])
+        ends = np.array([both.min(), both.max()])
         ends += np.array([-0.05, 0.05]) * max(np.ptp(ends), 1e-9)
         axes.plot(ends, ends, color="0.4", linewidth=0.8)
         for limit, style in ((one.mean_limit, "--"), (2.0 * one.limit, ":")):
@@ -59,11 +58,8 @@ def differences(validation: ModelValidation) -> Figure:
     for axes, one in zip(grid, shown, strict=True):
         x = np.array([pair.difference for pair in one.pairs]) / one.limit
         reach = max(1.2, 1.05 * float(np.abs(x).max()))
-        axes.hist(
-            x,
-            bins=np.linspace(-reach, reach, 25).tolist(),
-            color="C3" if one.verdict == "fail" else "C0",
-        )
+        colour = "C3" if one.verdict == "fail" else "C0"
+        axes.hist(x, np.linspace(-reach, reach, 25).tolist(), color=colour)
         for limit in (-2 / 3, 2 / 3):
             axes.axvline(limit, color="0.5", linewidth=0.8, linestyle="--")
         axes.axvline(one.mean / one.limit, color="k", linewidth=1.0)
@@ -74,38 +70,38 @@ def differences(validation: ModelValidation) -> Figure:
 
 def overlays(validation: ModelValidation, between: tuple[float, float] | None = None) -> Figure:
     """Draw measured and simulated channels of the first run over the arc length."""
-    run = validation.overlays[0].run
-    shown = [one for one in validation.overlays if one.run == run][:MOST]
+    shown = _first(validation.overlays)
+
+    def part(one: Overlay) -> tuple[Floats, slice]:
+        middle = 0.5 * (one.s[0] + one.s[-1])
+        first, last = np.searchsorted(one.s, between or (middle - NEAR, middle + NEAR))
+        return one.s, slice(first, last, max(1, (last - first) // LONGEST))
+
+    return _over_arc(shown, part, {"measured": "k", "simulated": "C1"}, 0.7)
+
+
+def _over_arc(
+    shown: Sequence[Any], part: Callable[..., Any], lines: Mapping[str, str], lw: float
+) -> Figure:
+    """Draw channels by the names of their attributes, in colours, over a part of the arc length."""
     figure, grid = _axes(len(shown), 1, 1.3)
     for axes, one in zip(grid, shown, strict=True):
-        scale, unit = _shown(one.quantity)
-        middle = 0.5 * (one.s[0] + one.s[-1])
-        low, high = between or (middle - NEAR, middle + NEAR)
-        rows = slice(*np.searchsorted(one.s, [low, high]))
-        every = max(1, (rows.stop - rows.start) // LONGEST)
-        at = slice(rows.start, rows.stop, every)
-        axes.plot(one.s[at], scale * one.measured[at], color="k", linewidth=0.7, label="measured")
-        axes.plot(
-            one.s[at], scale * one.simulated[at], color="C1", linewidth=0.7, label="simulated"
-        )
+        (scale, unit), (s, rows) = _shown(one.quantity), part(one)
+        for name, colour in lines.items():
+            axes.plot(s[rows], scale * getattr(one, name)[rows], color=colour, lw=lw, label=name)
         axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
-    grid[0].legend(fontsize="small", ncols=2, loc="upper right")
+    grid[0].legend(fontsize="small", ncols=len(lines), loc="upper right")
     grid[-1].set_xlabel("arc length (m)")
     return figure
 
 
 def spectra(validation: ModelValidation) -> Figure:
     """Draw power spectral densities of measured and simulated channels of the first run."""
-    run = validation.overlays[0].run
-    shown = [one for one in validation.overlays if one.run == run][:MOST]
+    shown = _first(validation.overlays)
     figure, grid = _axes(len(shown), 3, 1.9)
     for axes, one in zip(grid, shown, strict=True):
-        for values, colour, words in (
-            (one.measured, "k", "measured"),
-            (one.simulated, "C1", "simulated"),
-        ):
-            f, power = _density(one, values)
-            axes.loglog(f, power, color=colour, linewidth=0.9, label=words)
+        for name, colour in (("measured", "k"), ("simulated", "C1")):
+            axes.loglog(*_density(one, getattr(one, name)), color=colour, lw=0.9, label=name)
         axes.set_title(one.name, fontsize="small")
         axes.set_xlabel("frequency (Hz)", fontsize="small")
     grid[0].legend(fontsize="small")
@@ -123,19 +119,13 @@ def _density(one: Overlay, values: Floats) -> tuple[Floats, Floats]:
 
 def fits(found: Identified) -> Figure:
     """Draw the channels of the first run, measured, before and after, over a part of the line."""
-    shown = _first(found.channels)
-    figure, grid = _axes(len(shown), 1, 1.3)
-    for axes, one in zip(grid, shown, strict=True):
-        scale, unit = _shown(one.quantity)
+
+    def part(one: Channel) -> tuple[Floats, slice]:
         middle = len(one.at) // 2
-        rows = slice(middle, middle + int(4.0 / one.step))
-        drawn = (one.measured, one.before, one.after)
-        for values, colour, words in zip(drawn, ("k", "C0", "C1"), WORDS, strict=True):
-            axes.plot(one.at[rows], scale * values[rows], color=colour, linewidth=0.8, label=words)
-        axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
-    grid[0].legend(fontsize="small", ncols=3, loc="upper right")
-    grid[-1].set_xlabel("arc length (m)")
-    return figure
+        return one.at, slice(middle, middle + int(4.0 / one.step))
+
+    lines = {"measured": "k", "before": "C0", "after": "C1"}
+    return _over_arc(_first(found.channels), part, lines, 0.8)
 
 
 def residual_spectra(found: Identified) -> Figure:
@@ -157,5 +147,5 @@ def residual_spectra(found: Identified) -> Figure:
     return figure
 
 
-def _first(channels: Sequence[Channel]) -> list[Channel]:
+def _first(channels: Sequence[Any]) -> list[Any]:
     return [one for one in channels if one.run == channels[0].run][:MOST]

@@ -8,7 +8,7 @@ from typing import Any
 from railsim.assessment import Assessment, assess
 from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.influences import RADIUS
-from railsim.assessment.running import group_key
+from railsim.assessment.running import by_vehicle
 from railsim.assessment.verdict import DERAILED, FAIL, PASS
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
@@ -89,12 +89,9 @@ def _remarks(words: Sequence[str]) -> Table:
 
 def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessment], list[str]]:
     """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
-    groups: dict[str, dict[str, Result]] = {}
-    for name, result in runs.items():
-        groups.setdefault(group_key(result), {})[name] = result
     found: list[Assessment] = []
     remarks: list[str] = []
-    for group in groups.values():
+    for group in by_vehicle(runs):
         try:
             found += assess(group, standard, coarse=True)
         except InputError as error:
@@ -316,21 +313,15 @@ def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
             -math.inf if math.isnan(w.Y_over_Q) else w.Y_over_Q / w.limit for w in report.wheels
         ]
         worst = report.wheels[shares.index(max(shares))]
-        lifted = [w.place for w in report.wheels if math.isnan(w.Y_over_Q)]
+        lifted = ", ".join(w.place for w in report.wheels if math.isnan(w.Y_over_Q)) or "none"
         share = worst.Y_over_Q / worst.limit
         if share > 1.0:
             failed.append(len(rows))
             above.append(f"{run}: Nadal's limit, {worst.place}")
         climb = f"{max(w.climb_distance for w in report.wheels):.2f} m"
         tilt = f"{max(report.overturning.values()):.2f}" if report.overturning else ""
-        values = (
-            f"{worst.Y_over_Q:.3f}",
-            f"{worst.limit:.3f}",
-            f"{100.0 * share:.0f} %",
-            climb,
-            tilt,
-        )
-        rows.append([run, worst.place, *values, ", ".join(lifted) or "none"])
+        rows.append([run, worst.place, f"{worst.Y_over_Q:.3f}", f"{worst.limit:.3f}",
+                     f"{100.0 * share:.0f} %", climb, tilt, lifted])  # fmt: skip
     header = ["run", "wheel", "largest Y/Q", "limit", "share", "climb", "overturning", "lifted"]
     caption = "Derailment: the wheel nearest to Nadal's limit"
     return Table(header, rows, caption, (0, 1, 7), failed, NADAL), above

@@ -100,6 +100,9 @@ def figures(collected: Collected) -> dict[str, Figure]:
     solved = definition.actuators[definition.solve.unknown] if definition.solve else None
     compares = bool(compared) and "ratio" in output
     held = any("pressure" in one.output for one in compared.values())
+    cams = any(hasattr(joint, "cam") for joint in definition.joints.values())
+    gas, cases = any(name.endswith("_length") for name in output), list(collected.cases)
+    zoomed, air = partial(plots.comparison_figure, zoom=True), isinstance(solved, AirSpring)
     # whether there is something to draw, and what draws it
     wanted: dict[str, tuple[object, Callable[..., Figure], Any]] = {
         "drawing": (True, plots.drawing_figure, result),
@@ -107,37 +110,17 @@ def figures(collected: Collected) -> dict[str, Figure]:
         "kinematics": (True, plots.kinematics_figure, result),
         "actuators": (actuators(result.motion), plots.actuators_figure, result),
         "angles": (definition.angles, plots.angles_figure, result),
-        "cam": (
-            any(hasattr(j, "cam") for j in definition.joints.values()),
-            plots.cam_figure,
-            result,
-        ),
+        "cam": (cams, plots.cam_figure, result),
         "ratio_force": ("force" in output or "ratio" in output, plots.force_figure, result),
         "pressure": ("pressure" in output, plots.pressure_figure, result),
         "contact": (result.contact, plots.contact_figure, result),
-        "carpet": (
-            "pressure" in output and isinstance(solved, AirSpring),
-            plots.carpet_figure,
-            result,
-        ),
-        "gas_springs": (
-            any(name.endswith("_length") for name in output),
-            plots.gas_spring_figure,
-            result,
-        ),
-        "cases": (
-            len(collected.cases) > 1 and "force" in output,
-            plots.cases_figure,
-            collected.cases,
-        ),
+        "carpet": ("pressure" in output and air, plots.carpet_figure, result),
+        "gas_springs": (gas, plots.gas_spring_figure, result),
+        "cases": ("force" in output and cases[1:], plots.cases_figure, collected.cases),
         "time": (result.timed, plots.time_figure, result),
         "comparison": (compares, plots.comparison_figure, compared),
         "comparison_held": (compares and held, plots.held_figure, compared),
-        "comparison_zone": (
-            compares and result.zone,
-            partial(plots.comparison_figure, zoom=True),
-            compared,
-        ),
+        "comparison_zone": (compares and result.zone, zoomed, compared),
         "search": (optimum, plots.search_figure, optimum),
     }
     drawn = {name: draw(what) for name, (there, draw, what) in wanted.items() if there}
@@ -220,16 +203,14 @@ def animation(result: Analysis) -> bytes:
     motion = solve(model, np.linspace(model.start, model.end, GIF_FRAMES))
     drawn = drawing.lines(motion)
     every = np.concatenate([line.xy.reshape(-1, 2) for line in drawn]) * 1e3
-    (x0, y0), (x1, y1) = every.min(axis=0), every.max(axis=0)
-    margin = 0.06 * max(x1 - x0, y1 - y0)
+    x0, x1, y0, y1 = drawing.box(every, 0.06)
     frames = []
     with styled():
         figure = Figure(figsize=(5.2, 4.6), dpi=80, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.subplots()
         made = plots.draw(axes, drawn, 0, "#1d2429", "")
-        axes.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin))
-        axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
+        axes.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
         title = axes.set_title(_position(result, motion.s[0]))
         moving: list[Any] = [*made, title]
         for artist in moving:

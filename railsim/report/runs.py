@@ -8,6 +8,7 @@ import re
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from markupsafe import Markup
@@ -280,27 +281,18 @@ def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
         for remark in record.get("remarks", ()):
             said.setdefault(str(remark), []).append(str(record["name"]))
     short = sum(map(len, ended.values()))
-    for header, words, cells, caption, none in (
-        (
-            ["runs", "status", "reason, of the first", "which"],
-            range(1, 4),
-            rows,
-            f"{short} of {len(records)} runs did not reach the requested end",
-            "All runs reached the requested end.",
-        ),
-        (
-            ["remark", "runs"],
-            range(2),
-            [[remark, listed(names)] for remark, names in said.items()],
-            "Remarks",
-            "There are no remarks on the runs.",
-        ),
-    ):
-        left = len(cells) - MOST_ROWS
+    remarks = [[remark, listed(names)] for remark, names in said.items()]
+    caption = f"{short} of {len(records)} runs did not reach the requested end"
+    for table, none in (
+        (Table(["runs", "status", "reason, of the first", "which"], rows, caption, range(1, 4)),
+         "All runs reached the requested end."),
+        (Table(["remark", "runs"], remarks, "Remarks", range(2)),
+         "There are no remarks on the runs."),
+    ):  # fmt: skip
+        left = len(table.rows) - MOST_ROWS
         note = f"{left} more are in summary.csv." if left > 0 else ""
-
-        if cells:
-            section.tables.append(Table(header, cells[:MOST_ROWS], caption, words, note=note))
+        if table.rows:
+            section.tables.append(replace(table, rows=table.rows[:MOST_ROWS], note=note))
         else:
             section.texts.append(none)
     return section

@@ -72,13 +72,8 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
     name = table.load if load is None else load
     _, (case,) = load_cases(suspension, {name: suspension.loads[name]})
     nest, remarks = _nest(suspension, table, case)
-    return VehiclePart(
-        assembly=table.assembly,
-        axleboxes={"arm": _axlebox(table)},
-        elements={"arm_bush": _bush(suspension, table, case), "coil_nest": nest},
-        case=case,
-        remarks=remarks,
-    )
+    elements = {"arm_bush": _bush(suspension, table, case), "coil_nest": nest}
+    return VehiclePart(table.assembly, {"arm": _axlebox(table)}, elements, case, remarks)
 
 
 def vehicle_text(
@@ -97,11 +92,8 @@ def vehicle_text(
         raise ValueError("the suspension has no vehicle table")
     extends = table.extends if extends is None else extends
     remove = table.remove if remove is None else remove
-    head: dict[str, Any] = {
-        "format": "railsim-vehicle/1",
-        "name": f"{Path(extends).stem} on {suspension.name}",
-        "extends": extends,
-    }
+    name = f"{Path(extends).stem} on {suspension.name}"
+    head: dict[str, Any] = {"format": "railsim-vehicle/1", "name": name, "extends": extends}
     if suspension.source is not None:
         head["source"] = suspension.source
     if remove:
@@ -121,12 +113,9 @@ def vehicle_text(
 
 
 def _axlebox(table: VehicleTable) -> dict[str, Any]:
-    return {
-        "wheelset": table.wheelset,
-        "position": _rounded([0.0, table.lateral_position, -table.wheel_radius]),
-        "pitch_inertia": table.pitch_inertia,
-        "sides": "both",
-    }
+    position = _rounded([0.0, table.lateral_position, -table.wheel_radius])
+    return {"wheelset": table.wheelset, "position": position,
+                    "pitch_inertia": table.pitch_inertia, "sides": "both"}  # fmt: skip
 
 
 def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) -> dict[str, Any]:
