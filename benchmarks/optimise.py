@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from railsim.definitions.loading import load_study
-from railsim.studies.front import hypervolume, non_dominated
 from railsim.studies.optimise import optimise
-from railsim.studies.search import METHODS, Task
+from railsim.studies.search import METHODS, Task, hypervolume, non_dominated
 
 
 @dataclass

@@ -20,8 +20,13 @@ import click
 from click.shell_completion import CompletionItem
 
 from railsim.cli.common import echo, print_json
-from railsim.cli.interrupts import Interrupted, raise_pending_signal, remembered_interrupts
-from railsim.cli.streams import silence, usable_streams
+from railsim.cli.interrupts import (
+    Interrupted,
+    raise_pending_signal,
+    remembered_interrupts,
+    silence,
+    usable_streams,
+)
 from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
 from railsim.threads import use_one_thread
 from railsim.version import __version__

@@ -8,7 +8,7 @@ So the signal is remembered as well, and looked at where the work goes on, by
 
 And Python raises nothing at all for as long as one call outside it takes: compiling the time loop
 is minutes.  So a thread listens too; where the program has not ended `PATIENCE` after a signal, it
-ends it, and leaves no hidden file behind.
+ends it, and leaves no hidden file behind.  Streams that are closed or full are made usable here.
 """
 
 import os
@@ -17,7 +17,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from types import FrameType
+from typing import TextIO
 
 from railsim.cli.common import echo
 from railsim.files.access import remove_partial_files
@@ -120,3 +122,25 @@ def raise_pending_signal() -> None:
     """
     if _heard:
         raise Interrupted(_heard[0])
+
+
+def usable_streams() -> None:
+    """Make sure that every text can be printed, or is dropped where the stream is closed.
+
+    A character that the locale lacks is written as its code.
+    """
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by the caller: `>&-`
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, TextIOWrapper):
+            with suppress(OSError, ValueError):
+                stream.reconfigure(errors="backslashreplace")
+
+
+def silence(stream: TextIO) -> None:
+    """Let what a stream still holds go nowhere: its reader has gone, or its disk is full."""
+    with suppress(OSError, ValueError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)

@@ -4,7 +4,6 @@
 `spec.py`           `RunSpec`, `StudySpec`, `Execution`: what is asked for, by whomever
 `case.py`           `Case`: all inputs of one run, loaded, with its name and its key
 `points.py`         inputs of each run, with a key, before anything is loaded
-`written_inputs.py` definitions given in Python, written to files of the folder
 `rows.py`           values of grids, linked keys and samples
 `plan.py`           `Plan`: from a study to points and cases; all faults are reported together
 `run.py`            run of a case, to a file
@@ -14,16 +13,14 @@
 `retention.py`      parts of each result that are kept
 `user_function.py`  user-defined quantities by a Python function
 `summary.py`        ``summary.csv`` and ``study.json``
-`study.py`          `study`: from inputs to a plan, which is carried out
+`study.py`          `study`: from inputs, files or definitions, to a plan, which is carried out
 `state.py`          which runs of a plan are done, and which are to be computed
 `carry_out.py`      `carry_out`: computes the missing runs, with the journal of the folder
 `outcome.py`        `Outcome`: summary and results of a folder
 `analyses.py`       analyses at a point besides a run: curving, critical speed, modes
-`optimise.py`       `optimise`: parameters against objectives and constraints
+`optimise.py`       `optimise`: objectives, constraints, the design that is chosen
 `designs.py`        designs evaluated by a study
-`exported_design.py` the selected design as a vehicle file
-`search.py`         search methods
-`front.py`          Pareto fronts and their volume
+`search.py`         search methods; Pareto fronts and their volume
 `sensitivity.py`    sensitivity of objectives and constraints to the variables
 `stationary.py`     stationary tests on twisted and canted track, with limits
 =================== ========================================================================

@@ -1,15 +1,18 @@
 """`study`: from inputs to a plan, which is carried out."""
 
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 from railsim.definitions import Settings, Track, Vehicle
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.study.analyses import Analysis, needs_run
 from railsim.definitions.study.definition import Sample
 from railsim.errors import InputError, argument_fault
-from railsim.files.access import check_folder, is_file
+from railsim.files.access import check_folder, is_file, make_folder, write_text
 from railsim.processes import available_cores
 from railsim.studies.carry_out import carry_out
 from railsim.studies.journal import JOURNAL, Journal
@@ -20,7 +23,6 @@ from railsim.studies.retention import ALL, retention
 from railsim.studies.spec import Execution, StudySpec, checked
 from railsim.studies.summary import read_index, refuse_too_many
 from railsim.studies.user_function import Function, full_name
-from railsim.studies.written_inputs import as_files
 from railsim.version import __version__
 
 
@@ -205,3 +207,45 @@ def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
         inputs = checked(StudySpec, data, str(folder / JOURNAL))
     base = (folder / inputs.folder).resolve()
     return inputs, base if os.path.isdir(base) else Path.cwd()
+
+
+INPUTS = "inputs"
+
+
+def as_files(inputs: Any, folder: Path) -> list[str]:
+    """Return one or several inputs as files; definitions are written if they do not exist."""
+    single = isinstance(inputs, str | Path | FileDefinition)
+    texts: dict[str, str] = {}  # of the definitions, by name
+    found = []
+    for one in [inputs] if single else inputs:
+        if not isinstance(one, FileDefinition):
+            found.append(str(one))
+            continue
+        text = one.to_toml()
+        base = _slug(str(getattr(one, "name", "settings")))
+        names = chain([base], (f"{base}-{number}" for number in count(2)))
+        name = next(name for name in names if texts.get(name, text) == text)
+        texts[name] = text
+        path = (folder / INPUTS / f"{name}.toml").absolute()
+        if not _holds(path, text.encode()):
+            make_folder(path.parent)
+            write_text(path, text)
+        found.append(str(path))
+    return found
+
+
+def _holds(path: Path, data: bytes) -> bool:
+    if not path.is_file() or path.stat().st_size != len(data):
+        return False
+    return path.read_bytes() == data
+
+
+def _slug(name: str) -> str:
+    """Return a name in a form suitable for a file.
+
+    Examples
+    --------
+    >>> _slug("Passenger coach, soft primary")
+    'passenger_coach_soft_primary'
+    """
+    return re.sub(r"\W+", "_", name.lower()).strip("_")[:60] or "definition"

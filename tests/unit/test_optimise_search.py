@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from railsim.studies.front import hypervolume, knee, non_dominated
-from railsim.studies.search import Surrogate, Task, Values, search
+from railsim.studies.search import Surrogate, Task, Values, hypervolume, knee, non_dominated, search
 from railsim.studies.sensitivity import sensitivities
 
 
