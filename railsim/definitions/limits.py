@@ -9,9 +9,9 @@ that uses it says so.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from railsim.definitions.base import (
     Count,
@@ -22,7 +22,7 @@ from railsim.definitions.base import (
     Positive,
     Text,
     check,
-    rising,
+    rises,
 )
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.vehicle.definition import Vehicle
@@ -32,15 +32,7 @@ from railsim.definitions.vehicle.tables import Service
 COMFORT_LIMITS_FORMAT = "railsim-comfort-limits/1"
 
 
-def _rising_rows(rows: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not rising(rows):
-        raise ValueError("the first column must increase from row to row")
-    return rows
-
-
-Rows = Annotated[
-    tuple[tuple[Positive, Positive], ...], Field(min_length=1), AfterValidator(_rising_rows)
-]
+Rows = Annotated[tuple[tuple[Positive, Positive], ...], Field(min_length=1), rises("first column")]
 Probability = Annotated[float, Field(strict=True, ge=0.5, lt=1.0)]
 ZoneName = Annotated[str, Field(pattern="^[1-4]$")]
 
@@ -292,7 +284,7 @@ class TrackTarget(Sourced):
     rows: Annotated[
         tuple[tuple[Positive, Positive, Positive, Positive, Positive], ...],
         Field(min_length=1),
-        AfterValidator(_rising_rows),
+        rises("first column"),
     ]
     """Rows [speed up to m/s, smallest and largest of alignment m, smallest and largest of level
     m]"""
