@@ -197,15 +197,11 @@ def _compared(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iter
             name = peak.labels.get("wheelset", "")
             undefined = index == 0 or isnan(differences[label])
             yield [
-                *(("", "") if index else (row.quantity.name, words)),
-                label,
+                *(("", "") if index else (row.quantity.name, words)), label,
                 f"{results[label].wheelsets.index(name) + 1}" if name else "",
-                peak.labels.get("side", ""),
-                Amount(peak.value, Column.of(row.quantity)),
-                peak.time,
-                peak.distance,
-                None if undefined else differences[label],
-            ]
+                peak.labels.get("side", ""), Amount(peak.value, Column.of(row.quantity)), peak.time,
+                peak.distance, None if undefined else differences[label],
+            ]  # fmt: skip
 
 
 def difference_table(found: Sequence[Difference]) -> Table:

@@ -17,28 +17,13 @@ DECIMALS = {"kN": 2, "mm": 2, "mrad": 2, "%": 2, "-": 3, "N": 1, "1e-3": 3, "s":
 """Decimals in printed tables by shown unit; four digits for the others."""
 
 SHOWN_UNITS = {
-    "mm": ("m", 1e3),
-    "km": ("m", 1e-3),
-    "mm2": ("m2", 1e6),
-    "mm/rad": ("m/rad", 1e3),
-    "1/km": ("1/m", 1e3),
-    "km/h": ("m/s", 3.6),
-    "t": ("kg", 1e-3),
-    "Mt": ("kg", 1e-9),
-    "kN": ("N", 1e-3),
-    "kN m": ("N m", 1e-3),
-    "kN/m": ("N/m", 1e-3),
-    "N/mm": ("N/m", 1e-3),
-    "kN m/rad": ("N m/rad", 1e-3),
-    "MPa": ("Pa", 1e-6),
-    "kW": ("W", 1e-3),
-    "mrad": ("rad", 1e3),
-    "deg": ("rad", 180.0 / pi),
-    "%": ("1", 100.0),
-    "1e-3": ("1", 1e3),
-    "per mille": ("1", 1e3),
+    "mm": ("m", 1e3), "km": ("m", 1e-3), "mm2": ("m2", 1e6), "mm/rad": ("m/rad", 1e3),
+    "1/km": ("1/m", 1e3), "km/h": ("m/s", 3.6), "t": ("kg", 1e-3), "Mt": ("kg", 1e-9),
+    "kN": ("N", 1e-3), "kN m": ("N m", 1e-3), "kN/m": ("N/m", 1e-3), "N/mm": ("N/m", 1e-3),
+    "kN m/rad": ("N m/rad", 1e-3), "MPa": ("Pa", 1e-6), "kW": ("W", 1e-3), "mrad": ("rad", 1e3),
+    "deg": ("rad", 180.0 / pi), "%": ("1", 100.0), "1e-3": ("1", 1e3), "per mille": ("1", 1e3),
     "-": ("1", 1.0),
-}
+}  # fmt: skip
 """SI unit of values shown in another one, and shown value over SI value."""
 
 

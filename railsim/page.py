@@ -78,14 +78,9 @@ def rendered(
         f"script-src {_hashes(run_scripts)}; base-uri 'none'; form-action 'none'"
     )
     return environment.get_template("page").render(
-        policy=Markup(policy),
-        title=title,
-        styles=map(Markup, shown_styles),
-        scripts=map(Markup, run_scripts),
-        data=data,
-        schemes=schemes,
-        **values,
-    )
+        policy=Markup(policy), title=title, styles=map(Markup, shown_styles),
+        scripts=map(Markup, run_scripts), data=data, schemes=schemes, **values,
+    )  # fmt: skip
 
 
 def _hashes(texts: Iterable[str]) -> str:

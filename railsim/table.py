@@ -197,13 +197,9 @@ class Table:
             drawn.add_row(*(Text(_folded(cell, least), _style(cell)) for cell, least in parts))
         stream = io.StringIO()
         console = Console(
-            file=stream,
-            width=max(width, sum(widths) + gap * len(widths)),
-            force_terminal=colour,
-            color_system="standard" if colour else None,
-            legacy_windows=False,
-            _environ={},
-        )
+            file=stream, width=max(width, sum(widths) + gap * len(widths)), force_terminal=colour,
+            color_system="standard" if colour else None, legacy_windows=False, _environ={},
+        )  # fmt: skip
         console.print(drawn)
         return stream.getvalue().splitlines()
 

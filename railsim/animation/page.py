@@ -24,14 +24,10 @@ def write_page(
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=(".html", ".htm"))
     text = rendered(
-        "railsim.animation",
-        "page.html",
-        title=scene.title,
-        styles=["page.css"],
-        scripts=["page.js"],
-        data=scene_data(scene) | {"modes": [_motion(mode) for mode in modes]},
+        "railsim.animation", "page.html", title=scene.title, styles=["page.css"],
+        scripts=["page.js"], data=scene_data(scene) | {"modes": [_motion(mode) for mode in modes]},
         schemes="light dark",
-    )
+    )  # fmt: skip
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
     return path
@@ -54,16 +50,13 @@ def scene_data(scene: Scene) -> dict[str, Any]:
             for b in scene.bodies
         ],
         "words": {name: _words(name) for name in ("Q", "Y", "wheelset_lateral")},
-        "time": _list(scene.time, 4),
-        "distance": _list(scene.distance, 3),
+        "time": _list(scene.time, 4), "distance": _list(scene.distance, 3),
         "pose": _list(scene.pose, 5),
-        "track": {name: _list(values, 5) for name, values in scene.track.items()},
-        "forces": forces,
+        "track": {name: _list(values, 5) for name, values in scene.track.items()}, "forces": forces,
         "contact": None if scene.contact is None else _list(scene.contact, 5),
         "sections": [[{k: _list(v, 5) for k, v in section.items()} for section in pair]
                      for pair in scene.sections],
-        "seats": None if scene.seats is None else _list(scene.seats, 5),
-        "patches": patches,
+        "seats": None if scene.seats is None else _list(scene.seats, 5), "patches": patches,
     }  # fmt: skip
 
 

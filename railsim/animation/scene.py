@@ -111,19 +111,12 @@ def result_scene(
     wheelsets = [result.bodies.index(name) for name in result.wheelsets]
     profiles = sections(result, flat)
     return Scene(
-        title=f"{vehicle.name} · {result.track().name} · {speed}",
-        bodies=drawn,
-        time=result["time"][rows],
-        distance=distance[rows],
-        pose=poses[:, columns],
-        track=_track(Alignment(result.track()), distance[rows]),
-        Q=result["Q"][rows],
-        Y=result["Y"][rows],
-        contact=contact_points(result, rows, profiles),
-        sections=profiles,
-        seats=seats(result, rows, profiles, poses[:, wheelsets]),
-        patches=patches,
-    )
+        title=f"{vehicle.name} · {result.track().name} · {speed}", bodies=drawn,
+        time=result["time"][rows], distance=distance[rows], pose=poses[:, columns],
+        track=_track(Alignment(result.track()), distance[rows]), Q=result["Q"][rows],
+        Y=result["Y"][rows], contact=contact_points(result, rows, profiles), sections=profiles,
+        seats=seats(result, rows, profiles, poses[:, wheelsets]), patches=patches,
+    )  # fmt: skip
 
 
 def _poses(result: Result, rows: Floats) -> Floats:

@@ -123,24 +123,20 @@ class Assessment:
         if isinstance(limits, ComfortLimits):
             comfort = {run: [p.record(limits) for p in own] for run, own in self.comfort.items()}
         return {
-            "vehicle": self.vehicle,
-            "standard": self.standard,
-            "edition": limits.edition if limits else None,
-            "runs": list(self.runs),
-            "verdict": self.verdict or None,
-            "reasons": list(self.reasons),
+            "vehicle": self.vehicle, "standard": self.standard,
+            "edition": limits.edition if limits else None, "runs": list(self.runs),
+            "verdict": self.verdict or None, "reasons": list(self.reasons),
             "verdicts": {name: verdict.record() for name, verdict in self.verdicts.items()},
             "deciding": list(getattr(limits, "deciding", ())),
             "conditions": [condition.record() for condition in self.conditions],
             "zones": [zone.record() for zone in self.zones],
             "hunting_frequency": self.hunting_frequency,
             "regression": [one.record() for one in self.influences],
-            "sections": [row.record() for row in self.sections],
-            "comfort": comfort,
+            "sections": [row.record() for row in self.sections], "comfort": comfort,
             "wear": {run: [w.record() for w in wheels] for run, wheels in self.wear.items()},
             "safety": {run: report.record() for run, report in self.safety.items()},
             "remarks": list(self.remarks),
-        }
+        }  # fmt: skip
 
 
 def assess(

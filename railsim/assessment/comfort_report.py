@@ -48,26 +48,19 @@ class PointComfort:
         """Return the values as plain numbers and strings, SI, percentages in per cent."""
         continuous = self.mean.continuous
         return {
-            "place": self.sensor,
-            "x": self.place,
-            "N_MV": self.mean.N_MV,
-            "N_VA": self.mean.N_VA,
-            "N_VD": self.mean.N_VD,
-            "class": class_of(limits.mean_comfort, self.mean.N_MV),
+            "place": self.sensor, "x": self.place, "N_MV": self.mean.N_MV, "N_VA": self.mean.N_VA,
+            "N_VD": self.mean.N_VD, "class": class_of(limits.mean_comfort, self.mean.N_MV),
             "blocks": self.mean.blocks,
             "continuous_largest": [float(v) for v in np.max(continuous, axis=0)],
             "iso2631_rms": [float(v) for v in self.iso_rms],
-            "iso2631_total": float(np.sqrt(np.sum(self.iso_rms**2))),
-            "sperling": self.sperling,
+            "iso2631_total": float(np.sqrt(np.sum(self.iso_rms**2))), "sperling": self.sperling,
             "P_CT": {
                 posture: max((getattr(t, posture) for t in self.transitions), default=None)
                 for posture in ("standing", "seated")
             },
-            "P_DE": self.events,
-            "hunting_share": self.hunting,
-            "source": limits.mean_comfort.source,
-            "checked": limits.mean_comfort.checked,
-        }
+            "P_DE": self.events, "hunting_share": self.hunting,
+            "source": limits.mean_comfort.source, "checked": limits.mean_comfort.checked,
+        }  # fmt: skip
 
 
 def class_of(classes: Classes, value: float) -> str:

@@ -190,27 +190,19 @@ class ModelValidation:
     def record(self) -> dict[str, Any]:
         """Return the comparison as plain values, SI."""
         return {
-            "vehicle": self.vehicle,
-            "edition": self.edition,
-            "runs": list(self.runs),
+            "vehicle": self.vehicle, "edition": self.edition, "runs": list(self.runs),
             "verdict": self.verdict,
             "quantities": [
                 {
-                    "name": one.quantity.name,
-                    "sections": one.sections,
-                    "least_sections": one.least,
-                    "values": len(one.pairs),
-                    "mean": one.mean,
-                    "mean_limit": one.mean_limit,
-                    "standard_deviation": one.deviation,
-                    "limit": one.limit,
-                    "verdict": one.verdict,
+                    "name": one.quantity.name, "sections": one.sections,
+                    "least_sections": one.least, "values": len(one.pairs), "mean": one.mean,
+                    "mean_limit": one.mean_limit, "standard_deviation": one.deviation,
+                    "limit": one.limit, "verdict": one.verdict,
                 }
                 for one in self.comparisons
             ],
-            "sections": self.section_table().records(),
-            "remarks": list(self.remarks),
-        }
+            "sections": self.section_table().records(), "remarks": list(self.remarks),
+        }  # fmt: skip
 
     @classmethod
     def of(cls, record: Mapping[str, Any]) -> "ModelValidation":

@@ -61,23 +61,16 @@ class Assessed:
         """Return it as plain numbers and strings, SI."""
         estimate, line = self.estimate, self.estimate.line
         return {
-            "name": self.criterion.name,
-            "criterion": self.criterion.group,
-            "place": self.place,
-            "N": estimate.N,
-            "mean": estimate.mean,
-            "deviation": estimate.deviation,
+            "name": self.criterion.name, "criterion": self.criterion.group, "place": self.place,
+            "N": estimate.N, "mean": estimate.mean, "deviation": estimate.deviation,
             "estimate": estimate.value,
             "uncorrected": self.uncorrected.value if self.uncorrected else None,
             "method": METHODS[estimate.method],
             "line": float(line.at(line.target)) if line else None,
-            "line_error": line.error if line else None,
-            "target": line.target if line else None,
-            "limit": self.limit,
-            "share": self.share,
-            "source": self.source,
+            "line_error": line.error if line else None, "target": line.target if line else None,
+            "limit": self.limit, "share": self.share, "source": self.source,
             "checked": self.checked,
-        }
+        }  # fmt: skip
 
 
 def nearest(rows: Sequence[Assessed]) -> list[Assessed]:
@@ -154,15 +147,11 @@ class ZoneReport:
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
         return {
-            "zone": self.zone,
-            "population": self.population.name,
-            "sections": len(self.values),
-            "sections_needed": self.needed,
-            "notes": list(self.notes),
-            "lifted": self.lifted,
+            "zone": self.zone, "population": self.population.name, "sections": len(self.values),
+            "sections_needed": self.needed, "notes": list(self.notes), "lifted": self.lifted,
             "quantities": [row.record() for row in self.rows],
             "information": [row.record() for row in self.information],
-        }
+        }  # fmt: skip
 
 
 def zone_reports(

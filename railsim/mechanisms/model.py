@@ -205,18 +205,15 @@ class _Arrays:
         radii: NDArray[Any] = np.array(self.arc_radius, dtype=self.dtype).reshape(-1, self.lanes)
         positions = np.array(self.position)
         return Linkage(
-            len(self.bodies) - 1,
-            float(np.max(np.abs(positions[:, 0].real))),
+            len(self.bodies) - 1, float(np.max(np.abs(positions[:, 0].real))),
             np.array(self.body_of, dtype=np.int64),
             np.ascontiguousarray(positions.transpose(1, 0, 2)),
             np.array(self.joint, dtype=np.int64),
             np.ascontiguousarray(np.array(self.value).transpose(1, 0, 2)),
-            np.array(self.arc_point, dtype=np.int64),
-            np.ascontiguousarray(radii.T),
-            np.array(self.arc_ends, dtype=float).reshape(-1, 5),
-            np.array(drive, dtype=np.int64),
+            np.array(self.arc_point, dtype=np.int64), np.ascontiguousarray(radii.T),
+            np.array(self.arc_ends, dtype=float).reshape(-1, 5), np.array(drive, dtype=np.int64),
             self._filled((self._number(driver.zero),))[:, 0],
-        )
+        )  # fmt: skip
 
 
 def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> list[Any]:

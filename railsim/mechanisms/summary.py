@@ -37,15 +37,11 @@ def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
     """One analysis as plain numbers, with `courses` also those of every link and actuator."""
     definition = result.definition
     data: Data = {
-        "name": definition.name,
-        "case": result.case,
-        "source": definition.source,
-        "remarks": remarks(result),
-        "parameters": parameter_data(result),
+        "name": definition.name, "case": result.case, "source": definition.source,
+        "remarks": remarks(result), "parameters": parameter_data(result),
         "provenance": {name: definition.provenance_of(name) for name in definition.parameters},
-        "travel": result.travel,
-        **_extremes(result),
-    }
+        "travel": result.travel, **_extremes(result),
+    }  # fmt: skip
     if "force" in result.output:
         force = result.extremes("force")
         data |= {"max_force_at": force.most_at, "min_force_at": force.least_at}
@@ -158,15 +154,11 @@ def _courses(courses: Mapping[str, Course], *names: str) -> Data:
 def optimum_data(optimum: "Optimum") -> Data:
     """A search as plain numbers, and everything about the optimum."""
     return {
-        **analysis_data(optimum.after),
-        "objective": optimum.objective,
-        "objective_before": optimum.objective_before,
-        "feasible": optimum.feasible,
-        "breaches": dict(optimum.breaches),
-        "active": [asdict(active) for active in optimum.active],
-        "starts": [_start_data(start) for start in optimum.starts],
-        "seed": optimum.seed,
-    }
+        **analysis_data(optimum.after), "objective": optimum.objective,
+        "objective_before": optimum.objective_before, "feasible": optimum.feasible,
+        "breaches": dict(optimum.breaches), "active": [asdict(active) for active in optimum.active],
+        "starts": [_start_data(start) for start in optimum.starts], "seed": optimum.seed,
+    }  # fmt: skip
 
 
 def _start_data(start: "Start") -> Data:

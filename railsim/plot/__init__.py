@@ -20,14 +20,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURES = {
-    "CriticalSpeed": ("stability", "bifurcation_figure"),
-    "Curving": ("curving", "curving_figure"),
-    "Modes": ("modes", "modes_figure"),
-    "Result": ("histories", "histories"),
-    "RootLocus": ("modes", "locus_figure"),
-    "Track": ("track", "track_figure"),
+    "CriticalSpeed": ("stability", "bifurcation_figure"), "Curving": ("curving", "curving_figure"),
+    "Modes": ("modes", "modes_figure"), "Result": ("histories", "histories"),
+    "RootLocus": ("modes", "locus_figure"), "Track": ("track", "track_figure"),
     "Vehicle": ("vehicle", "vehicle_figure"),
-}
+}  # fmt: skip
 """Module and function that draws each type; a module is imported when it is needed."""
 
 

@@ -13,15 +13,9 @@ from railsim.mechanisms.quantities import quantity
 from railsim.plot.style import DISTINCT, Picture, distinct
 
 DASHES: tuple[Any, ...] = (
-    "-",
-    (0, (5, 2)),
-    (0, (1, 1.2)),
-    (0, (6, 2, 1, 2)),
-    (0, (3, 1, 1, 1, 1, 1)),
-    (0, (11, 3)),
-    (0, (1, 3)),
-    (0, (9, 2, 3, 2)),
-)
+    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (11, 3)),
+    (0, (1, 3)), (0, (9, 2, 3, 2)),
+)  # fmt: skip
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 
 

@@ -37,12 +37,9 @@ def irregularity_figure(found: Irregularity) -> Figure:
         for q in range(SHOWN):
             there = piece.power[q] > 0.0
             axes[SHOWN].plot(
-                2.0 * np.pi / piece.wave_numbers[there],
-                piece.seen[q, there],
-                color=f"C{q}",
-                lw=0.9,
-                label=QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None,
-            )
+                2.0 * np.pi / piece.wave_numbers[there], piece.seen[q, there], color=f"C{q}",
+                lw=0.9, label=QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None,
+            )  # fmt: skip
     axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")
     axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="variance explained (1)")
     axes[SHOWN].legend(loc="lower right")

@@ -228,13 +228,10 @@ def _curve(result: Verification) -> dict[str, Floats]:
     states = [trailing_arm.coil_state(result.arm, coil, phi) for coil in result.arm.coils]
     rise = result.arm.length * np.sin(phi)
     return {
-        "rotation": phi,
-        "load": load,
-        "deflection": states[0].deflection,
-        "K_sys": load / states[0].deflection,
-        "rate": np.gradient(load, rise, edge_order=2),
+        "rotation": phi, "load": load, "deflection": states[0].deflection,
+        "K_sys": load / states[0].deflection, "rate": np.gradient(load, rise, edge_order=2),
         **{f"height_{n}": s.height for n, s in zip(("outer", "inner"), states, strict=False)},
-    }
+    }  # fmt: skip
 
 
 def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:

@@ -120,14 +120,10 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
     for method, lowest in found.nonlinear.items():
         if lowest is not None:
             axes.plot(
-                [lowest.speed],
-                [1e3 * lowest.amplitude],
-                "o",
-                ms=6,
-                mfc="none",
+                [lowest.speed], [1e3 * lowest.amplitude], "o", ms=6, mfc="none",
                 color=BRANCHES["down" if method == "bifurcation" else method][0],
                 label=f"lowest by {method}: {lowest.speed:.2f} m/s",
-            )
+            )  # fmt: skip
 
 
 def _linear_speeds(found: CriticalSpeed) -> Iterator[tuple[str, float, Any]]:
@@ -186,14 +182,9 @@ def map_figure(
         for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):
             more = f", {others[0]} {axes_values[others[0]][number]:g}" if others else ""
             axes.plot(
-                axes_values[first],
-                column,
-                marker="o",
-                ms=3.5,
-                color=distinct(number),
-                ls="-" if method.startswith("linear") else DASHED,
-                label=f"{method}{more}",
-            )
+                axes_values[first], column, marker="o", ms=3.5, color=distinct(number),
+                ls="-" if method.startswith("linear") else DASHED, label=f"{method}{more}",
+            )  # fmt: skip
     axes.set(xlabel=first, ylabel="critical speed (m/s)")
     if not any(np.isfinite(values).any() for values in speeds.values()):
         say(axes, "no critical speed in the range at any point")

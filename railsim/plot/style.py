@@ -26,29 +26,14 @@ from railsim.definitions.track.section import Section
 from railsim.files.access import PICTURES, check_file, whole_file
 
 STYLE: Any = {
-    "axes.axisbelow": True,
-    "axes.edgecolor": "0.35",
-    "axes.grid": True,
-    "axes.labelsize": 9,
-    "axes.linewidth": 0.7,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 9.5,
-    "figure.dpi": 150,
-    "figure.titlesize": 11.5,
-    "figure.titleweight": "bold",
-    "font.size": 9,
-    "grid.color": "0.88",
-    "grid.linewidth": 0.6,
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "lines.linewidth": 1.2,
-    "mathtext.fontset": "dejavusans",
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
+    "axes.axisbelow": True, "axes.edgecolor": "0.35", "axes.grid": True, "axes.labelsize": 9,
+    "axes.linewidth": 0.7, "axes.spines.right": False, "axes.spines.top": False,
+    "axes.titlelocation": "left", "axes.titlesize": 9.5, "figure.dpi": 150,
+    "figure.titlesize": 11.5, "figure.titleweight": "bold", "font.size": 9, "grid.color": "0.88",
+    "grid.linewidth": 0.6, "legend.fontsize": 8.5, "legend.frameon": False, "lines.linewidth": 1.2,
+    "mathtext.fontset": "dejavusans", "xtick.labelsize": 8.5, "ytick.labelsize": 8.5,
     "svg.hashsalt": "railsim",
-}
+}  # fmt: skip
 
 HUES = (("#004a80", "#56a8e0"), ("#b8450a", "#f0a13c"), ("#00664b", "#5cc0a0"),
         ("#7d3a68", "#d493bd"), ("#4d4d4d", "#a6a6a6"))  # fmt: skip

@@ -70,13 +70,10 @@ def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
         "track": printable(group.track),
         "axis": "Distance along the track s (m)" if over == "distance" else "Time t (s)",
         "runs": [printable(name) for name in results],
-        "wheelsets": [printable(name) for name in wheelsets],
-        "low": low,
-        "high": high,
-        "cells": cells,
-        "sections": _sections(first) if over == "distance" else [],
+        "wheelsets": [printable(name) for name in wheelsets], "low": low, "high": high,
+        "cells": cells, "sections": _sections(first) if over == "distance" else [],
         "quantities": [quantity for quantity in quantities if quantity],
-    }
+    }  # fmt: skip
 
 
 def _sections(result: Result) -> list[dict[str, Any]]:
@@ -113,18 +110,12 @@ def _quantity(
     low, high, codes = coded(values)
     limit = limit_of(name, results.values())
     return {
-        "name": name,
-        "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
-        "symbol": plain_symbol(quantity.symbol),
-        "unit": quantity.shown_unit.replace("-", ""),
-        "sign": quantity.sign,
-        "sides": sides,
-        "low": low,
-        "high": high,
+        "name": name, "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
+        "symbol": plain_symbol(quantity.symbol), "unit": quantity.shown_unit.replace("-", ""),
+        "sign": quantity.sign, "sides": sides, "low": low, "high": high,
         "limit": limit[0] * quantity.scale if limit else None,
-        "limit_words": limit[1] if limit else "",
-        "codes": codes,
-    }
+        "limit_words": limit[1] if limit else "", "codes": codes,
+    }  # fmt: skip
 
 
 def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:

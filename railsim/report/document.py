@@ -68,17 +68,10 @@ def document(
 ) -> str:
     """Return the page as HTML; `values` go to the template."""
     return rendered(
-        "railsim.report",
-        "templates/document.html",
-        title=title,
-        styles=["templates/document.css"],
-        schemes="light dark",
-        sections=[s for s in sections if s.texts or s.tables or s.figures],
-        method=method,
-        verdict=verdict,
-        lead=f"{source}Written by railsim {__version__}.",
-        **values,
-    )
+        "railsim.report", "templates/document.html", title=title, styles=["templates/document.css"],
+        schemes="light dark", sections=[s for s in sections if s.texts or s.tables or s.figures],
+        method=method, verdict=verdict, lead=f"{source}Written by railsim {__version__}.", **values,
+    )  # fmt: skip
 
 
 def of_design(

@@ -92,20 +92,16 @@ def page(
     sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs or {}))
     sections.append(_remarks(records, remarks))
     return rendered(
-        "railsim.report",
-        "templates/runs.html",
-        title=title,
+        "railsim.report", "templates/runs.html", title=title,
         styles=["vendor/uPlot.min.css", "templates/runs.css"],
-        scripts=["vendor/uPlot.iife.min.js", "templates/study.js", "templates/runs.js"],
-        data=data,
-        schemes="light dark",
-        lead=_lead(records, results),
+        scripts=["vendor/uPlot.iife.min.js", "templates/study.js", "templates/runs.js"], data=data,
+        schemes="light dark", lead=_lead(records, results),
         verdict=_verdict(records, limits.verdicts),
         sections=[section for section in sections if section],
         foot=f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
         "Values in customary units; files and the Python interface use SI units.",
         wrap=Markup("_<wbr>"),
-    )
+    )  # fmt: skip
 
 
 def _done(records: Sequence[Record]) -> list[Record]:

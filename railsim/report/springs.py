@@ -93,14 +93,11 @@ def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" =
         except InputError as error:
             remarks = [f"Design: {fault.key}: {fault.found}." for fault in error.faults]
     return Collected(
-        suspension=suspension,
-        verification=verify(suspension),
-        design=designed,
+        suspension=suspension, verification=verify(suspension), design=designed,
         fatigue=fatigue(suspension) if suspension.fatigue is not None else None,
         ride_heights=ride_heights(suspension) if suspension.tolerances is not None else None,
-        search=search,
-        remarks=tuple(remarks),
-    )
+        search=search, remarks=tuple(remarks),
+    )  # fmt: skip
 
 
 @styled()

@@ -21,16 +21,6 @@ from railsim.result.reading import check_result, open_result, open_run
 from railsim.result.sinks import MemorySink, Sink
 
 __all__ = [
-    "Hdf5Sink",
-    "MemorySink",
-    "MidCurve",
-    "Peak",
-    "Result",
-    "Sink",
-    "check_result",
-    "mid_curves",
-    "open_result",
-    "open_run",
-    "peak",
-    "peaks",
-]
+    "Hdf5Sink", "MemorySink", "MidCurve", "Peak", "Result", "Sink", "check_result", "mid_curves",
+    "open_result", "open_run", "peak", "peaks",
+]  # fmt: skip

@@ -315,16 +315,11 @@ class Result:
         states: Mapping[str, Floats] = self._groups.get("state", {})
         before = {"end": states.get("start"), "memory": states.get("start_memory")}
         return {
-            "vehicle": self.vehicle(),
-            "track": self.track(),
-            "settings": self.settings(),
-            "speed": self.speed,
-            "start": float(facts.get("start", 0.0)),
-            "duration": facts.get("requested_duration"),
-            "until": facts.get("requested_until"),
-            "profiles": self.profiles,
-            "resume": before if "start" in states else None,
-        }
+            "vehicle": self.vehicle(), "track": self.track(), "settings": self.settings(),
+            "speed": self.speed, "start": float(facts.get("start", 0.0)),
+            "duration": facts.get("requested_duration"), "until": facts.get("requested_until"),
+            "profiles": self.profiles, "resume": before if "start" in states else None,
+        }  # fmt: skip
 
     def plot(
         self,

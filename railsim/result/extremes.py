@@ -73,15 +73,10 @@ class Peak:
     def record(self) -> dict[str, Any]:
         """Return the peak as plain numbers and strings, SI."""
         return {
-            "quantity": self.quantity.name,
-            "kind": self.kind,
-            "value": self.value,
-            "unit": self.quantity.unit,
-            **self.labels,
-            "time": self.time,
-            "distance": self.distance,
+            "quantity": self.quantity.name, "kind": self.kind, "value": self.value,
+            "unit": self.quantity.unit, **self.labels, "time": self.time, "distance": self.distance,
             **({} if math.isnan(self.smooth) else {"low_pass_20_hz": self.smooth}),
-        }
+        }  # fmt: skip
 
 
 def peak(result: Result, name: str, kind: str = "abs") -> Peak:
@@ -235,17 +230,14 @@ class MidCurve:
     def record(self) -> dict[str, Any]:
         """Return the values as plain numbers and strings, SI."""
         return {
-            "radius": self.radius,
-            "distance": self.distance,
-            "time": self.time,
+            "radius": self.radius, "distance": self.distance, "time": self.time,
             "values": {name: values.tolist() for name, values in self.values.items()},
             "largest": {peak.quantity.name: peak.value for peak in self.peaks},
             "largest_medians": {peak.quantity.name: peak.value for peak in self.median_peaks},
-            "full_curve": list(self.full_curve),
-            "settling": self.settling,
+            "full_curve": list(self.full_curve), "settling": self.settling,
             "medians": {name: values.tolist() for name, values in self.medians.items()},
             "scatter": {name: values.tolist() for name, values in self.scatter.items()},
-        }
+        }  # fmt: skip
 
 
 def mid_curves(

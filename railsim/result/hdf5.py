@@ -305,14 +305,10 @@ def _create(
     if length is not None:
         rows = math.ceil(length / math.ceil(length / rows)) if length else 1
     dataset = file.create_dataset(
-        quantity.name,
-        shape=(0, *inner),
-        maxshape=(None, *inner),
-        chunks=(rows, *(max(1, size) for size in inner)),
-        dtype=storage.kind(quantity.name),
-        fletcher32=True,
-        **(GZIP if storage.compress else {}),
-    )
+        quantity.name, shape=(0, *inner), maxshape=(None, *inner),
+        chunks=(rows, *(max(1, size) for size in inner)), dtype=storage.kind(quantity.name),
+        fletcher32=True, **(GZIP if storage.compress else {}),
+    )  # fmt: skip
     if quantity.name == "time":
         dataset.make_scale("time")
     _describe(dataset, quantity)

@@ -57,19 +57,11 @@ def data_sheets(suspension: TrailingArmSuspension, result: Verification) -> dict
             lateral = dict(methods) if force > 0.0 else {}
             loads[case.name] = Loaded(force, float(state.height), *stresses, lateral)
         values = {
-            "d": d,
-            "D": D,
-            "D_outer": D + d,
-            "D_inner": D - d,
-            "index": D / d,
-            "n": n,
-            "n_total": n_t,
-            "H0": H0,
-            "L_solid": solid,
-            "K_V": coil.K_V,
+            "d": d, "D": D, "D_outer": D + d, "D_inner": D - d, "index": D / d, "n": n,
+            "n_total": n_t, "H0": H0, "L_solid": solid, "K_V": coil.K_V,
             "mass": checks.mass(d, D, n_t, material.density),
             "surge_frequency": float(checks.surge_frequency(d, D, n, material.G, material.density)),
             "tau_solid": checks.solid_stress(coil.K_V, d, D, H0 - solid),
-        }
+        }  # fmt: skip
         sheets[name] = Sheet(values, loads)
     return sheets

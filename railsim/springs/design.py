@@ -123,15 +123,12 @@ def design(suspension: TrailingArmSuspension) -> Design:
         d, D = spring.wire_diameter, spring.mean_diameter
         n.append(helical.active_coils(suspension.material.G, d, D, k) if d else None)
     return Design(
-        names=tuple(suspension.springs),
-        rotation=phi,
-        K_tot=wanted.mounting_load / wanted.mounting_deflection,
-        K_V=tuple(K_V),
+        names=tuple(suspension.springs), rotation=phi,
+        K_tot=wanted.mounting_load / wanted.mounting_deflection, K_V=tuple(K_V),
         K_L=float(sum(state.K_L for state in states)),
-        K_C=float(sum(state.K_C for state in states)),
-        n=tuple(n),
+        K_C=float(sum(state.K_C for state in states)), n=tuple(n),
         load_range=(float(low), float(high)),
-    )
+    )  # fmt: skip
 
 
 def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:

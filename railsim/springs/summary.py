@@ -24,18 +24,13 @@ Data = dict[str, Any]
 def design_data(suspension: TrailingArmSuspension, result: Design) -> Data:
     """The design as plain numbers; see `Design`."""
     return {
-        "name": suspension.name,
-        "equilibrium": suspension.arm.equilibrium,
-        "theta": abs(result.rotation),
-        "rotation": result.rotation,
-        "K_tot": result.K_tot,
-        "K_L": result.K_L,
-        "K_C": result.K_C,
-        "target_load_range": list(result.load_range),
+        "name": suspension.name, "equilibrium": suspension.arm.equilibrium,
+        "theta": abs(result.rotation), "rotation": result.rotation, "K_tot": result.K_tot,
+        "K_L": result.K_L, "K_C": result.K_C, "target_load_range": list(result.load_range),
         **{f"K_V_{name}": K_V for name, K_V in zip(result.names, result.K_V, strict=True)},
         **{f"n_{name}": n for name, n in zip(result.names, result.n, strict=True)},
         "coils": coils_by_wire(suspension, result),
-    }
+    }  # fmt: skip
 
 
 def coils_by_wire(suspension: TrailingArmSuspension, result: Design) -> dict[str, list[Data]]:

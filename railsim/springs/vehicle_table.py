@@ -123,15 +123,12 @@ def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) ->
     x, z = -length * np.cos(case.rotation), -table.wheel_radius + length * np.sin(case.rotation)
     hinge = [x, table.lateral_position, z]
     return {
-        "kind": "bushing",
-        "bodies": [table.frame, "arm"],
-        "point": _rounded(hinge),
-        "sides": "both",
-        "stiffness": list(table.bush.stiffness),
+        "kind": "bushing", "bodies": [table.frame, "arm"], "point": _rounded(hinge),
+        "sides": "both", "stiffness": list(table.bush.stiffness),
         "damping": list(table.bush.damping),
         "rotational_stiffness": list(table.bush.rotational_stiffness),
         "rotational_damping": list(table.bush.rotational_damping),
-    }
+    }  # fmt: skip
 
 
 def _nest(
