@@ -12,11 +12,28 @@ potential through all interpolations: along the track -dU/ds, which has the leve
 gap's slope dg/ds is the fall of the rail where the wheel touches it, ahead of or behind the axle.
 """
 
+from math import copysign, sqrt
+
 import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import B_CHANGE, B_K, B_K2, B_LEVER, B_RADIUS, B_RATE, B_RISE
-from railsim.kernels.contact_table import A1, B1, D_B1, LOOK_UP_SIZE, N_PATCH, N_WEIGHT, look_up
+from railsim.kernels.contact_table import (
+    A1,
+    B1,
+    D_B1,
+    FINE_ROLL,
+    K2,
+    K_ROLL,
+    K_W,
+    K_Y,
+    LOOK_UP_SIZE,
+    N_PATCH,
+    N_WEIGHT,
+    K,
+    look_up,
+    stretched_roll,
+)
 from railsim.kernels.system import AHEAD, ARC_LENGTH
 
 BEGIN, END = range(2)  # columns of RailTables.range_row
@@ -24,9 +41,21 @@ FIRST_PART, COUNT, PLAIN = range(3)  # of RailTables.piece
 FIRST_NODE, N_NODES = range(2)  # of RailTables.part
 NODES = 4  # of a cubic
 NODE_WEIGHTS = 2 * NODES  # weights of the nodes and of their derivative, in `Work.weights`
-FAR = 2e-3  # m, a patch whose gap exceeds the wheel's height by more is left out
+FAR = 1.2e-3  # m, a patch whose gap exceeds the wheel's height by more is left out
 NO_HEIGHT = 1.0  # m
+YAWED = 0.1  # m, more than a wheel runs ahead of its wheelset's middle
 NARROW = 1e-6  # m/N^(1/3), least semi-axis of a patch: others have 2e-5 and more
+
+
+@compiled(python=False)
+def near_range(system, state, w):
+    """Whether wheelset `w` is on a range of changing rails or, yawed, one of its wheels may be."""
+    rails, b = system.contact.rails, system.contact.body[w]
+    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]] + state[6 * b]
+    for k in range(rails.range_row.shape[0]):
+        if rails.range_row[k, BEGIN] - s < YAWED and s - rails.range_row[k, END] < YAWED:
+            return True
+    return False
 
 
 @compiled(python=False)
@@ -140,23 +169,34 @@ def node_weights(rails, part, i, s, out, first):
 
 
 @compiled(python=False)
-def rigid_height(rails, piece, s, y):
-    """Height of the highest rail over the plain one's for a wheel at `y`, and its rise.
+def nearest_y(rails, y):
+    """Node of the tables nearest to a lateral position, the last one beyond their ends."""
+    return min(max(int((y - rails.y0) / rails.dy + 0.5), 0), rails.values.shape[4] - 1)
+
+
+@compiled(python=False)
+def plain_gap(rails, piece, y):
+    """Height at which a wheel at `y` touches the plain rail, as `lowest_gap` [m]."""
+    level, roll = NO_HEIGHT, rails.values.shape[3] // 2
+    for zone in range(N_PATCH):
+        number = rails.piece[piece, PLAIN] + zone
+        level = min(level, gap_at(rails, number, 0, roll, nearest_y(rails, y)))
+    return level
+
+
+@compiled(python=False)
+def lowest_gap(rails, piece, s, y):
+    """Height at which a wheel at `y` touches the first of the rails, and its slope over s.
 
     At the nearest node in y, without roll and yaw: for what is foreseen.
 
     Returns
     -------
     float, float
-        Height, upwards [m], and its derivative over s [1].
+        Height, positive down, at most 1 m [m], and its derivative over s [1].
     """
-    shape = rails.values.shape
-    iy = min(max(int((y - rails.y0) / rails.dy + 0.5), 0), shape[4] - 1)
-    roll = shape[3] // 2
-    level, best, rise = NO_HEIGHT, NO_HEIGHT, 0.0
-    for zone in range(N_PATCH):
-        number = rails.piece[piece, PLAIN] + zone
-        level = min(level, gap_at(rails, number, 0, roll, iy))
+    iy, roll = nearest_y(rails, y), rails.values.shape[3] // 2
+    lowest, slope = NO_HEIGHT, 0.0
     for part in range(rails.piece[piece, COUNT]):
         part += rails.piece[piece, FIRST_PART]
         i = cell_of(rails, part, s)
@@ -170,9 +210,40 @@ def rigid_height(rails, piece, s, y):
                 continue
             g, step = gap_at(rails, here, 0, roll, iy), gap_at(rails, there, 0, roll, iy)
             step -= g
-            if g + u * step < best:
-                best, rise = g + u * step, -step / h
-    return level - best, rise
+            if g + u * step < lowest:
+                lowest, slope = g + u * step, step / h
+    return lowest, slope
+
+
+@compiled(python=False)
+def held(rails, y, roll, stretched, slope):
+    """Hold a wheel within the tables, beyond which gaps are continued linearly.
+
+    A flange that climbs goes 25 mm aside and rolls the wheelset by 15 mrad.
+
+    Parameters
+    ----------
+    y, roll, stretched, slope : float
+        Lateral displacement [m], roll [rad], coordinate of it and its slope (`stretched_roll`).
+
+    Returns
+    -------
+    float, float, float, float
+        Coordinate of the roll and its slope, then what is left of the displacement [m] and roll.
+    """
+    margin = 1e-6
+    foot = y - rails.shear[0] * roll
+    least = rails.y0 + (1.0 + margin) * rails.dy
+    most = rails.y0 + (rails.values.shape[4] - 2.0 - margin) * rails.dy
+    aside = foot - min(max(foot, least), most)
+    limit = -(1.0 - margin) * (rails.roll0 + rails.droll)
+    if abs(stretched) <= limit:
+        return stretched, slope, aside, 0.0
+    # x = r/(1 + (r/F)^2)^(1/4), solved for r
+    q = (limit / FINE_ROLL) ** 2
+    at_end = FINE_ROLL * sqrt(0.5 * q * (q + sqrt(q * q + 4.0)))
+    _, slope = stretched_roll(at_end)
+    return copysign(limit, stretched), slope, aside, roll - copysign(at_end, roll)
 
 
 @compiled(python=False)
@@ -229,9 +300,14 @@ def look_up_part(system, work, cell, place, part, first):
             for q in range(LOOK_UP_SIZE):
                 out[begin + q] += share * out[scratch + q]
             fall += slope * out[scratch]
-            K_rate += slope * out[scratch + 1]
-            K2_rate += slope * out[scratch + 2]
-        # near where a zone ends along the track cubics fall below zero: the ellipse needs an extent
+            K_rate += slope * out[scratch + K]
+            K2_rate += slope * out[scratch + K2]
+        # near where a zone ends along the track cubics fall below zero: it does not pull, and the
+        # ellipse needs an extent
+        if out[begin + K] < 0.0:
+            out[begin + K] = K_rate = 0.0
+            out[begin + K_Y] = out[begin + K_ROLL] = out[begin + K_W] = 0.0
+            out[begin + K2] = max(out[begin + K2], 0.0)
         out[begin + A1] = max(out[begin + A1], NARROW)
         out[begin + B1] = max(out[begin + B1], NARROW)
         out[begin + D_B1] = max(out[begin + D_B1], NARROW - out[begin + B1])

@@ -12,12 +12,19 @@ STANDSTILL = 8
 STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; it goes on alone
 BESIDE_RAIL = 10
 LAW_NOT_FINITE = 11
-RAIL_RANGE = 12
+WRONG_SIDE = 12
+FALLEN = 13
 
 # code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
 STATUS = {
     RUNNING: ("complete", "the run reached its end"),
     DERAILED: ("derailed", "{where} climbed over the rail: a flange's tip stands over its top"),
+    WRONG_SIDE: (
+        "derailed",
+        "{where} went past the guiding face of a rail whose section changes: a flange is on the "
+        "wrong side",
+    ),
+    FALLEN: ("derailed", "{where} found no rail under a wheel, which fell 20 mm"),
     BESIDE_RAIL: (
         "stopped",
         "{where} is beside its rail without having climbed it: the step is too long or the model "
@@ -25,10 +32,6 @@ STATUS = {
     ),
     INWARD_RANGE: ("stopped", "{where} moved a wheel inwards beyond the range of the table"),
     WHEEL_LIFT: ("stopped", "{where} lifted a wheel beyond the range of the model"),
-    RAIL_RANGE: (
-        "stopped",
-        "{where} moved a wheel to the side beyond the range of the tables of the rail's sections",
-    ),
     ROLL_RANGE: ("stopped", "{where} rolled beyond the range of the contact table"),
     YAW_RANGE: ("stopped", "{where} yawed beyond the range of the contact table"),
     NOT_FINITE: (

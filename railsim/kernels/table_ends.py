@@ -1,11 +1,23 @@
-"""What it means that a wheel has left its contact table."""
+"""What it means that a wheel has left its contact table, or stands on none of its rails."""
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_table import ABOVE_Y, BELOW_Y, N_PATCH, OUTSIDE_ROLL
-from railsim.kernels.status import BESIDE_RAIL, DERAILED, INWARD_RANGE, ROLL_RANGE, YAW_RANGE
+from railsim.kernels.rail_parts import plain_gap
+from railsim.kernels.status import (
+    BESIDE_RAIL,
+    DERAILED,
+    FALLEN,
+    INWARD_RANGE,
+    ROLL_RANGE,
+    RUNNING,
+    WHEEL_LIFT,
+    WRONG_SIDE,
+    YAW_RANGE,
+)
 
 DEEPEST = 1e-3  # penetration under some 2 MN, more than any wheel that climbs carries (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
+FALLEN_BY = 0.02  # depth below the plain rail to which no groove lets a wheel down (m)
 
 
 @compiled(python=False)
@@ -47,3 +59,25 @@ def has_climbed(contact, table, wheel, stretched):
         if wheel.z > here + (tr - ir) * (following - here) + DEEPEST:
             return False
     return True
+
+
+@compiled
+def beside_sections(contact, table, where, wheel, stretched):
+    """Status code beyond the plain table where a rail's section changes: see `outside`.
+
+    There a rail may end or go aside, so that a wheel leaves it without having climbed it.
+    """
+    status = outside(contact, table, where, wheel, stretched)
+    return WRONG_SIDE if status == BESIDE_RAIL else status
+
+
+@compiled(python=False)
+def without_rail(rails, piece, wheel, nearest):
+    """Status of a wheel that touches no rail of a piece and whose nearest one is so far below it.
+
+    It falls; only where it is high above the plain rail it has been lifted.
+    """
+    depth = wheel.z + rails.lever[piece] * wheel.roll - plain_gap(rails, piece, 0.0)
+    if depth > FALLEN_BY:
+        return FALLEN
+    return WHEEL_LIFT if nearest < -LIFT_RANGE and depth < -LIFT_RANGE else RUNNING

@@ -46,8 +46,6 @@ from railsim.kernels.contact_columns import (
     B,
 )
 from railsim.kernels.contact_table import (
-    ABOVE_Y,
-    BELOW_Y,
     G_ROLL,
     G_W,
     G_Y,
@@ -60,7 +58,6 @@ from railsim.kernels.contact_table import (
     K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
-    OUTSIDE_ROLL,
     cell_weights,
     coupled_approaches,
     is_far,
@@ -70,7 +67,7 @@ from railsim.kernels.contact_table import (
     under_load,
 )
 from railsim.kernels.elements import RATE_OF_STOPS
-from railsim.kernels.rail_parts import COUNT, FIRST_PART, look_up_part, place_on_rails
+from railsim.kernels.rail_parts import COUNT, FIRST_PART, held, look_up_part, place_on_rails
 from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
@@ -95,15 +92,16 @@ from railsim.kernels.rails import (
     SLOPE_Z,
     predict_rate_changes,
 )
-from railsim.kernels.status import RAIL_RANGE, ROLL_RANGE, RUNNING, WHEEL_LIFT, YAW_RANGE
+from railsim.kernels.status import RUNNING, WHEEL_LIFT, YAW_RANGE
 from railsim.kernels.support import SKIP
 from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, SIN_ROLL, SPEED, Y_0, Z_0
-from railsim.kernels.table_ends import LIFT_RANGE, all_far, outside
+from railsim.kernels.table_ends import LIFT_RANGE, all_far, beside_sections, outside, without_rail
 from railsim.kernels.track_frame import OMEGA
 from railsim.kernels.wheel_surface import note_surfaces
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
+STEEP = 3.0  # of a flange
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 
 
@@ -269,16 +267,17 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     """As `wheel_contact`, at the position `s` of a piece whose rails' sections change."""
     contact, above, bump, approach = system.contact, work.above, work.bump, work.approach
     rails, table = contact.rails, contact.table[w, side]
-    where, iy, ir, iw, ty, tr, tw = locate(
-        rails, 0, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
-    )
-    if where in (BELOW_Y, ABOVE_Y):
-        return RAIL_RANGE, n
+    stretched, wide = wheel.sign * above[8], wheel.yaw * wheel.yaw
+    where = locate(contact, table, wheel.y, wheel.roll, stretched, wide)[0]
     if where != INSIDE:
-        return ROLL_RANGE if where == OUTSIDE_ROLL else YAW_RANGE, n
+        return beside_sections(contact, table, where, wheel, stretched), n
+    stretched, slope, aside, turned = held(rails, wheel.y, wheel.roll, stretched, above[9])
+    where, iy, ir, iw, ty, tr, tw = locate(rails, 0, wheel.y - aside, wheel.roll, stretched, wide)
+    if where != INSIDE:
+        return YAW_RANGE, n
     if tw > 1.0:
         work.events[w, 4] += 1
-    cell_weights(rails, ty, tr, above[9], work.weights)
+    cell_weights(rails, ty, tr, slope, work.weights)
     count = rails.piece[piece, COUNT]
     for patch in range(N_PATCH, N_PATCH * count):
         for k in range(BUMP_SIZE):
@@ -286,13 +285,15 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     lever = wheel.sign * rails.lever[piece]
     rate = state[SPEED] + state[6 * system.bodies.kind.shape[0] + 6 * contact.body[w]]
     rate -= lever * above[7]
+    # to see every zone that may touch, however steep
+    reach = wheel.z + highest + rails.lever[piece] * turned + STEEP * abs(aside)
     lift, nearest = 1.0, -1.0
     for number in range(count):
         first = N_PATCH * number
         over = look_up_part(
             system,
             work,
-            (iy, ir, iw, tw, wheel.z + highest),
+            (iy, ir, iw, tw, reach),
             (s, rate, lever),
             rails.piece[piece, FIRST_PART] + number,
             first,
@@ -301,7 +302,10 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
         for patch in range(first, first + N_PATCH):
             if approach[patch] == 0.0:
                 k = patch * LOOK_UP_SIZE
-                raise_gap(work.look_up, k, bump, patch, rails.shear[0])
+                shear = rails.shear[0]
+                g_y = work.look_up[k + G_Y]
+                work.look_up[k] += aside * g_y + turned * (work.look_up[k + G_ROLL] + shear * g_y)
+                raise_gap(work.look_up, k, bump, patch, shear)
                 work.stiffness[first + patch] = work.look_up[k + 1]
                 work.stiffness[first + patch + N_PATCH] = work.look_up[k + 2]
                 approach[patch] = wheel.z - work.look_up[k]
@@ -317,7 +321,7 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
             along = 0.4 * p * p * sqrt(p) * bump[patch, B_K] + p * p * p / 3.0 * bump[patch, B_K2]
             work.rail_force[contact.body[w], 0] -= along
             work.rail_force[contact.body[w], 5] += lever * along
-    return WHEEL_LIFT if nearest < -LIFT_RANGE else RUNNING, n
+    return without_rail(rails, piece, wheel, nearest) if lift > NEAR else RUNNING, n
 
 
 @compiled(inline=True)

@@ -26,8 +26,8 @@ from railsim.kernels.contact_columns import (
     B_RATE,
     BUMP_SIZE,
 )
-from railsim.kernels.contact_table import N_PATCH
-from railsim.kernels.rail_parts import place_on_rails, rigid_height
+from railsim.kernels.contact_table import N_PATCH, TREAD
+from railsim.kernels.rail_parts import lowest_gap, near_range, place_on_rails, plain_gap
 from railsim.kernels.rails import ASIDE, ROLL
 from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
 
@@ -116,6 +116,11 @@ def note_surfaces(system, work, state, w, side, wheel):
         Largest e of the patches [m].
     """
     contact, bump, h = system.contact, work.bump, work.watch[AHEAD]
+    if contact.surface_of[w, side, TREAD] < 0:  # round
+        for patch in range(N_PATCH):
+            for k in range(BUMP_SIZE):
+                bump[patch, k] = 0.0
+        return 0.0
     phi, rate = wheel_angle(system, state, w)
     rate -= work.acceleration[contact.body[w], 4]
     most = 0.0
@@ -151,6 +156,11 @@ def foreseen_heights(system, work, state, w, track, first):
     contact = system.contact
     b = contact.body[w]
     n = system.bodies.kind.shape[0]
+    both_round = max(contact.surface_of[w, 0, TREAD], contact.surface_of[w, 1, TREAD]) < 0
+    if both_round and not near_range(system, state, w):
+        for k in range(4):
+            track[first + k] = 0.0
+        return
     phi, _ = wheel_angle(system, state, w)
     rate = -state[6 * n + 6 * b + 4]  # the turn of the track's frame left out
     for side in range(2):
@@ -159,7 +169,7 @@ def foreseen_heights(system, work, state, w, track, first):
         roll = state[6 * b + 3] - work.plane[w, ROLL]
         y = sign * (state[6 * b + 1] - work.rail[w, side, ASIDE] - shear * roll)
         track[first + side] = track[first + 2 + side] = 0.0
-        table = contact.surface_of[w, side, 0]
+        table = contact.surface_of[w, side, TREAD]
         if table >= 0:
             e, lead, _ = surface_at(contact, table, phi, y)
             track[first + side] = e
@@ -170,6 +180,7 @@ def foreseen_heights(system, work, state, w, track, first):
                 # at the lateral position before the step: the rest is in the slopes of the forces
                 if abs(track[first + 4 + side] - y) > HELD:
                     track[first + 4 + side] = y
-                e, rise = rigid_height(contact.rails, piece, s, track[first + 4 + side])
-                track[first + side] += e
-                track[first + 2 + side] += rise * state[SPEED]
+                y = track[first + 4 + side]
+                low, fall = lowest_gap(contact.rails, piece, s, y)
+                track[first + side] += plain_gap(contact.rails, piece, y) - low
+                track[first + 2 + side] -= fall * state[SPEED]

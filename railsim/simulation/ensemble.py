@@ -24,11 +24,13 @@ from railsim.kernels.recording import Recorder
 from railsim.kernels.status import (
     BESIDE_RAIL,
     DERAILED,
+    FALLEN,
     INWARD_RANGE,
     NOT_FINITE,
     ROLL_RANGE,
     STRIKES,
     WHEEL_LIFT,
+    WRONG_SIDE,
     YAW_RANGE,
 )
 from railsim.kernels.system import (
@@ -52,7 +54,8 @@ Group = TypeVar("Group", bound=tuple[Any, ...])
 # the grid of the contact tables, which a system has but one of
 GRID = ("y0", "dy", "roll0", "droll")
 # statuses that concern a wheelset
-OF_WHEELSET = (DERAILED, BESIDE_RAIL, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
+ENDS = (DERAILED, BESIDE_RAIL, WRONG_SIDE, FALLEN, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE)
+OF_WHEELSET = (*ENDS, STRIKES)
 
 
 def contact_grid(model: Model) -> tuple[float | int, ...]:

@@ -15,7 +15,7 @@ from railsim.contact.curves import HALF_WIDTHS, wheel_curve
 from railsim.contact.rail_sections import kinematic_height, rail_parts, rolled_curve
 from railsim.contact.table import _wheel_arrays, ellipse_functions, strip_influence
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.section_files import read_sections
+from railsim.definitions.section_files import SectionList, read_sections
 from railsim.errors import InputError
 from railsim.kernels import table_slice as kernel
 from railsim.profiles import load_profile
@@ -86,8 +86,8 @@ def test_contact_lies_where_the_rail_slopes(parts, wheel):
         assert 1e3 * found == pytest.approx(lead, abs=0.5)
 
 
-def carried(parts, wheel, y, s=0.239):
-    """Height of the wheel [mm] and loads of wing and nose [N] under 10 kN."""
+def carried(parts, wheel, y, s=0.239, load=10e3):
+    """Height of the wheel [mm] and loads of the rails, such as wing and nose [N], under a load."""
     tables = []
     for part in parts:
         rail = rolled_curve(part, s, RADIUS)
@@ -115,7 +115,7 @@ def carried(parts, wheel, y, s=0.239):
             ]
         )
 
-    z = brentq(lambda z: loads(z).sum() - 10e3, -2e-3, 0.0, xtol=1e-10)
+    z = brentq(lambda z: loads(z).sum() - load, -3e-3, 0.0, xtol=1e-10)
     return 1e3 * z, loads(z)
 
 
@@ -131,6 +131,21 @@ def test_wing_and_nose_share_the_load_as_in_contact(parts, wheel):
         angle, N = float(row["deltcp_rad"]), float(row["Fn_N"])
         assert loads[int(row["patch"]) - 1] == pytest.approx(N * np.cos(angle), abs=300.0)
         assert z == pytest.approx(float(row["z_mm"]), abs=0.005)
+
+
+def test_height_on_a_nose_that_rises(wheel):
+    """Rising 1:10, 46 mm ahead of the axle: within 0.003 mm of CONTACT under its load."""
+    folder = ROOT / "tests" / "data" / "sections"
+    y, z = 1e-3 * np.loadtxt(folder / "cross_nose_0.csv", delimiter=",", skiprows=1).T
+    s = np.linspace(-0.1, 0.1, 21)
+    sections = SectionList(s, tuple(np.array([y, z - 0.1 * at]) for at in s), np.zeros((21, 0)))
+    nose = rail_parts(sections)
+    with (folder / "cross_nose_s0_dev.csv").open() as lines:
+        (row,) = ({k: float(v) for k, v in row.items()} for row in csv.DictReader(lines))
+    height, _ = carried(nose, wheel, row["y_mm"], 1e-3 * row["s_mm"], row["Fz_N"])
+    assert height == pytest.approx(row["z_mm"], abs=0.003)
+    _, ahead, _ = kinematic_height(nose, 1e-3 * row["s_mm"], (wheel.y, wheel.r), RADIUS, 0.0)
+    assert 1e3 * ahead == pytest.approx(row["xcp_tr_mm"], abs=0.5)
 
 
 @pytest.mark.further
