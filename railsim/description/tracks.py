@@ -11,7 +11,7 @@ from railsim.definitions.track.alignment_rules import cant_at
 from railsim.definitions.track.layout import cant_sections, curvature_sections, gradient_sections
 from railsim.definitions.track.section import Section
 from railsim.description.values import Description, Parts, either, short
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.table import Column, Table
 from railsim.track.curves import Curve, curves
 from railsim.units import speed_in_si
@@ -25,10 +25,8 @@ _COPIED = (
 def _checked(speed: float | str) -> float:
     value = speed_in_si(speed)
     if isinstance(value, str) or not value > 0.0:
-        fault = argument_fault(
-            "speeds", "", f"found {speed!r}", "above 0, such as 20 or '72 km/h'", "--speed"
-        )
-        raise InputError([fault])
+        allowed = "above 0, such as 20 or '72 km/h'"
+        raise argument_error("speeds", f"found {speed!r}", allowed, option="--speed")
     return float(value)
 
 

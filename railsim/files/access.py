@@ -21,7 +21,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import BinaryIO, Self
 
-from railsim.errors import InputError, argument_fault, input_error
+from railsim.errors import InputError, argument_error, input_error
 from railsim.text import LONGEST_FILE, shortened
 
 RESULTS = (".h5", ".hdf5")
@@ -115,7 +115,7 @@ def make_folder(folder: Path) -> None:
 
 def _refuse(found: str, allowed: str, option: str = "--out", *, parameter: str = "path") -> None:
     if found:
-        raise InputError([argument_fault(parameter, "", found, allowed, option)]) from None
+        raise argument_error(parameter, found, allowed, option=option) from None
 
 
 def _unwritable(folder: Path) -> str:

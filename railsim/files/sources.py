@@ -268,8 +268,7 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
     base_path = find_file(base_name, kind, beside=path)
     if base_path.resolve() in chain:
         names = " -> ".join(p.name for p in (*chain, base_path))
-        fault = Fault(str(path), "extends", f"a circle: {names}", "a chain with an end")
-        raise InputError([fault])
+        raise input_error(str(path), f"a circle: {names}", "a chain with an end", key="extends")
     if len(chain) > LONGEST_CHAIN:
         found = f"the {len(chain)}th file in a chain"
         raise input_error(str(path), found, f"{LONGEST_CHAIN} at most", key="extends")

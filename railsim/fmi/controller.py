@@ -8,14 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from railsim.errors import (
-    InputError,
-    argument_error,
-    argument_fault,
-    input_error,
-    nearest,
-    optional_package,
-)
+from railsim.errors import argument_error, input_error, nearest, optional_package
 from railsim.simulation import Simulation
 
 
@@ -141,5 +134,6 @@ def _value(simulation: Simulation, at: str) -> float:
         return float(np.asarray(value)[tuple(int(i) for i in indices)])
     except (IndexError, ValueError, TypeError):
         shape = np.shape(value)
-        fault = argument_fault("inputs", at, "no such member", f"indices within {shape}")
-        raise InputError([fault]) from None
+        raise argument_error(
+            "inputs", "no such member", f"indices within {shape}", key=at
+        ) from None

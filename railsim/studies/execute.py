@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from railsim.errors import InputError, ModelError, RailsimError, argument_error, argument_fault
+from railsim.errors import ModelError, RailsimError, argument_error
 from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
@@ -312,8 +312,7 @@ def cluster(address: str) -> Any:
         return Client(address)
     except (OSError, ValueError) as error:
         found = f"no scheduler answers at {address} ({error})"
-        fault = argument_fault("scheduler", "", found, "such as tcp://host:8786")
-        raise InputError([fault]) from None
+        raise argument_error("scheduler", found, "such as tcp://host:8786") from None
 
 
 def machines_that_compile(client: Any) -> int:

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self, overload
 
-from railsim.errors import InputError, argument_fault, input_error
+from railsim.errors import argument_error, input_error
 from railsim.files.access import locked
 from railsim.studies.records import Record, json_bytes
 
@@ -77,8 +77,7 @@ class Journal:
             if not locked(self._handle):
                 self.close()
                 found = f"another study is writing into {folder}"
-                fault = argument_fault("out", "", found, "wait for it, or choose another folder")
-                raise InputError([fault])
+                raise argument_error("out", found, "wait for it, or choose another folder")
         self.entries: dict[str, Entry] = {}
         self.inputs: Mapping[str, Any] | None = None
         self.damaged = 0

@@ -18,7 +18,7 @@ import tomli_w
 from railsim.definitions.loading import load_study
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
-from railsim.errors import Fault, InputError, argument_error, argument_fault
+from railsim.errors import argument_error, input_error
 from railsim.files import sources
 from railsim.files.access import check_folder, is_file, make_folder, read_text, write_text
 from railsim.files.overrides import apply_overrides, split_overrides
@@ -175,8 +175,7 @@ def optimise(
     """
     definition = file if isinstance(file, Study) else load_study(file)
     if definition.optimise is None:
-        fault = Fault(str(file), "optimise", "missing", "needed: variables and objectives")
-        raise InputError([fault])
+        raise input_error(str(file), "missing", "needed: variables and objectives", key="optimise")
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
     replaced = {name: value for name, value in changes.items() if value is not None}
     wanted = _changed(definition.optimise, replaced)
@@ -249,8 +248,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         chosen = front[knee(values[order])]
     if choose is not None:
         if not 1 <= choose <= len(designs):
-            fault = argument_fault("choose", "", f"design {choose}", f"1 to {len(designs)}")
-            raise InputError([fault])
+            raise argument_error("choose", f"design {choose}", f"1 to {len(designs)}")
         chosen = designs[choose - 1]
     names = [name_of(one) for one in (*wanted.objectives, *wanted.constraints)]
     found = Optimisation(

@@ -11,7 +11,7 @@ from itertools import product
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import needs_run
 from railsim.definitions.study.definition import value_texts
-from railsim.errors import Fault, Faults, InputError, argument_error, argument_fault, input_error
+from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.studies.case import Case, Loader, run_labels, run_name
 from railsim.studies.points import Fingerprints, Point, check_number, point_key
 from railsim.studies.rows import PERMITTED, Row, made_rows
@@ -180,8 +180,7 @@ def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
     key, equals, written = text.partition("=")
     values = [value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written)]
     if not (equals and key.strip() and all(values)):
-        fault = argument_fault("grid", text, "not understood", "allowed: key.path=a,b,c")
-        raise InputError([fault])
+        raise argument_error("grid", "not understood", "allowed: key.path=a,b,c", key=text)
     try:
         found = tuple(one for value in values for one in value_texts(value))
     except ValueError as error:

@@ -11,7 +11,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.study.analyses import Analysis, needs_run
 from railsim.definitions.study.definition import Sample
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.files.access import check_folder, is_file, make_folder, write_text
 from railsim.processes import available_cores
 from railsim.studies.carry_out import carry_out
@@ -170,10 +170,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
     check_folder(folder)
     retention(spec)  # refuses unknown quantities
     if spec.quantities and not needs_run(spec.analyses):
-        fault = argument_fault(
-            "quantities", "", "no analysis computes a run", 'add one of kind = "run"'
-        )
-        raise InputError([fault])
+        raise argument_error("quantities", "no analysis computes a run", 'add one of kind = "run"')
     plan = Plan(spec, execution.workers or available_cores())
     base = os.path.relpath(Path.cwd(), folder)
     outcome = carry_out(
@@ -199,8 +196,7 @@ def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
         index = folder / "study.json"
         if not is_file(index):
             found = f"no study in {folder} to resume"
-            fault = argument_fault("resume", "", found, "give `vehicles`, `tracks` and `speeds`")
-            raise InputError([fault])
+            raise argument_error("resume", found, "give `vehicles`, `tracks` and `speeds`")
         inputs = read_index(index).inputs
     else:
         refuse_too_many(data, str(folder / JOURNAL))
