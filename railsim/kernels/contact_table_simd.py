@@ -2,7 +2,7 @@
 
 Why this exists: a look-up adds 32 nodes of twelve fields, and of four of them the three gradients
 too.  Left to the compiler the sums of the gradients are scalars and the weights are worked out
-again for each patch; here every node is one register of four fields and one of eight, and all sums
+again for each patch; here every node is two registers, one with four fields twice, and all sums
 stay in registers.  Gain: docs/performance.md.  Any processor will do: the instructions are generic
 vectors that LLVM cuts to what it has.
 
@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from railsim.kernels.registers import INT, Registers
+from railsim.kernels.registers import INDEX, INT, Registers
 
 _GRADIENT, _VALUE = 4, 8  # fields with and without gradients
 
@@ -57,35 +57,37 @@ def _emit(builder, values, first, row, slab, weights, tw, out, begin):
     def offset(start, stride, count):
         return builder.add(start, builder.mul(stride, ir.Constant(INT, count)))
 
+    def mixed(a, b, mask):
+        return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, len(mask)), mask))
+
+    low, high = [0, 1, 2, 3], [4, 5, 6, 7]
     scalars = [builder.load(builder.gep(weights, [ir.Constant(INT, i)])) for i in range(16)]
-    w = [force.splat(scalar) for scalar in scalars]
-    w_patch = [patch.splat(scalar) for scalar in scalars[:4] + scalars[8:12]]
+    w = [patch.splat(scalar) for scalar in scalars]
+    # weights and, in the upper half, their slopes: of a node's force both are wanted
+    w_force = [mixed(w[k], w[4 + k], [*low, 8, 9, 10, 11]) for k in range(4)]
     slabs = []
     for j_w in range(2):
-        value = slope_y = slope_roll = of_patch = None
+        force_y = force_roll = of_patch = None
         for j_roll in range(4):
             start = offset(offset(first, slab, j_w), row, j_roll)
-            here = slope = there = None
+            here = there = None
             for k in range(4):
                 at = ahead(start, (_GRADIENT + _VALUE) * k)
                 node = force.load(values, at)
-                here = _add(force, w[k], node, here)
-                slope = _add(force, w[4 + k], node, slope)
-                there = _add(patch, w_patch[k], patch.load(values, ahead(at, _GRADIENT)), there)
-            value = _add(force, w[8 + j_roll], here, value)
-            slope_y = _add(force, w[8 + j_roll], slope, slope_y)
-            slope_roll = _add(force, w[12 + j_roll], here, slope_roll)
-            of_patch = _add(patch, w_patch[4 + j_roll], there, of_patch)
-        slabs.append((value, slope_y, slope_roll, of_patch))
+                here = _add(patch, w_force[k], mixed(node, node, low * 2), here)
+                there = _add(patch, w[k], patch.load(values, ahead(at, _GRADIENT)), there)
+            force_y = _add(patch, w[8 + j_roll], here, force_y)
+            force_roll = _add(patch, w[12 + j_roll], here, force_roll)
+            of_patch = _add(patch, w[8 + j_roll], there, of_patch)
+        slabs.append((force_y, force_roll, of_patch))
 
-    def between(registers, a, b):
-        return registers.fma(registers.splat(tw), builder.fsub(b, a), a)
-
-    value, slope_y, slope_roll = (
-        between(force, a, b) for a, b in zip(slabs[0][:3], slabs[1][:3], strict=True)
+    tw = patch.splat(tw)
+    force_y, force_roll, of_patch = (
+        patch.fma(tw, builder.fsub(b, a), a) for a, b in zip(*slabs, strict=True)
     )
-    force.store(value, out, begin)
-    patch.store(between(patch, slabs[0][3], slabs[1][3]), out, ahead(begin, _GRADIENT))
-    gradients = slope_y, slope_roll, builder.fsub(slabs[1][0], slabs[0][0])
-    for i, total in enumerate(gradients):
-        force.store(total, out, ahead(begin, _VALUE + _GRADIENT * (i + 1)))
+    difference = builder.fsub(slabs[1][0], slabs[0][0])
+    force.store(mixed(force_y, force_y, low), out, begin)
+    patch.store(of_patch, out, ahead(begin, _GRADIENT))
+    gradients = (force_y, high), (force_roll, low), (difference, low)
+    for i, (total, half) in enumerate(gradients):
+        force.store(mixed(total, total, half), out, ahead(begin, _VALUE + _GRADIENT * (i + 1)))

@@ -3,6 +3,8 @@
 The tables of names fix the order; `link_columns` and `mount_columns` read them for eight elements.
 """
 
+import numpy as np
+
 from railsim.kernels import compiled
 from railsim.kernels.lanes import load_rows, starts
 
@@ -76,3 +78,19 @@ def mount_columns(row, which):
         ((kx, ky, kz), (cx, cy, cz), (fx, fy, fz)),
         ((k1, k2, k3), (c1, c2, c3)),
     )
+
+
+def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """Mount, axis, internal state of all that is more than spring and damper, rising.
+
+    The state is -1 where there is none, or something else beside it.
+    """
+    other = curve >= 0
+    other[:, 2] |= flags[:, FRICTION] == ONE_SIDED
+    has_law = other | (internal >= 0)
+    return np.stack([*np.nonzero(has_law), np.where(other, -1, internal)[has_law]], axis=1)
+
+
+def falling_friction(friction: np.ndarray) -> np.ndarray:
+    """Mounts whose friction falls with the sliding speed."""
+    return np.flatnonzero((friction[:, :, 2] < 1.0).any(axis=1))

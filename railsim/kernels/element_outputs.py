@@ -9,7 +9,6 @@ from railsim.kernels.element_columns import TRANSLATES, link_columns, mount_colu
 from railsim.kernels.elements import (
     end_of,
     in_axes_of,
-    laws_before,
     link_law,
     other_laws,
     relative_motion,
@@ -80,9 +79,10 @@ def mount_output(system, work, inner, index, e, out):
     R1, R2, omega_1, omega_2, _, _, g, w = relative_motion(work.pose, one, two, point_1, point_2)
     if mounts.flags[index, TRANSLATES]:
         d, rate = in_axes_of(R1, omega_1, g, w)
-        begin = laws_before(mounts.law, 0, 3 * index)
-        block = (index, begin, laws_before(mounts.law, begin, 3 * index + 3))
-        more = other_laws(system, work, block, d, rate, inner)
+        law = 0
+        while law < mounts.law.shape[0] and mounts.law[law, 0] < index:
+            law += 1
+        more, _ = other_laws(system, work, (index, law, index + 1), d, rate, inner)
         force = plus(spring_damper(spring, d, rate), more)
         put(out, e, DEFLECTION, laws, d)
         put(out, e, FORCE, laws, force)

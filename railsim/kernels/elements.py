@@ -19,6 +19,7 @@ states (see `internal`).
 from math import exp, sqrt
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.element_columns import (
     BOTH_ENDS,
     DAMPING_Z,
@@ -145,9 +146,9 @@ def link_laws(system, work, first, n, inner):
         if m >= 0:
             force += inner[m]
             drive[m, 0] = rate
-        if links.curve[e, 0] >= 0:
+        if rarely(links.curve[e, 0] >= 0):
             force += spring_table(curves, links.curve[e, 0], laws[k], rate, laws)
-        if links.curve[e, 1] >= 0:
+        if rarely(links.curve[e, 1] >= 0):
             force += curve_value(curves, links.curve[e, 1], rate)
         laws[2 * LANES + k] = force
 
@@ -246,7 +247,7 @@ def axis_law(system, work, e, k, motion, inner):
         else:
             drive[m, 0] = rate
             force += inner[m]
-    if k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED:
+    if rarely(k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED):
         force += lifted_part(mounts, e, d, rate, normal)
         if laws[AHEAD] > 0.0:
             note_stop(laws, normal, pad_load(mounts, curves, e, d + laws[AHEAD] * rate))
@@ -285,15 +286,25 @@ def lifted_part(mounts, e, z, rate, normal):
 
 @compiled(python=False)
 def mount_laws(system, work, block, inner):
-    """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
-    mounts, laws = system.mounts, work.laws
-    first, law, end = block
-    for i in range(law, end):
-        e, k = mounts.law[i] // 3, mounts.law[i] % 3
+    """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces.
+
+    ``block``: first mount, first of `Mounts.law` and the mount after the last one.  Returns the
+    next of `Mounts.law`.
+    """
+    mounts, internal, laws = system.mounts, system.internal, work.laws
+    first, law, stop = block
+    while law < mounts.law.shape[0] and mounts.law[law, 0] < stop:
+        e, k, m = mounts.law[law, 0], mounts.law[law, 1], mounts.law[law, 2]
         lane = e - first
+        law += 1
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
+        if m >= 0 and internal.kind[m] != PAD and internal.kind[m] != AIR:
+            work.drive[m, 0] = rate
+            laws[(6 + k) * LANES + lane] = inner[m]
+            continue
         normal = pad_load(mounts, system.curves, e, laws[2 * LANES + lane])
         laws[(6 + k) * LANES + lane] = axis_law(system, work, e, k, (d, rate, normal), inner)
+    return law
 
 
 @compiled(inline=True)
@@ -311,27 +322,16 @@ def spring_damper(law, d, rate):
 
 @compiled(inline=True)
 def other_laws(system, work, block, d, rate, inner):
-    """Forces of internal states and tables of a block of mounts, see `mount_laws`.
-
-    ``block``: first mount, first of `Mounts.law` and the one after the last.
-    """
+    """Forces of internal states and tables of a block of mounts, and what `mount_laws` returns."""
     laws = work.laws
     zero = spread(0.0)
     for k in range(3):
         store_lanes(laws, k * LANES, d[k])
         store_lanes(laws, (3 + k) * LANES, rate[k])
         store_lanes(laws, (6 + k) * LANES, zero)
-    mount_laws(system, work, block, inner)
-    return load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
-
-
-@compiled(inline=True)
-def laws_before(law, begin, stop):
-    """End of the entries of `Mounts.law` from `begin` on that are below `stop`."""
-    end = begin
-    while end < law.shape[0] and law[end] < stop:
-        end += 1
-    return end
+    law = mount_laws(system, work, block, inner)
+    forces = load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
+    return forces, law
 
 
 @compiled(inline=True)
@@ -396,7 +396,7 @@ def mount_forces(system, work, inner):
     """
     mounts, pose = system.mounts, work.pose
     count = mounts.body.shape[0]
-    end = 0
+    law = 0
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
         which = eight_from(first, count)
@@ -404,15 +404,14 @@ def mount_forces(system, work, inner):
         for e in range(first, first + n):
             both_ends |= mounts.flags[e, BOTH_ENDS]
             rotates |= mounts.flags[e, ROTATES]
-        law, end = end, laws_before(mounts.law, end, 3 * (first + n))
         one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
         point_1, point_2, share, spring, rotation = mount_columns(mounts.row, which)
         R1, R2, omega_1, omega_2, a, b, g, w = relative_motion(pose, one, two, point_1, point_2)
         d, rate = in_axes_of(R1, omega_1, g, w)
         t = spring_damper(spring, d, rate)
-        if law < end:
-            block = (first, law, end)
-            t = plus(t, other_laws(system, work, block, d, rate, inner))
+        if law < mounts.law.shape[0] and mounts.law[law, 0] < first + n:
+            forces, law = other_laws(system, work, (first, law, first + n), d, rate, inner)
+            t = plus(t, forces)
         f = rotate(R1, times(share[0], t))
         moment_1 = cross(g, f)
         moment_2 = spread(0.0), spread(0.0), spread(0.0)

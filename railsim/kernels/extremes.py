@@ -8,7 +8,9 @@ smallest one; columns the quantities of each wheelset.
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
+from railsim.kernels.lanes import LANES, any_beyond, larger, load_lanes, smaller, spread
 from railsim.kernels.rails import against_rails
 from railsim.kernels.support import SUPPORT_SIZE, support_begin
 from railsim.kernels.system import ARC_LENGTH, TIME, Z_0
@@ -72,7 +74,15 @@ def note_extremes(system, work, state):
             plane, w, y, z, roll, left_y, left_z, right_y, right_z
         )
         present[X_YAW] = state[b + 5]
-        for k in range(X_YAW + 1):
+        high, low = EXTREMES * (MAX * body.shape[0] + w), EXTREMES * (MIN * body.shape[0] + w)
+        beyond = spread(0.0)
+        for first in range(0, EXTREMES, LANES):
+            now = load_lanes(present, first)
+            most, least = load_lanes(extremes, high + first), load_lanes(extremes, low + first)
+            beyond = beyond + (larger(most, now) - most) + (least - smaller(least, now))
+        if not rarely(any_beyond(beyond, 0.0)):
+            continue
+        for k in range(EXTREMES):  # those without a quantity are 0
             value = present[k]
             if value > extremes[MAX, w, k]:
                 extremes[MAX, w, k] = value

@@ -21,6 +21,7 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.actuators import actuator_forces
+from railsim.kernels.branches import rarely
 from railsim.kernels.driving import (
     add_axle_torques,
     add_traction,
@@ -119,7 +120,7 @@ def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """
     for f in range(offset.shape[0]):
         cell[f], cell_u[f] = cell_of(track, s + offset[f])
-        if cell[f] < 0:
+        if rarely(cell[f] < 0):
             return END_OF_TRACK
     track_frames(track, cell, cell_u, origin, frames)
     return RUNNING
@@ -405,7 +406,7 @@ def mechanics(system, work, state, derivative, rails):
     bodies = system.bodies
     n = bodies.kind.shape[0]
     time, s, speed = state[TIME], state[ARC_LENGTH], state[SPEED]
-    if not speed > STANDSTILL_SPEED:
+    if rarely(not speed > STANDSTILL_SPEED):
         return STANDSTILL, 0, 0
     status = locate_frames(
         system.track,
@@ -422,30 +423,30 @@ def mechanics(system, work, state, derivative, rails):
         work.watch[LOCATED] = np.nan
     if system.support.elastic:
         locate_support(system, work, s)
-    if bodies.fixed.shape[0] > 0:
+    if rarely(bodies.fixed.shape[0] > 0):
         turn_fixed(bodies, work.frames, state)
     kinematics(system, work, state)
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
     work.laws[AHEAD], work.laws[RATE_OF_STOPS] = work.watch[0], 0.0
     link_forces(system, work, inner)
-    if system.mounts.falling.shape[0] > 0:
+    if rarely(system.mounts.falling.shape[0] > 0):
         friction_at_speed(system, work)
     mount_forces(system, work, inner)
-    if system.actuators.body.shape[0] > 0:
+    if rarely(system.actuators.body.shape[0] > 0):
         where = actuator_forces(system, work, state, False)
         if where >= 0:
             return LAW_NOT_FINITE, where, 0
     hold_axleboxes(system, work, state)
-    if system.loads.body.shape[0] > 0:
+    if rarely(system.loads.body.shape[0] > 0):
         load_forces(system, work, time, s)
-    if system.actuators.body.shape[0] > 0:
+    if rarely(system.actuators.body.shape[0] > 0):
         where = actuator_forces(system, work, state, True)
         if where >= 0:
             return LAW_NOT_FINITE, where, 0
-    if system.drives.body.shape[0] > 0:
+    if rarely(system.drives.body.shape[0] > 0):
         add_axle_torques(system, work, state)
-    if system.drive.mode == FREE:
+    if rarely(system.drive.mode == FREE):
         add_traction(system, work, speed)
     work.parts[EVALUATIONS] += 1
     left = evaluations(system, state, rails)
@@ -469,10 +470,10 @@ def mechanics(system, work, state, derivative, rails):
         return status, where, n_patches
     dynamics(system, work, state, derivative)
     rate = speed_change(system, work, state, derivative)
-    if rate != 0.0:
+    if rarely(rate != 0.0):
         apply_speed_change(system, work, state, rate, derivative)
     hold_reference(bodies, work, derivative)
-    if bodies.fixed.shape[0] > 0:
+    if rarely(bodies.fixed.shape[0] > 0):
         hold_fixed(bodies, work, speed, rate, derivative)
     derivative[TIME] = 1.0
     derivative[ARC_LENGTH] = speed

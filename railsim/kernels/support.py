@@ -22,6 +22,7 @@ chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.lanes import (
@@ -146,7 +147,7 @@ def locate_support(system, work, s):
         work.support_step[w, SKIP] = 0.0
         work.support_step[w, PADS] = 1.0
         work.support_step[w, BALLAST] = 1.0
-        if system.support.variation.shape[0] > 0:
+        if rarely(system.support.variation.shape[0] > 0):
             f = system.bodies.frame[system.contact.body[w]]
             factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
 

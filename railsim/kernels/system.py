@@ -24,7 +24,7 @@ import numpy as np
 
 from railsim.kernels.commands import Actuators, Controllers, Own, Signals
 from railsim.kernels.contact_table import RailTables
-from railsim.kernels.element_columns import FRICTION, LINK_COLUMNS, MOUNT_COLUMNS, ONE_SIDED
+from railsim.kernels.element_columns import LINK_COLUMNS, MOUNT_COLUMNS
 from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
 from railsim.kernels.record import record
@@ -229,7 +229,7 @@ class Mounts(NamedTuple):
     curve : int64[e, 3]          tables of force over deflection, else -1
     flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
                                  part, friction pads (`ONE_SIDED` where they may lift)
-    law : int64[l]               see `mount_laws`
+    law : int64[l, 3]            see `mount_laws`
     falling : int64[f]           mounts whose friction falls with the sliding speed
     """
 
@@ -271,18 +271,6 @@ class Mounts(NamedTuple):
     def rotation_damping(self) -> np.ndarray:
         """Dampings about the axes, shape (e, 3) [N m s]."""
         return self.row[:, MOUNT_COLUMNS["rotation_damping"]]
-
-
-def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    """3 times the mount plus the axis, rising, of all that is more than spring and damper."""
-    has_law = (internal >= 0) | (curve >= 0)
-    has_law[:, 2] |= flags[:, FRICTION] == ONE_SIDED
-    return np.flatnonzero(has_law)
-
-
-def falling_friction(friction: np.ndarray) -> np.ndarray:
-    """Mounts whose friction falls with the sliding speed."""
-    return np.flatnonzero((friction[:, :, 2] < 1.0).any(axis=1))
 
 
 @record

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.controllers import control
 from railsim.kernels.division import begin_division, prepare_steps, striking
 from railsim.kernels.extremes import note_extremes, note_unloaded
@@ -48,6 +49,11 @@ class Chunk(NamedTuple):
 @compiled(python=False)
 def first_not_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
+    total = 0.0
+    for k in range(state.shape[0]):
+        total += 0.0 * state[k]
+    if not rarely(total != 0.0):
+        return -1
     for k in range(state.shape[0]):
         if not np.isfinite(state[k]):
             return k
@@ -93,7 +99,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                 if step % chunk.every == 0:
                     record_row(recorder, rows, system, state, derivative, work, patches)
                     rows += 1
-                if system.signals.which.shape[0] + system.controllers.which.shape[0] > 0:
+                if rarely(system.signals.which.shape[0] + system.controllers.which.shape[0] > 0):
                     status, where = control(system, work, state, derivative)
                     if status != RUNNING:
                         return status, where, step - chunk.first, rows

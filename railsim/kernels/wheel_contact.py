@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -156,7 +157,7 @@ def normal_contact(system, work, speed, state):
             predict_rate_changes(system, work, w, state)
         for side in range(2):
             status, n = wheel_contact(system, work, w, side, state, n)
-            if status != RUNNING:
+            if rarely(status != RUNNING):
                 return status, w, n
         # from the plane to the track's axes; -dU/ds instead of the force along the track
         f_y, f_z = force[b, 1], force[b, 2]
@@ -224,15 +225,17 @@ def wheel_contact(system, work, w, side, state, n):
     wheel = wheel_on_rail(work, w, side, state[SPEED])
     table = contact.table[w, side]
     bumpy = contact.surface_of.shape[0] > 0
-    highest = note_surfaces(system, work, state, w, side, wheel) if bumpy else 0.0
+    highest = 0.0
+    if rarely(bumpy):
+        highest = note_surfaces(system, work, state, w, side, wheel)
     for k in range(contact.rails.range_of.shape[0]):
         s, piece = place_on_rails(system, state, w, side, k, above[3])
-        if piece >= 0:
+        if rarely(piece >= 0):
             return wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n)
     where, iy, ir, iw, ty, tr, tw = locate(
         contact, table, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
     )
-    if where != INSIDE:
+    if rarely(where != INSIDE):
         return outside(contact, table, where, wheel, wheel.sign * above[8]), n
     if tw > 1.0:
         work.events[w, 4] += 1
@@ -246,7 +249,7 @@ def wheel_contact(system, work, w, side, state, n):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
-        if bumpy:
+        if rarely(bumpy):
             raise_gap(work.look_up, first, work.bump, patch, contact.shear[table])
         work.stiffness[patch] = work.look_up[first + 1]
         work.stiffness[N_PATCH + patch] = work.look_up[first + 2]
@@ -257,7 +260,7 @@ def wheel_contact(system, work, w, side, state, n):
     for patch in range(N_PATCH):
         if approach[patch] > -NEAR:
             n = patch_contact(system, work, w, side, patch, wheel, n)
-    if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, wheel.z):
+    if rarely(lift > LIFT_RANGE) and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
     return RUNNING, n
 
@@ -390,11 +393,12 @@ def patch_contact(system, work, w, side, patch, wheel, n):
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
         add_normal_force(work, contact.body[w], w, side, wheel, p, k, vertical)
-        # moment about the axle
-        work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_LEAD]
-        along = vertical * work.bump[patch, B_RISE]
-        work.rail_force[contact.body[w], 0] -= along
-        work.rail_force[contact.body[w], 5] += work.bump[patch, B_LEVER] * along
+        if rarely(contact.surface_of.shape[0] + contact.rails.range_of.shape[0] > 0):
+            # moment about the axle
+            work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_LEAD]
+            along = vertical * work.bump[patch, B_RISE]
+            work.rail_force[contact.body[w], 0] -= along
+            work.rail_force[contact.body[w], 5] += work.bump[patch, B_LEVER] * along
         cos_g = sqrt(cos_2)
         N = vertical / cos_g
         if N > 0.0:

@@ -24,6 +24,7 @@ the angle g > 0 where the normal leans to the right; on the wheel the opposite, 
 """
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.check_rails import add_check_rails
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
@@ -160,7 +161,7 @@ def wheel_rail(system, work, speed, state):
         if system.support.elastic and work.support_step[k, SKIP] > 0.0:
             continue
         complete_normal_force(system, work, b, state)
-    if system.contact.check.shape[0] > 0:
+    if rarely(system.contact.check.shape[0] > 0):
         add_check_rails(system, work, speed, state)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
@@ -171,18 +172,18 @@ def wheel_rail(system, work, speed, state):
     contact = system.contact
     patches = side_by_side(patch)
     kalker_lookup(n, patches, contact.kalker)
-    if contact.friction_law != 0:
+    if rarely(contact.friction_law != 0):
         own_friction(n, patches, patch[PATCH_SPEED], contact.friction_law, contact.friction_block)
-    elif contact.friction_rest < 1.0:
+    elif rarely(contact.friction_rest < 1.0):
         falling_friction(
             n, patches, patch[PATCH_SPEED], contact.friction_rest, contact.friction_decay
         )
-    if contact.transient != 0:
+    if rarely(contact.transient != 0):
         follow_creepages(system, work, n, state)
     creep_forces(n, contact.law, patches, work.creep)
     G = contact.law.k_adhesion * contact.law.G
     creep_slopes(n, patches, speed, G, patch[SLOPE_ALONG], patch[SLOPE_ACROSS])
-    if contact.transient != 0:
+    if rarely(contact.transient != 0):
         give_back_creepages(system, work, n, state)
     add_creep_forces(system, work, n, speed, state)
     return RUNNING, 0, n

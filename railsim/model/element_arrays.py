@@ -53,17 +53,11 @@ from railsim.kernels.element_columns import (
     MOUNT_COLUMNS,
     MOUNT_SIZE,
     ONE_SIDED,
-)
-from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, OWN, PAD, Internal
-from railsim.kernels.system import (
-    Curves,
-    Drives,
-    Links,
-    Loads,
-    Mounts,
     falling_friction,
     mount_laws,
 )
+from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, OWN, PAD, Internal
+from railsim.kernels.system import Curves, Drives, Links, Loads, Mounts
 from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
 
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}

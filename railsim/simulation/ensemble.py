@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.aligned import aligned
-from railsim.kernels.element_columns import BOTH_ENDS, ROTATES
+from railsim.kernels.element_columns import BOTH_ENDS, ROTATES, falling_friction, mount_laws
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.recording import Recorder
 from railsim.kernels.status import (
@@ -33,16 +33,7 @@ from railsim.kernels.status import (
     WRONG_SIDE,
     YAW_RANGE,
 )
-from railsim.kernels.system import (
-    N_SCALARS,
-    Bodies,
-    Contact,
-    Curves,
-    Mounts,
-    System,
-    falling_friction,
-    mount_laws,
-)
+from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, Mounts, System
 from railsim.model import rail_ranges
 from railsim.model.assembly import Model, per_wheelset, side_by_side
 from railsim.model.uneven_wheels import joined, rolling
