@@ -359,3 +359,53 @@ def test_eight_parameters_of_a_coach(tmp_path):
     error = one.x - np.log(list(keys.values()))
     assert np.all(np.abs(error) < 3.0 * one.deviations)
     assert np.all(np.abs(error[:3]) < 0.02)
+
+
+@pytest.mark.further
+def test_friction_of_a_curve_is_found_beside_a_stiffness(tmp_path):
+    """Wheel forces through R 250 m: 0.30 instead of 0.40, a primary stiffness 30 % off."""
+    keys = {"track.friction": 0.75, "primary.stiffness.x": 1.3}
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    true = Model(vehicle, track).with_parameters(
+        parsed(keys, vehicle, track), np.log(list(keys.values()))
+    )
+    outputs = {"quantities": ["distance", "Q", "Y"], "low_pass": {"frequency": 20.0}}
+    settings = railsim.Settings.model_validate({"output_rate": 200.0, "outputs": outputs})
+    run = railsim.simulate(
+        true.vehicle, true.track, speed=15.0, start=150.0, until=440.0, settings=settings
+    )
+    rng = np.random.default_rng(3)
+    columns, lines = {"t": run.time, "s": run.distance}, []
+    for w in (1, 2):
+        for side in ("left", "right"):
+            for name in "QY":
+                x = run.series(name, wheelset=w - 1, side=side)
+                noise = 0.02 * float(np.std(x))
+                columns[f"{name}{w}{side}"] = x + noise * rng.standard_normal(len(x))
+                lines.append(
+                    f'{name}{w}{side} = {{ quantity = "{name}:{w}:{side}", noise = {noise} }}'
+                )
+    np.savetxt(tmp_path / "run.csv", np.column_stack(list(columns.values())), delimiter=",",
+               header=",".join(columns), comments="")  # fmt: skip
+    (tmp_path / "run.toml").write_text(
+        'format = "railsim-measurement/1"\nname = "run"\nfile = "run.csv"\nspeed = 15.0\n'
+        '[channels]\nt = { quantity = "time" }\ns = { quantity = "distance" }\n' + "\n".join(lines)
+    )
+    one = railsim.identify(
+        vehicle, tmp_path / "run.toml", list(keys), track=track, band=(0.1, 5.0), workers=1,
+        place=False,
+    )  # fmt: skip
+    assert np.all(np.abs(one.x - np.log(list(keys.values()))) < 3.0 * one.deviations)
+    assert one.factors == pytest.approx(list(keys.values()), rel=0.02)
+    assert all(channel.is_white for channel in one.channels)
+
+
+def test_a_stretched_arc_length_is_said(tmp_path):
+    """A counter 0.3 % off: the parameters are found all the same, and the counter is named."""
+    path = measured(tmp_path, quarter(), FACTORS)
+    rows = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
+    rows[:, 1:3] *= 1.003
+    head = (tmp_path / "run.csv").read_text().partition("\n")[0]
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=head, comments="")
+    one = railsim.identify(quarter(), path, [PRIMARY, SECONDARY], band=(0.5, 14.0), workers=1)
+    assert any("stretched by -3.0" in words for words in one.remarks)
