@@ -16,9 +16,9 @@ from railsim.studies.execute import (
     Job,
     batches,
     cluster,
+    compile_on_cluster,
     in_processes,
     in_this_process,
-    machines_that_compile,
     on_cluster,
 )
 from railsim.studies.journal import JOURNAL, Journal
@@ -104,9 +104,7 @@ def _computed(jobs: Sequence[Job], client: Any, execution: Execution) -> Iterabl
     progress = execution.progress or (lambda _: None)
     if client is not None:
         threads = sum(client.nthreads().values())
-        if machines := machines_that_compile(client):
-            text = f"machines of the cluster that compile first, once, about a minute: {machines}"
-            (execution.on_remark or _LOG.warning)(text)
+        compile_on_cluster(client, execution.on_remark or _LOG.warning)
         return on_cluster(batches(jobs, execution.together, max(1, threads)), client, progress)
     count = execution.workers or available_cores()
     work: Sequence[Batch] = batches(jobs, execution.together, count)

@@ -27,12 +27,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from railsim.definitions.loading import load_track, load_vehicle
 from railsim.errors import ModelError, RailsimError, argument_error
 from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
+from railsim.simulation import simulate
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.records import Record
@@ -315,10 +317,25 @@ def cluster(address: str) -> Any:
         raise argument_error("scheduler", found, "such as tcp://host:8786") from None
 
 
-def machines_that_compile(client: Any) -> int:
-    """Return the number of machines of a dask cluster that compile before their first run."""
+def run_briefly() -> None:
+    """Load the compiled kernels, or compile them, by a run of two steps without remarks."""
+    logging.disable()
+    try:
+        coach, track = load_vehicle("coach_manchester"), load_track("straight")
+        simulate(coach, track, speed=20.0, duration=0.01)
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def compile_on_cluster(client: Any, remark: Callable[[str], None]) -> None:
+    """Have one worker of each machine of a dask cluster compile, before the others need it."""
     ready = client.run(is_compiled, on_error="ignore")  # by the addresses of the workers
-    return len({urlsplit(address).hostname for address, is_ready in ready.items() if not is_ready})
+    first = {urlsplit(address).hostname: address for address, known in ready.items() if not known}
+    if first:
+        remark(f"machines of the cluster that compile first, once, about a minute: {len(first)}")
+        options = {"allow_other_workers": True, "pure": False}  # where one dies
+        runs = [client.submit(run_briefly, workers=[one], **options) for one in first.values()]
+        client.gather(runs, errors="skip")
 
 
 def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:

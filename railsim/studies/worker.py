@@ -3,13 +3,10 @@
 The code is loaded at the first call of each kernel, by a run of two steps.
 """
 
-import logging
 import sys
 from types import TracebackType
 
-from railsim.definitions.loading import load_track, load_vehicle
-from railsim.simulation import simulate
-from railsim.studies.execute import is_compiled
+from railsim.studies.execute import is_compiled, run_briefly
 
 # what a worker meets whose study has ended while it began: no semaphores, no inputs
 STUDY_HAS_ENDED = (FileNotFoundError, EOFError, ConnectionError)
@@ -25,14 +22,8 @@ def report_unless_ended(
 
 def load_compiled_code() -> None:
     """Load the compiled kernels if they exist; otherwise the first worker compiles them."""
-    if not is_compiled():
-        return
-    logging.disable()  # an auxiliary run: its remarks are not reported
-    try:
-        coach, track = load_vehicle("coach_manchester"), load_track("straight")
-        simulate(coach, track, speed=20.0, duration=0.01)
-    finally:
-        logging.disable(logging.NOTSET)
+    if is_compiled():
+        run_briefly()
 
 
 sys.excepthook = report_unless_ended  # inherited by the copies of the server

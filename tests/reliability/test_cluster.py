@@ -9,7 +9,7 @@ import pytest
 import railsim
 from railsim.result import open_run
 from railsim.studies.case import load_case
-from railsim.studies.execute import Job, machines_that_compile, perform_there
+from railsim.studies.execute import Job, compile_on_cluster, perform_there
 from railsim.studies.spec import RunSpec
 
 distributed = pytest.importorskip("distributed")
@@ -37,13 +37,23 @@ def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
     assert open_run(tmp_path / "here.h5").status == "complete"
 
 
-def test_machines_that_compile_are_counted_each_once():
+def test_one_worker_of_each_machine_compiles_before_the_others_begin():
     class Client:
+        first, told = [], []
+
         def run(self, function, **_):
             ready = {"tcp://one:1": False, "tcp://one:2": False, "tcp://two:1": False}
             return {**ready, "tls://three:1": True}
 
-    assert machines_that_compile(Client()) == 2
+        def submit(self, function, workers, **_):
+            self.first += workers
+
+        def gather(self, runs, errors):
+            assert self.told == [2]
+
+    client = Client()
+    compile_on_cluster(client, lambda text: client.told.append(int(text.split()[-1])))
+    assert [address[:9] for address in client.first] == ["tcp://one", "tcp://two"]
 
 
 @pytest.mark.slow
