@@ -17,7 +17,7 @@ from railsim.definitions import Track
 from railsim.definitions.section_files import SectionList
 from railsim.definitions.track.rail_sections import RailSections
 from railsim.definitions.vehicle.flatten import FlatVehicle
-from railsim.errors import ModelError
+from railsim.errors import ModelError, input_error
 from railsim.kernels.contact_table import N_FIELD, N_PATCH, RailTables
 from railsim.profiles.profile import Profile
 
@@ -128,7 +128,12 @@ def _range(
     positions = np.array([contour.s for contour in part.contours])
     sections = SectionList(positions, contours, np.zeros((len(contours), 0)))
     y, z = contours[0]
-    face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face
+    try:
+        face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face
+    except ValueError as error:
+        raise input_error(
+            "track", f"{error} in the first section", "14 mm, or a number", "sections.gauge_face"
+        ) from error
     return Range(
         sections=sections,
         begin=round(part.begin - part.shift, 9),

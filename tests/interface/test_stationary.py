@@ -108,3 +108,8 @@ def test_without_service_table_a_cant_is_asked_for():
     coach = railsim.load_vehicle("coach_manchester").replace(service=None)
     with pytest.raises(railsim.InputError, match="give `cant`"):
         stationary(coach, railsim.load_track("straight"), load_stationary_limits("stationary"))
+
+
+def test_check_rails_are_left_out_with_a_remark(capsys):
+    assert main([*COACH, "--track", "depot_r150_check_rail"]) == 0
+    assert "check rails and sections of rails left out" in capsys.readouterr().out

@@ -115,7 +115,7 @@ def test_transfer_from_wing_to_nose(wheel, equal):
 
     Across, 350 N of 10 kN: CONTACT takes the angle of the wing's surface 0.2 mm beside the first
     contact, 0.097; the force here is the gradient of the energy, and on the wheel's cone of 1:15
-    it has the angle 0.067.
+    it has the angle 0.067 (`test_force_across_is_that_of_the_wheels_cone`).
     """
     rows = rows_of("crossing_s239_dev.csv")
     both = [row for row in rows if 0.85 <= row["y_mm"] <= 1.09]
@@ -130,6 +130,29 @@ def test_transfer_from_wing_to_nose(wheel, equal):
         assert 1e3 * patch[column.C_X] == pytest.approx(row["xcp_tr_mm"], abs=0.5)
         y = 1e3 * (patch[column.C_Y] + ASIDE) + row["y_mm"]
         assert y == pytest.approx(row["ycp_tr_mm"] + 1e3 * ASIDE, abs=0.5)
+
+
+def test_force_across_is_that_of_the_wheels_cone(wheel, equal):
+    """CONTACT's patch forces, the wing's at the angle of the cone of 1:15: within 100 N.
+
+    A cone that goes sideways by dy is one that sinks by dy/15, whatever the rail: without friction
+    its lateral force is 1/15 of its vertical one. CONTACT's 0.096 to 0.101 are the rail's alone.
+    """
+    tread = load_profile("S1002", kind="wheel")
+    slope = np.diff(np.interp(1e-3 * np.arange(33.0, 46.0), tread.y, tread.z)) / 1e-3
+    np.testing.assert_allclose(slope, -1.0 / 15.0, atol=1e-5)
+    rows = [row for row in rows_of("crossing_s239_dev.csv") if 0.81 <= row["y_mm"] <= 1.09]
+    for y in sorted({row["y_mm"] for row in rows}):
+        across = 0.0
+        for row in rows:
+            if row["y_mm"] == y:
+                on_wing = row["patch"] == 1
+                if on_wing:
+                    assert 33.0 < row["ycp_rail_mm"] - y < 45.0
+                angle = np.arctan(1.0 / 15.0) if on_wing else -row["deltcp_rad"]
+                across += row["patch_Fs_N"] * np.cos(angle) + row["Fn_N"] * np.sin(angle)
+        _, force, _ = wheel.under(10e3, 239.0, y + equal - 0.975)
+        assert force[1] == pytest.approx(across, abs=100.0)
 
 
 def test_heights_along_the_wing(wheel):

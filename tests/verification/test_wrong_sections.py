@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from railsim.definitions.loading import load_track
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.errors import InputError
+from railsim.model.assembly import assemble
 
 PLACES = np.round(np.linspace(0.0, 2.0, 21), 9)
 Y = np.linspace(-0.035, 0.035, 40)
@@ -54,3 +55,10 @@ def test_wrong_sections_are_refused(tmp_path, sections, said):
 def test_gap_is_remarked(tmp_path):
     (remark,) = loaded(tmp_path, rows()[:7] + rows()[13:]).unusual()
     assert "no section from 50.6 to 51.3 m: the rail between is blended" in str(remark)
+
+
+def test_first_section_without_a_gauge_face_is_named(tmp_path):
+    """These sections end 12 mm below the top: found where contact tables are made."""
+    track = loaded(tmp_path, rows())
+    with pytest.raises(InputError, match="gauge_face: the gauge side ends 12"):
+        assemble(load_vehicle("coach_manchester"), track, load_settings())
