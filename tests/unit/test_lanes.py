@@ -134,6 +134,10 @@ def test_two_of_each_pair_stand_side_by_side_and_the_last_pair_fills_up():
     assert eight_in_pairs.py_func(4, 6) == (8, 9, 10, 11, 10, 11, 10, 11)
 
 
+def test_neighbours_of_plain_lanes():
+    np.testing.assert_array_equal(lanes_plain.beside(np.arange(8)), [1, 0, 3, 2, 5, 4, 7, 6])
+
+
 def test_plain_functions_have_the_names_of_the_compiled_ones():
     from railsim.kernels import lanes
 

@@ -1,0 +1,46 @@
+"""Patches after Kik and Piotrowski alone: a circle in closed form, and mirror images."""
+
+import numpy as np
+import pytest
+
+from railsim.contact.table import strip_influence
+from railsim.kernels.non_elliptic import kik_piotrowski
+from railsim.kernels.table_slice import Zone
+
+E_STAR, DELTA, VIRTUAL = 1.1e11, 80e-6, 0.55
+
+
+def zone(y, h, radius):
+    """Candidates at `y` with the gap `h` over a rail that is level."""
+    width = np.gradient(y)
+    fields = dict.fromkeys(Zone._fields, np.ones(len(y)))
+    more = {"h": h, "du": width, "length": width, "c_y": y, "c_z": 0.0 * y, "slope": 0.0 * y}
+    both = {name: np.zeros((1, len(y))) for name in ("wheel_curvature", "rail_curvature")}
+    node = np.zeros(len(y), dtype=np.int64)
+    return Zone(**{**fields, **more, **both, "radius": radius, "node": node})
+
+
+def patch(of, centre=0.0):
+    return kik_piotrowski(of, 0, len(of.h), centre, DELTA, E_STAR, strip_influence())
+
+
+def test_circle_is_the_closed_form():
+    """x_l^2 = a^2 - s^2: I1 = 2 pi/3 a^3, I2 = pi^2 a^2/2, hence N = 4/3 E* delta a."""
+    R = 0.3
+    a = np.sqrt(VIRTUAL * DELTA * 2.0 * R)
+    y = np.linspace(-1.2 * a, 1.2 * a, 481)
+    found = patch(zone(y, 0.5 * y**2 / R, R + 0.0 * y))
+    assert found[0] == pytest.approx(4.0 / 3.0 * E_STAR * DELTA * a, rel=5e-3)
+    assert found[1:] == pytest.approx((a, a), rel=5e-3)
+
+
+def test_mirrored_contour_has_the_same_patch():
+    """A contour that curves more to one side, its candidates closer there."""
+    y = np.linspace(-0.004, 0.009, 301)
+    y = y + 0.04 * y * np.abs(y) / 0.009
+    y = np.sort(y)
+    h = np.where(y < 0.0, 60.0, 4.0) * y**2
+    one = zone(y, h, 0.46 + 5.0 * y)
+    other = zone(-y[::-1], h[::-1], one.radius[::-1].copy())
+    assert patch(one)[0] > 1e3
+    np.testing.assert_allclose(patch(other), patch(one), rtol=1e-9)
