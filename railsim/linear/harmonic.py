@@ -20,13 +20,13 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.errors import ModelError, argument_error
 from railsim.linear.coordinates import FreeVehicle
+from railsim.notation import ROLL, Y, Z
 
 ANGLES = 24
 BALANCED = 1e-2  # N and N m, of a wheelset's vertical force and roll moment
 MOST_ITERATIONS = 15
 SLOW = 0.1  # ratio of two residuals from which on slopes are formed again
 STEP = 1e-8  # m and rad
-Y, Z, ROLL = 1, 2, 3
 
 
 class ContactPath:

@@ -54,7 +54,7 @@ from railsim.model.preloads import least_squares, with_preloads, with_these_prel
 from railsim.model.solutions import solution
 from railsim.model.time_step import empty_recorder, observed
 from railsim.model.work import components_of, level_track, work_arrays
-from railsim.notation import COMPONENTS, SIDES
+from railsim.notation import COMPONENTS, ROLL, SIDES, YAW, Z
 
 RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
 ONE_SIDED = 0.01  # least friction of a rail in the balance, as a share of the other's
@@ -192,7 +192,7 @@ def _first_guess(model: Model, level: System) -> Floats:
         touching = [node[np.argmin(node[:, 0])] for node in nodes]
         # at 60 um, what some 50 kN make
         stiffness = sum(float(node[K] + 0.008 * node[K2]) for node in touching)
-        state[6 * body + 2] = gap + (weight / stiffness) ** (2.0 / 3.0)
+        state[6 * body + Z] = gap + (weight / stiffness) ** (2.0 / 3.0)
     _sink(level, state, weight)
     return state
 
@@ -208,7 +208,7 @@ def _sink(level: System, state: Floats, weight: float) -> None:
     track[:, 1:RAIL_DOF:2] = rail
     track[:, RAIL_DOF + 1] = sleeper
     for body in level.bodies.whole:
-        state[6 * body + 2] += rail
+        state[6 * body + Z] += rail
 
 
 def _tracks(system: System, state: Floats) -> Floats:
@@ -427,5 +427,5 @@ def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) 
             continue
         # positions relative to the frame are small: its rate of turn is that of the body
         rate = speed * frames[model.system.bodies.frame[body], OMEGA : OMEGA + 3]
-        state[6 * n + 6 * body + 3 : 6 * n + 6 * body + 6] += rate
+        state[6 * n + 6 * body + ROLL : 6 * n + 6 * body + YAW + 1] += rate
     return state

@@ -34,6 +34,7 @@ from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
 from railsim.model.work import work_arrays
+from railsim.notation import ROLL, YAW
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.simulation.outputs import against_rails
@@ -429,11 +430,11 @@ class _Search:
         found.T_gamma[index] = wheel[:, :, W_T_GAMMA]
         found.contact_y[index] = _contact_positions(solver, len(wheelsets))
         found.lateral[index] = against_rails(self.model, state[None])[0, :, 0]
-        found.attack[index] = state[6 * wheelsets + 5]
+        found.attack[index] = state[6 * wheelsets + YAW]
         found.sum_Y[index] = Y.sum(axis=1)
-        found.steering[index] = state[[6 * b + 5 for b in frames]]
+        found.steering[index] = state[[6 * b + YAW for b in frames]]
         if self.parts.cars:
-            found.car_roll[index] = state[6 * self.parts.cars[0] + 3]
+            found.car_roll[index] = state[6 * self.parts.cars[0] + ROLL]
 
 
 def _remarks(model: Model) -> tuple[str, ...]:
