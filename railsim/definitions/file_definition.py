@@ -26,6 +26,8 @@ class FileDefinition(Definition):
 
     KIND: ClassVar[str]
     """Word for it: vehicle, track, settings."""
+    format: str
+    """Kind and version of the file"""
     OPEN_TABLES: ClassVar[tuple[str, ...]] = ()
     """Tables that an assignment makes where they are missing; their members are dotted names."""
 

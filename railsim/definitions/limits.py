@@ -309,7 +309,6 @@ class RunningLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-limits/1"]
-    """Kind and version of the file"""
     standard: Literal["en14363", "uic518"]
     """Which evaluation it belongs to"""
     edition: Text
@@ -354,7 +353,6 @@ class ComfortLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-comfort-limits/1"]
-    """Kind and version of the file"""
     edition: Text
     """Edition of the standard"""
     mean_comfort: Classes
@@ -391,7 +389,6 @@ class StationaryLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-stationary-limits/1"]
-    """Kind and version of the file"""
     edition: Text
     """Edition of the standards"""
     unloading: Value
@@ -428,7 +425,6 @@ class ValidationLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-validation-limits/1"]
-    """Kind and version of the file"""
     edition: Text
     """Edition of the standard"""
     sections: Count
@@ -445,7 +441,6 @@ class WheelLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-wheel-limits/1"]
-    """Kind and version of the file"""
     edition: Text
     """Edition of the standard"""
     flange_thickness: Value

@@ -147,7 +147,6 @@ class MeasurementFile(FileDefinition):
     KIND: ClassVar = "measurement"
 
     format: Literal["railsim-measurement/1"]
-    """Kind and version of the file"""
     name: Text
     """What the run is called in tables and plots"""
     source: Text | None = None

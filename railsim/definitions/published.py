@@ -36,7 +36,6 @@ class Published(FileDefinition):
     KIND: ClassVar = "published"
 
     format: Literal["railsim-published/1"]
-    """Kind and version of the file"""
     name: Text
     """What the study is called"""
     source: Text

@@ -147,7 +147,6 @@ class Settings(FileDefinition):
     OPEN_TABLES: ClassVar = ("initial",)
 
     format: Literal["railsim-settings/1"] = "railsim-settings/1"
-    """Kind and version of the file"""
     scheme: Literal["fast", "rk4"] = "fast"
     """Integration scheme: `fast`, or `rk4` as the reference"""
     step: Step | None = None

@@ -273,7 +273,6 @@ class TrailingArmSuspension(FileDefinition):
     OPEN_TABLES: ClassVar = ("loads",)
 
     format: Literal["railsim-spring/1"]
-    """Kind and version of the file"""
     name: Text = "trailing-arm primary suspension"
     """What the suspension is called in tables and plots"""
     source: Text | None = None

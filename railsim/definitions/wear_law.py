@@ -42,7 +42,6 @@ class WearLawFile(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-wear-law/1"]
-    """Kind and version of the file"""
     name: Text
     """How tables call it"""
     source: Text

@@ -256,7 +256,6 @@ class Mechanism(FileDefinition):
     KIND: ClassVar = "mechanism"
 
     format: Literal["railsim-mechanism/1"]
-    """Kind and version of the file"""
     name: Text = "mechanism"
     """What it is called in tables and plots"""
     source: Text | None = None

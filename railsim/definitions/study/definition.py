@@ -115,7 +115,6 @@ class Study(FileDefinition):
     OPEN_TABLES: ClassVar = ("grid",)
 
     format: Literal["railsim-study/1"]
-    """Kind and version of the file"""
     name: Text
     """What the study is called"""
     purpose: Text | None = None

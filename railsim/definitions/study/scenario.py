@@ -83,7 +83,6 @@ class Scenario(FileDefinition):
     KIND: ClassVar = "scenario"
 
     format: Literal["railsim-scenario/1"]
-    """Kind and version of the file"""
     name: Text
     """What the campaign is called"""
     purpose: Text | None = None

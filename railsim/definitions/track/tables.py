@@ -199,7 +199,6 @@ class TrackTables(FileDefinition):
     """Everything that the file of a track says."""
 
     format: Literal["railsim-track/1"]
-    """Kind and version of the file"""
     name: Text
     """What the track is called in tables and plots"""
     source: Text | None = None

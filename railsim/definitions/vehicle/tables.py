@@ -139,7 +139,6 @@ class VehicleTables(FileDefinition):
     """Everything that the file of a vehicle says."""
 
     format: Literal["railsim-vehicle/1"]
-    """Kind and version of the file"""
     name: Text
     """What the vehicle is called in tables and plots"""
     source: Text | None = None
