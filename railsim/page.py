@@ -65,12 +65,10 @@ def rendered(
         return files(package).joinpath(name).read_text(encoding="utf-8")
 
     environment = jinja2.Environment(
-        loader=jinja2.DictLoader({"base": BASE, "page": text(template)}),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        loader=jinja2.DictLoader({"base": BASE, "page": text(template)}), autoescape=True,
+        trim_blocks=True, lstrip_blocks=True,
         finalize=lambda value: printable(value) if type(value) is str else value,
-    )
+    )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     shown_styles, run_scripts = [*map(text, styles)], [*map(text, scripts)]
     policy = (

@@ -5,16 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.comfort import (
-    BLOCKS,
-    MeanComfort,
-    TransitionComfort,
-    block_rms,
-    event_comfort,
-    mean_comfort,
-    transition_comfort,
-    weighted_for_comfort,
-)
+from railsim.assessment import comfort
 from railsim.assessment.record import PIECE, Record
 from railsim.assessment.sperling import Direction, index_of_rms, sperling_mean_square
 from railsim.assessment.weighting import WK
@@ -37,10 +28,10 @@ class PointComfort:
 
     sensor: str
     place: float  # along the vehicle, from the reference body forwards [m]
-    mean: MeanComfort  # N_MV, N_VA, N_VD and the root mean squares of 5 s
+    mean: comfort.MeanComfort  # N_MV, N_VA, N_VD and the root mean squares of 5 s
     iso_rms: Floats  # weighted root mean squares after ISO 2631-1 along x, y, z [m/s2], float64[3]
     sperling: dict[str, float]  # wz ``lateral`` and ``vertical``
-    transitions: tuple[TransitionComfort, ...]
+    transitions: tuple[comfort.TransitionComfort, ...]
     events: dict[str, float]  # largest P_DE by posture [%]
     hunting: float = 0.0
 
@@ -93,17 +84,15 @@ def comfort_report(record: Record) -> list[PointComfort]:
     transitions = _transitions(record, columns)
     return [
         PointComfort(
-            name,
-            record.sensor_offset(name),
-            mean_comfort(np.concatenate(into.blocks), np.concatenate(into.back)),
+            name, record.sensor_offset(name),
+            comfort.mean_comfort(np.concatenate(into.blocks), np.concatenate(into.back)),
             np.sqrt(into.iso / into.count),
             {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
-            tuple(transitions[number]),
-            into.events,
+            tuple(transitions[number]), into.events,
             float(into.hunting / into.iso[1]) if frequency else 0.0,
         )
         for number, (name, into) in enumerate(zip(names, gathered, strict=True))
-    ]
+    ]  # fmt: skip
 
 
 class _Gathered:
@@ -124,11 +113,11 @@ class _Gathered:
 
     def add(self, a: Floats, counted: slice, rate: float) -> None:
         """Add a part: accelerations with margins, and which of them count."""
-        floor, back = weighted_for_comfort(a, rate)
-        blocks = block_rms(floor[counted], rate)
+        floor, back = comfort.weighted_for_comfort(a, rate)
+        blocks = comfort.block_rms(floor[counted], rate)
         if len(blocks):
             self.blocks.append(blocks)
-            self.back.append(block_rms(back[counted], rate))
+            self.back.append(comfort.block_rms(back[counted], rate))
         size = counted.stop - counted.start
         iso = np.column_stack([floor[:, 0], floor[:, 1], WK.weighted(a[:, 2], rate)])
         self.iso += np.sum(iso[counted] ** 2, axis=0)
@@ -139,12 +128,12 @@ class _Gathered:
             self.hunting += float(np.sum(near**2))
         for axis, way in enumerate(self.sperling, start=1):
             self.sperling[way] += size * sperling_mean_square(a[counted, axis], rate, way)
-        for posture, value in event_comfort(a[counted, 1], rate).items():
+        for posture, value in comfort.event_comfort(a[counted, 1], rate).items():
             self.events[posture] = max(self.events[posture], np.nan_to_num(value))
 
 
-def _transitions(record: Record, columns: list[int]) -> list[list[TransitionComfort]]:
-    found: list[list[TransitionComfort]] = [[] for _ in columns]
+def _transitions(record: Record, columns: list[int]) -> list[list[comfort.TransitionComfort]]:
+    found: list[list[comfort.TransitionComfort]] = [[] for _ in columns]
     names = list(record.sensors)
     for section in curvature_sections(record.result.track()):
         if section.type != "CLO":
@@ -159,7 +148,7 @@ def _transitions(record: Record, columns: list[int]) -> list[list[TransitionComf
             if s[0] > section.begin or s[-1] < section.end:
                 continue
             begin, end = np.interp([section.begin, section.end], s, time)
-            one = transition_comfort(time, a[:, column, 1], roll[:, column], begin, end)
+            one = comfort.transition_comfort(time, a[:, column, 1], roll[:, column], begin, end)
             if one is not None:
                 found[number].append(one)
     return found
@@ -180,4 +169,8 @@ def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
 def short_of_blocks(points: list[PointComfort]) -> str:
     """Sentence if there are fewer blocks than the standard requires; otherwise empty."""
     blocks = points[0].mean.blocks
-    return "" if blocks >= BLOCKS else f"{blocks} blocks of 5 s, EN 12299 requires {BLOCKS}"
+    return (
+        ""
+        if blocks >= comfort.BLOCKS
+        else f"{blocks} blocks of 5 s, EN 12299 requires {comfort.BLOCKS}"
+    )

@@ -90,12 +90,10 @@ def _kind(result: Result) -> tuple[str, ...]:
     friction = " / ".join(f"{mu:g}" for mu in dict.fromkeys(track.friction))
     rails = " / ".join(dict.fromkeys(track.rail))
     return (
-        (service.condition if service else None) or "",
-        vehicle.load or "",
-        ", ".join(dict.fromkeys(spectra)) or "smooth",
-        f"friction {friction}",
+        (service.condition if service else None) or "", vehicle.load or "",
+        ", ".join(dict.fromkeys(spectra)) or "smooth", f"friction {friction}",
         f"{rails}, inclination {track.inclination:g}, gauge {track.gauge:g} m",
-    )
+    )  # fmt: skip
 
 
 def _populations(runs: Mapping[str, Result]) -> dict[str, str]:

@@ -20,12 +20,10 @@ AT_ONCE = 20_000  # positions that are evaluated at once, to limit the memory fo
 # UIC 518 (2009): speed up to [km/h], QN1 and QN2 of alignment and level, standard deviations [mm],
 # from secondary sources
 QN = (
-    (80.0, (1.5, 1.8), (2.3, 2.6)),
-    (120.0, (1.2, 1.5), (1.8, 2.1)),
-    (160.0, (1.0, 1.3), (1.4, 1.7)),
-    (200.0, (0.8, 1.1), (1.2, 1.5)),
+    (80.0, (1.5, 1.8), (2.3, 2.6)), (120.0, (1.2, 1.5), (1.8, 2.1)),
+    (160.0, (1.0, 1.3), (1.4, 1.7)), (200.0, (0.8, 1.1), (1.2, 1.5)),
     (300.0, (0.7, 1.0), (1.0, 1.3)),
-)
+)  # fmt: skip
 
 
 class TrackQuality:

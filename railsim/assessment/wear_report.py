@@ -5,16 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.assessment import wear
 from railsim.assessment.record import START, Record
-from railsim.assessment.wear import (
-    DEFAULT_LAW,
-    LAWS,
-    YIELD_IN_SHEAR,
-    Patches,
-    WholeLifeRailModel,
-    surface_fatigue_index,
-    wear_law,
-)
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 from railsim.result.filters import StreamingPercentiles
@@ -58,9 +50,9 @@ def wear_report(
     record: Record,
     *,
     law: str | None = None,
-    model: WholeLifeRailModel | None = None,
+    model: wear.WholeLifeRailModel | None = None,
     all_forces: bool = False,
-    yield_in_shear: float = YIELD_IN_SHEAR,
+    yield_in_shear: float = wear.YIELD_IN_SHEAR,
 ) -> list[WheelWear]:
     """Wear and fatigue at all wheels.
 
@@ -70,7 +62,7 @@ def wear_report(
     [Pa].
     """
     record.need(["T_gamma", "xi_x"], "settings.outputs.quantities with T_gamma, xi_x")
-    model = model or WholeLifeRailModel()
+    model = model or wear.WholeLifeRailModel()
     flat = flatten(record.result.vehicle())
     radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])
     shape = radii.shape
@@ -79,13 +71,13 @@ def wear_report(
     damage: Floats = np.zeros((*shape, 1))
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
-    laws = dict(LAWS) if law is None else {law: wear_law(law)}
+    laws = dict(wear.LAWS) if law is None else {law: wear.wear_law(law)}
     needed = (*PATCHES, "patch_T_gamma")
     of_file = any(one.constants for one in laws.values())
     if of_file:
         record.need((*needed, "patch_friction"), "settings.outputs.contact_patches=true")
     patches = all(name in record.result for name in needed)
-    worn = {n: np.zeros(shape) for n in laws if patches or laws[n] is LAWS[DEFAULT_LAW]}
+    worn = {n: np.zeros(shape) for n in laws if patches or laws[n] is wear.LAWS[wear.DEFAULT_LAW]}
     way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
@@ -110,7 +102,7 @@ def wear_report(
         passes = np.where(against, model(each), 0.0) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
         speed = (way / np.gradient(record.time))[rows, None, None, None]
-        of_patches = Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
+        of_patches = wear.Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
         for name in worn:
             lost = laws[name].worn_area(of_patches)
             worn[name] += np.sum(lost.sum(axis=-1) * ways, axis=0)
@@ -139,7 +131,7 @@ def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
     N, a, b, T_x, T_y = (record.result.part(name, rows) for name in PATCHES)
     loaded = N > 0.0
     safe = np.where(loaded, N, 1.0)
-    index = surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b, k)
+    index = wear.surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b, k)
     ratio = np.hypot(T_x, T_y) / safe
     # k/p0 is T/N less the index
     pressure = 1.0 / np.where(loaded & (ratio > index), ratio - index, np.inf)

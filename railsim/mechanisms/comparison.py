@@ -30,12 +30,10 @@ def compare(results: Sequence[Analysis]) -> list[dict[str, Any]]:
         limited = [v for n, v in result.min_angles.items() if result.definition.angles[n].limited]
         row: dict[str, Any] = {
             "name": result.definition.name + (f", {result.case}" if result.case else ""),
-            "stroke": result.stroke,
-            "max_force": result.max_force,
-            "peak_force": result.peak_force,
+            "stroke": result.stroke, "max_force": result.max_force, "peak_force": result.peak_force,
             "length_start": float(result.output.get("length", [np.nan])[0]),
             "min_angle": min(limited, default=np.nan),
-        }
+        }  # fmt: skip
         if result.zone and "force" in result.zone["work"]:
             forces = [result.zone[k]["force"] for k in ("low", "work", "high")]
             row["work_force"] = forces[1]

@@ -10,14 +10,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.mechanism.expressions import Expression
 from railsim.definitions.mechanism.parts import AUTO
-from railsim.mechanisms.forces import (
-    Rates,
-    force_at_pressure,
-    generalised_force,
-    pressure_for,
-    rubs,
-    unit_work,
-)
+from railsim.mechanisms import forces
 from railsim.mechanisms.inversion import zeros
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.outputs import height_of
@@ -63,12 +56,12 @@ def positions_of_rest(dense: Motion) -> tuple[Rest, ...]:
     """Where a mechanism without an unknown rests under its own weights and elements."""
     if dense.model.definition.solve is not None:
         return ()
-    return rests(dense, lambda m, sense: generalised_force(m, Rates(friction=sense)))
+    return rests(dense, lambda m, sense: forces.generalised_force(m, forces.Rates(friction=sense)))
 
 
 def moved(motion: Motion) -> bool:
     """Whether weights or elements act on a mechanism at all."""
-    return bool(np.any(generalised_force(motion)))
+    return bool(np.any(forces.generalised_force(motion)))
 
 
 def rests(dense: Motion, force: Force) -> tuple[Rest, ...]:
@@ -81,7 +74,7 @@ def rests(dense: Motion, force: Force) -> tuple[Rest, ...]:
     model = dense.model
     if not np.any(force(dense, 0)):
         return ()
-    if rubs(model):
+    if forces.rubs(model):
         return _rest_ranges(dense, force)
     span = model.end - model.start
     low, high = sorted((model.start, model.end))
@@ -123,9 +116,9 @@ def _held_pressure(dense: Motion, work: float) -> float:
         return float(dense.model.number(stated))
     at = solve(dense.model, [work])
     _, r1, _ = at.point(definition.output.point)
-    wanted = dense.model.number(contact.force) * r1[:, 1] - generalised_force(at)
-    force = wanted / unit_work(at, definition.actuators[solve_for.unknown])
-    return float(pressure_for(at, solve_for.unknown, force)[0])
+    wanted = dense.model.number(contact.force) * r1[:, 1] - forces.generalised_force(at)
+    force = wanted / forces.unit_work(at, definition.actuators[solve_for.unknown])
+    return float(forces.pressure_for(at, solve_for.unknown, force)[0])
 
 
 def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> Contact | None:
@@ -140,9 +133,9 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     pressure = _held_pressure(dense, at_zone["work"])
 
     def generalised(positions: Motion, friction: int) -> Any:
-        push = force_at_pressure(positions, unknown, pressure)
-        work = unit_work(positions, definition.actuators[unknown])
-        return push * work + generalised_force(positions, Rates(friction=friction))
+        push = forces.force_at_pressure(positions, unknown, pressure)
+        work = forces.unit_work(positions, definition.actuators[unknown])
+        return push * work + forces.generalised_force(positions, forces.Rates(friction=friction))
 
     def force(positions: Motion, way: int) -> Floats:
         return np.asarray(generalised(positions, way * dense.model.sense) / height_of(positions)[1])

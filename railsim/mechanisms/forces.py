@@ -35,12 +35,7 @@ from railsim.definitions.mechanism.parts import (
 )
 from railsim.definitions.mechanism.values import body_name, points_of
 from railsim.kernels import linkage_motion as motion_kernel
-from railsim.mechanisms.components import (
-    AirSpringTable,
-    cylinder_area,
-    gas_spring_force,
-    table_value,
-)
+from railsim.mechanisms import components
 from railsim.mechanisms.kinematics import Motion, driver_words
 from railsim.mechanisms.model import Model, real
 
@@ -159,7 +154,7 @@ def _spring_law(
         assert spring.stiffness is not None
         return n(spring.stiffness) * (n(free) - x)
     rows = np.array([[real(n(q)) for q in row] for row in spring.table])
-    found = table_value(rows, x)
+    found = components.table_value(rows, x)
     outside = np.flatnonzero(np.isnan(_first_lane(motion, found)))
     if len(outside) and not rates.trial:
         turns = isinstance(spring, TorsionSpring)
@@ -188,7 +183,7 @@ def _gas_push(motion: Motion, name: str, gas: GasSpring, moved: Any, rates: Rate
     pulls = gas.acts == "traction"
     used = stroke - compressed if pulls else compressed
     F1, temperature = n(gas.F1), n(gas.temperature)
-    push = gas_spring_force(used, F1, n(gas.progression), stroke, gas.law, temperature)
+    push = components.gas_spring_force(used, F1, n(gas.progression), stroke, gas.law, temperature)
     if pulls:
         push = -push
     if rates.friction:
@@ -324,12 +319,12 @@ def check_dead_point(motion: Motion, name: str) -> Any:
     return effect
 
 
-def table_of(motion: Motion, spring: AirSpring) -> AirSpringTable:
+def table_of(motion: Motion, spring: AirSpring) -> components.AirSpringTable:
     """The table of an air spring."""
     n = motion.model.number
     heights, pressures = ([real(n(x)) for x in row] for row in (spring.heights, spring.pressures))
     forces = [[real(n(x)) for x in row] for row in spring.forces]
-    return AirSpringTable(np.array(heights), np.array(pressures), np.array(forces))
+    return components.AirSpringTable(np.array(heights), np.array(pressures), np.array(forces))
 
 
 def pressure_for(motion: Motion, name: str, force: Any) -> Any:
@@ -358,7 +353,7 @@ def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
 def chamber_area(model: Model, cylinder: Cylinder, acts: str) -> Any:
     """Area of the chamber that pushes or pulls, of all cylinders side by side [m2]."""
     n = model.number
-    return cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), acts)
+    return components.cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), acts)
 
 
 def applied(motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST) -> Any:

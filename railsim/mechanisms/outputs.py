@@ -11,19 +11,9 @@ from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism.values import ends
 from railsim.errors import Fault, Faults
+from railsim.mechanisms import forces
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.dynamics import driven_motion
-from railsim.mechanisms.forces import (
-    Rates,
-    actuator_force,
-    check_dead_point,
-    element_push,
-    generalised_force,
-    inertia,
-    pressure_for,
-    rubs,
-    table_of,
-)
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, driver_words, solve
 
@@ -63,7 +53,7 @@ def sampled(dense: Motion) -> Floats:
         return driven_motion(replace(dense, model=replace(model, definition=timed))).motion.s
     if name is None or pair is None or by == "time":
         raise model.refusal("sampling.by", f"'{by}'", "'time' needs a [motion]")
-    check_dead_point(dense, name)
+    forces.check_dead_point(dense, name)
     s = equal_lengths(dense, pair, dense.length(pair)[0][[0, -1]], count)
     s[0], s[-1] = model.start, model.end
     return s
@@ -89,7 +79,7 @@ def outputs(motion: Motion) -> dict[str, Any]:
         pair = ends(element)
         if pair is not None:
             found[f"{name}_length"] = motion.length(pair)[0]
-            found[f"{name}_force"] = element_push(motion, name)
+            found[f"{name}_force"] = forces.element_push(motion, name)
             if isinstance(element, GasSpring) and element.rod is not None:
                 area = 0.25 * np.pi * model.number(element.rod) ** 2
                 found[f"{name}_pressure"] = np.abs(found[f"{name}_force"]) / area
@@ -104,17 +94,17 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     model = motion.model
     definition = model.definition
     found: dict[str, Any] = {}
-    for way, sense in (("", 1), ("_back", -1))[: 2 if rubs(model) else 1]:
-        rates = Rates(friction=sense * model.sense)
-        found[f"force{way}"] = actuator_force(motion, unknown, rates)
+    for way, sense in (("", 1), ("_back", -1))[: 2 if forces.rubs(model) else 1]:
+        rates = forces.Rates(friction=sense * model.sense)
+        found[f"force{way}"] = forces.actuator_force(motion, unknown, rates)
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):
         for name, force in list(found.items()):
-            found[name.replace("force", "pressure")] = pressure_for(motion, unknown, force)
+            found[name.replace("force", "pressure")] = forces.pressure_for(motion, unknown, force)
     if definition.output is not None:
         along = motion.point(definition.output.point)[1][:, model.axis]
         with np.errstate(divide="ignore", invalid="ignore"):
-            found["effective_weight"] = -generalised_force(motion) / along
-            found["effective_mass"] = inertia(motion)[0] / along**2
+            found["effective_weight"] = -forces.generalised_force(motion) / along
+            found["effective_mass"] = forces.inertia(motion)[0] / along**2
     return found
 
 
@@ -142,7 +132,7 @@ def check_pressure(motion: Motion, output: Mapping[str, Any]) -> None:
         spring = definition.actuators[definition.solve.unknown]
         assert isinstance(spring, AirSpring)
         height = float(motion.length(spring.air_spring)[0][k])
-        reason = table_of(motion, spring).reason(height, float(output["force"][k]))
+        reason = forces.table_of(motion, spring).reason(height, float(output["force"][k]))
         where = f"driver at {driver_words(motion.model, float(motion.s[k]))}: {reason}"
         key = f"actuators.{definition.solve.unknown}"
         raise motion.model.refusal(key, where, "another range or table")

@@ -2,15 +2,8 @@
 
 import numpy as np
 
+from railsim.definitions.mechanism import parts
 from railsim.definitions.mechanism.faults import bounds_remarks
-from railsim.definitions.mechanism.parts import (
-    GasSpring,
-    HandForce,
-    HandTorque,
-    Link,
-    Prismatic,
-    Revolute,
-)
 from railsim.definitions.mechanism.values import body_name
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
@@ -37,7 +30,7 @@ def _forces(result: Analysis) -> list[str]:
         return []
     unknown = result.definition.actuators[solve_for.unknown]
     least = runs_ahead(result)
-    if not isinstance(unknown, HandForce | HandTorque) or least >= 0.0:
+    if not isinstance(unknown, parts.HandForce | parts.HandTorque) or least >= 0.0:
         return []
     unit = force_unit(solve_for.unknown, result.definition)
     return [f"'{solve_for.unknown}' holds back with up to {-least:.2f} {unit}: the load runs ahead"]
@@ -46,14 +39,14 @@ def _forces(result: Analysis) -> list[str]:
 def _rods(result: Analysis) -> list[str]:
     """A rod hardly longer than its crank: close to a dead point when they lie on each other."""
     model, joints = result.model, result.definition.joints
-    pairs = [joint.revolute for joint in joints.values() if isinstance(joint, Revolute)]
+    pairs = [joint.revolute for joint in joints.values() if isinstance(joint, parts.Revolute)]
     fixed = [pair for pair in pairs if "ground" in map(body_name, pair)]
     pivots = {body_name(p): p for pair in fixed for p in pair if body_name(p) != "ground"}
-    guides = [joint.prismatic for joint in joints.values() if isinstance(joint, Prismatic)]
+    guides = [joint.prismatic for joint in joints.values() if isinstance(joint, parts.Prismatic)]
     slides = {body_name(point) for pair in guides for point in pair}
     found = []
     for name, joint in joints.items():
-        if not isinstance(joint, Link):
+        if not isinstance(joint, parts.Link):
             continue
         for end, other in (joint.link, joint.link[::-1]):
             if body_name(end) not in pivots or body_name(other) not in slides:
@@ -74,7 +67,7 @@ def _gas_springs(result: Analysis) -> list[str]:
     found = []
     low, high = GAS_PRESSURES
     for name, part in result.definition.elements.items():
-        if not isinstance(part, GasSpring):
+        if not isinstance(part, parts.GasSpring):
             continue
         if f"{name}_pressure" in result.output:
             pressure = result.extremes(f"{name}_pressure")

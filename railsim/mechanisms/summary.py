@@ -112,17 +112,15 @@ def published_data(result: Analysis) -> dict[str, Data]:
 def _contact_data(contact: Contact) -> Data:
     """The static contact force as plain numbers."""
     return {
-        "pressure": contact.pressure,
-        "force": dict(contact.force),
-        "force_rising": dict(contact.rising),
-        "force_falling": dict(contact.falling),
+        "pressure": contact.pressure, "force": dict(contact.force),
+        "force_rising": dict(contact.rising), "force_falling": dict(contact.falling),
         "curve": _list(contact.curve),
         "equilibria": [
             {"height": y, "stable": stable, "from": low, "to": high}
             for (y, stable), (low, high) in zip(contact.equilibria, contact.heights, strict=True)
         ],
         "reason": contact.reason or None,
-    }
+    }  # fmt: skip
 
 
 def _motion_data(result: Analysis, timed: TimedMotion, *, courses: bool) -> Data:

@@ -100,13 +100,11 @@ def selection_table(choices: Sequence[Choice]) -> Table:
         if others:
             name = f"{name} ... {others[-1].name} ({len(others) + 1} rows)"
         row: dict[str, Any] = {
-            "catalogue": first.catalogue,
-            "row": name,
-            "fits": "yes" if first.fits else "no",
+            "catalogue": first.catalogue, "row": name, "fits": "yes" if first.fits else "no",
             "reasons": "; ".join(first.reasons),
             "sizes": "/".join(f"{v[k] * 1e3:g}" for k in ("body", "rod") if k in v) or "-",
             "progression": v.get("progression", np.nan),
-        }
+        }  # fmt: skip
         for column, low, high in (
             ("F1", "F1_low", "F1_high"),
             ("force", "force_least", "force_most"),

@@ -28,7 +28,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError
 from railsim.linear.track_response import COMPONENTS, ORDERS, RAILS, TrackResponse
 from railsim.linear.vehicle import LinearVehicle
-from railsim.observation.grid import on_grid
+from railsim.observation.pieces import on_grid
 from railsim.result import Result
 from railsim.simulation.run import simulate
 from railsim.track.irregularity import displacement

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import firwin, oaconvolve
 
 from railsim.arrays import Flags, Floats
 from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.measurement import Measurement
-from railsim.observation.grid import HALF, on_grid
 
 STEP = 0.25  # m
 LONGEST, OVERLAP, SHORTEST = 2000.0, 200.0, 300.0  # of pieces [m]
@@ -17,6 +18,8 @@ MARGIN = 20.0  # at both ends of a record [m]
 SLOWEST = 5.0  # m/s
 AROUND_GAP = 8  # steps beside a gap that are left out
 READ = ("sensor_acceleration", "sensor_roll_rate")
+HALF = 32  # of the filter of `on_grid`, in steps of the grid
+SHAPE = 8.0  # of its window, Kaiser's: 80 dB
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,24 @@ def pieces_of(measurement: Measurement, names: list[str]) -> list[Piece]:
         if end >= last:
             return pieces
         begin = end - OVERLAP
+
+
+def on_grid(s: Floats, values: Floats, grid: Floats) -> Floats:
+    """Values at equal steps, without waves shorter than two of them.
+
+    A symmetric low pass with its corner at half the rate of the grid, then a cubic spline; at both
+    ends signals are continued antisymmetrically.
+
+    `s`, `values` (float64[n]): Rising arc lengths at nearly equal steps [m], and values there.
+    `grid` (float64[m]): Equal steps [m].
+    """
+    step, own = grid[1] - grid[0], float(np.median(np.diff(s)))
+    if own < step:
+        n = min(2 * int(HALF * step / own) + 1, 2 * (len(s) // 2) - 1)
+        taps, pad = firwin(n, own / step, window=("kaiser", SHAPE)), n // 2
+        ends = 2.0 * values[0] - values[pad:0:-1], 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
+        values = oaconvolve(np.concatenate([ends[0], values, ends[1]]), taps, mode="valid")
+    return np.asarray(CubicSpline(s, values)(grid))
 
 
 def _piece(measurement: Measurement, names: list[str], begin: float, end: float) -> Piece:

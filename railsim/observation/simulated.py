@@ -25,8 +25,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import is_straight_and_level
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.track_response import RAILS
-from railsim.observation.grid import on_grid
-from railsim.observation.pieces import STEP, Piece
+from railsim.observation.pieces import STEP, Piece, on_grid
 from railsim.result import Result
 from railsim.simulation.remarks import silent
 from railsim.simulation.run import simulate

@@ -16,26 +16,13 @@ from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import argument_error, input_error
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
+from railsim.plot import style
 from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels
-from railsim.plot.style import (
-    DISTINCT,
-    LIMIT,
-    SIDE_LINES,
-    Picture,
-    distinct,
-    key,
-    note,
-    shade,
-    side_keys,
-    spans,
-    styled,
-    wheelset_colours,
-)
 from railsim.result import Result
 from railsim.text import unformatted
 
 
-@styled()
+@style.styled()
 def histories(
     result: Result,
     selections: Sequence[str] = STUDY,
@@ -112,19 +99,19 @@ def _figure(
 ) -> Figure:
     rows, columns = len(grid), len(grid[0])
     width = 7.0 if columns == 1 else 3.0 + 3.4 * min(columns, 4)
-    figure = Picture(width, 1.3 + 2.1 * rows)
+    figure = style.Picture(width, 1.3 + 2.1 * rows)
     axes = figure.subplots(
         rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
     )
     horizontal = result[over][window]
-    shown = spans(curvature_sections(result.track()), result["distance"][window], horizontal)
+    shown = style.spans(curvature_sections(result.track()), result["distance"][window], horizontal)
     for i, row in enumerate(grid):
         for j, panel in enumerate(row):
             if panel is None:
                 axes[i, j].remove()
                 continue
             _draw(axes[i, j], result, panel, horizontal, by, window)
-            shade(axes[i, j], shown, named=i == 0)
+            style.shade(axes[i, j], shown, named=i == 0)
             if not (i + 1 < rows and grid[i + 1][j] is not None):
                 axes[i, j].set_xlabel(result.quantities[over].label)
                 axes[i, j].tick_params(labelbottom=True)
@@ -147,18 +134,18 @@ def _draw(
     axes: Axes, result: Result, panel: Panel, horizontal: Floats, by: str, window: slice
 ) -> None:
     quantity = panel.quantity
-    wheelsets = wheelset_colours(result.wheelsets)
+    wheelsets = style.wheelset_colours(result.wheelsets)
     others = [line for line in panel.lines if "wheelset" not in line.labels]
     for index, line in enumerate(panel.lines):
         side = line.labels.get("side", "left")
         if by == "wheelset" and "side" in line.labels:
-            colour = DISTINCT[0] if side == "left" else DISTINCT[1]
+            colour = style.DISTINCT[0] if side == "left" else style.DISTINCT[1]
         elif "wheelset" in line.labels:
             colour = wheelsets[line.labels["wheelset"]]
         else:
-            colour = distinct(index)
+            colour = style.distinct(index)
         # the leading wheelset stays visible
-        look: Any = {"color": colour, "ls": SIDE_LINES[side], "zorder": 3.0 - 0.01 * index}
+        look: Any = {"color": colour, "ls": style.SIDE_LINES[side], "zorder": 3.0 - 0.01 * index}
         axes.plot(horizontal, line.values[window] * quantity.scale, **look)
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = capitalised(quantity)
@@ -201,10 +188,10 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
         return
     value, words = limit
     shown = value * quantity.scale
-    axes.axhline(shown, color=LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
+    axes.axhline(shown, color=style.LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
     shift, va = ((-3, 2.5), "bottom") if value < 0 else ((-3, -2.5), "top")
-    look: Any = {"fontsize": 7.5, "color": LIMIT, "frame": ("axes fraction", "data")}
-    note(axes, words, (1.0, shown), shift, "right", va, **look)
+    look: Any = {"fontsize": 7.5, "color": style.LIMIT, "frame": ("axes fraction", "data")}
+    style.note(axes, words, (1.0, shown), shift, "right", va, **look)
 
 
 def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
@@ -212,15 +199,15 @@ def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
     lines = [line for panel in drawn for line in panel.lines]
     handles = []
     if by == "wheel":
-        colours = wheelset_colours(result.wheelsets)
+        colours = style.wheelset_colours(result.wheelsets)
         names = short_names(result.wheelsets)
         for number, name in enumerate(result.wheelsets, start=1):
             if any(line.labels.get("wheelset") == name for line in lines):
                 words = f"{number} {unformatted(names[name])}"
-                handles.append(key(words, color=colours[name], lw=2.0))
-    for side, colour in zip(SIDE_LINES, DISTINCT, strict=False):
+                handles.append(style.key(words, color=colours[name], lw=2.0))
+    for side, colour in zip(style.SIDE_LINES, style.DISTINCT, strict=False):
         if any(line.labels.get("side") == side for line in lines):
-            handles += side_keys([side], color="0.25" if by == "wheel" else colour)
+            handles += style.side_keys([side], color="0.25" if by == "wheel" else colour)
     return handles
 
 

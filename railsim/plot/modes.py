@@ -17,12 +17,10 @@ BARS = 14  # components of a shape that are drawn
 LEAST_BARS = 5  # rows of a shape, so that bars are of one height
 # by quarters of a period, to which a phase is nearest
 PHASES = {
-    DISTINCT[0]: "in phase with the first component",
-    DISTINCT[2]: "a quarter ahead",
-    DISTINCT[1]: "in opposite phase",
-    DISTINCT[5]: "a quarter behind",
+    DISTINCT[0]: "in phase with the first component", DISTINCT[2]: "a quarter ahead",
+    DISTINCT[1]: "in opposite phase", DISTINCT[5]: "a quarter behind",
     "0.6": "spin, which has no displacement",
-}
+}  # fmt: skip
 DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
 
 

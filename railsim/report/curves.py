@@ -79,14 +79,12 @@ def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
 def _sections(result: Result) -> list[dict[str, Any]]:
     return [
         {
-            "begin": section.begin,
-            "end": section.end,
-            "curve": section.type == "CIR",
+            "begin": section.begin, "end": section.end, "curve": section.type == "CIR",
             "words": f"R {1.0 / section.start_value:.6g}" if section.type == "CIR" else "",
         }
         for section in curvature_sections(result.track())
         if section.type != "STR"
-    ]
+    ]  # fmt: skip
 
 
 def _quantity(

@@ -151,12 +151,10 @@ def _differences(vehicles: Mapping[str, Any]) -> Table:
     ]
     more = len(rows) - MOST_DIFFERENCES
     return Table(
-        ["key", *map(printable, vehicles)],
-        rows[:MOST_DIFFERENCES],
-        "Differences between the vehicles (SI)",
-        range(len(vehicles) + 1),
+        ["key", *map(printable, vehicles)], rows[:MOST_DIFFERENCES],
+        "Differences between the vehicles (SI)", range(len(vehicles) + 1),
         note=f"{more} more keys differ." if more > 0 else "",
-    )
+    )  # fmt: skip
 
 
 def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:

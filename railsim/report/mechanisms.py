@@ -81,14 +81,12 @@ CAPTIONS = {
     "pressure": "Pressure for equilibrium of the mechanism.",
     "contact": "Static contact force at constant pressure; a full circle is a stable equilibrium.",
     "carpet": "Carpet plot of the air spring with the load of the mechanism.",
-    "gas_springs": "Length and force of the gas springs.",
-    "cases": "Unknown force in all cases.",
-    "time": "The motion in time.",
-    "comparison": "The mechanisms side by side over the height.",
+    "gas_springs": "Length and force of the gas springs.", "cases": "Unknown force in all cases.",
+    "time": "The motion in time.", "comparison": "The mechanisms side by side over the height.",
     "comparison_held": "Pressures needed, and contact forces at the held pressures.",
     "comparison_zone": "The same within the zone; below, the differences from the first.",
     "search": "Objective at the end of the search from each starting point.",
-}
+}  # fmt: skip
 
 
 @styled()
@@ -255,12 +253,10 @@ def player(result: Analysis) -> tuple[str, dict[str, Any]]:
         look = {"width": 1.4 * plots.WIDTHS[line.kind], "dash": DASHES.get(line.kind)}
         moving.append({**look, "kind": line.kind, "points": at})
     data = {
-        "lines": moving,
-        "fixed": [[round(x * 1e3, 1), round(-y * 1e3, 1)] for x, y in ground],
-        "texts": _sentences(result, motion.s),
-        "whole": [round(float(v), 1) for v in whole],
+        "lines": moving, "fixed": [[round(x * 1e3, 1), round(-y * 1e3, 1)] for x, y in ground],
+        "texts": _sentences(result, motion.s), "whole": [round(float(v), 1) for v in whole],
         "near": [round(float(v), 1) for v in (a, -d, b - a, d - c)],
-    }
+    }  # fmt: skip
     return " ".join(f"{v:.1f}" for v in whole), data
 
 

@@ -36,17 +36,10 @@ from railsim.errors import Fault, InputError
 from railsim.files.access import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
+from railsim.result import sinks
 from railsim.result.data import Attributes, Result, frozen, register_writer
 from railsim.result.integrity import DIGEST, content_digest, seal
 from railsim.result.reading import open_result
-from railsim.result.sinks import (
-    ALWAYS,
-    NOTHING,
-    SinkContext,
-    full_coordinates,
-    root_attributes,
-    timed,
-)
 
 # what is wrong with the disk rather than with the name
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG)
@@ -73,7 +66,7 @@ class Storage:
 PLAIN = Storage()
 
 
-class Hdf5Sink(SinkContext):
+class Hdf5Sink(sinks.SinkContext):
     """Streams chunks to a result file.
 
     The file is created at once beside its target under a hidden name, so that an output that
@@ -90,7 +83,7 @@ class Hdf5Sink(SinkContext):
         path: str | Path,
         *,
         overwrite: bool = False,
-        attributes: Attributes = NOTHING,
+        attributes: Attributes = sinks.NOTHING,
         option: str = "--out",
         storage: Storage = PLAIN,
     ) -> None:
@@ -126,14 +119,16 @@ class Hdf5Sink(SinkContext):
             raise
 
     def begin(
-        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+        self,
+        coordinates: Mapping[str, Sequence[str]],
+        quantities: Iterable[Quantity] = sinks.ALWAYS,
     ) -> None:
         """See `Sink.begin`."""
         self._quantities = {quantity.name: quantity for quantity in quantities}
-        names = full_coordinates(coordinates)
+        names = sinks.full_coordinates(coordinates)
         for dim, labels in names.items():
             _write_names(self._file, dim, labels)
-        for name in timed(self._quantities):
+        for name in sinks.timed(self._quantities):
             inner = tuple(len(names[dim]) for dim in self._quantities[name].dims[1:])
             self._blocks[name] = np.empty((ROWS_AT_ONCE, *inner))
             self._crc[name] = 0
@@ -174,14 +169,14 @@ class Hdf5Sink(SinkContext):
     def close(
         self,
         attributes: Attributes,
-        statics: Mapping[str, Any] = NOTHING,
-        profiles: Mapping[str, Profile] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+        statics: Mapping[str, Any] = sinks.NOTHING,
+        profiles: Mapping[str, Profile] = sinks.NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = sinks.NOTHING,
     ) -> Result:
         """See `Sink.close`; the file now has its name."""
         with _disk_errors(self.path):
             self._write_rest(statics, profiles, groups)
-            self._file.attrs.update(root_attributes(self._attributes, attributes))
+            self._file.attrs.update(sinks.root_attributes(self._attributes, attributes))
             self._file.attrs[DIGEST] = content_digest(self._file, self._crc)
             self._file.flush()  # where the disk is full, before the file is closed
             self._file.close()
@@ -250,7 +245,7 @@ def write(
     selected = {name: q for name, q in result.quantities.items() if name in wanted}
     with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:
         sink.begin(result.coordinates, selected.values())
-        sink.append({name: result[name] for name in timed(selected)})
+        sink.append({name: result[name] for name in sinks.timed(selected)})
         statics = {name: result[name] for name in selected if "time" not in selected[name].dims}
         sink.close(result.attributes, statics, result.profiles, result.groups)
     return sink.path

@@ -113,13 +113,11 @@ def search(suspension: TrailingArmSuspension) -> SearchResult:
     by_mass = task.limits.objective == "mass"
     nests.sort(key=lambda nest: nest.mass if by_mass else -nest.fatigue_margin)
     result = SearchResult(
-        nests=tuple(nests[: task.limits.results]),
-        objective=task.limits.objective,
-        tried=len(sample.H0),
-        feasible=int(np.sum(feasible)),
+        nests=tuple(nests[: task.limits.results]), objective=task.limits.objective,
+        tried=len(sample.H0), feasible=int(np.sum(feasible)),
         broken={name: int(np.sum(slack < -1e-9)) for name, slack in found.slack.items()},
         cloud=np.column_stack([found.mass, np.minimum(*found.margin)])[feasible],
-    )
+    )  # fmt: skip
     if not nests:
         raise InputError(_nothing_fits(suspension, result, optima))
     return result
@@ -334,13 +332,11 @@ def _built(task: Task, found: _Optimum) -> Nest | None:
     return Nest(
         outer=spring(x.d_outer, x.D_outer, n_outer, x.H0),
         inner=spring(x.d_inner, x.D_inner, n_inner, x.H0 - task.height_difference),
-        mass=float(result.mass[best]),
-        fatigue_margin=float(margin[best]),
+        mass=float(result.mass[best]), fatigue_margin=float(margin[best]),
         mounting_error=float(result.deflection_error[0][best]),
-        target_error=float(result.deflection_error[1][best]),
-        active=found.active,
+        target_error=float(result.deflection_error[1][best]), active=found.active,
         slack={name: float(values[best]) for name, values in result.slack.items()},
-    )
+    )  # fmt: skip
 
 
 def _nothing_fits(

@@ -149,13 +149,11 @@ def _nest(
     if len(case.springs) > 1 and case.springs["inner"] not in touching:
         remarks.append("The inner spring does not work at this load and is left out.")
     nest = {
-        "kind": "shear_spring",
-        "bodies": [table.frame, "arm"],
+        "kind": "shear_spring", "bodies": [table.frame, "arm"],
         "points": [_rounded([0.0, table.lateral_position, z]) for z in (seat - height, seat)],
-        "sides": "both",
-        "stiffness": _rounded([case.K_L, case.K_L, K_V]),
+        "sides": "both", "stiffness": _rounded([case.K_L, case.K_L, K_V]),
         "bending_stiffness": _rounded([max(bending, 0.0)] * 2),
-    }
+    }  # fmt: skip
     return nest, tuple(remarks)
 
 

@@ -16,7 +16,7 @@ from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.observation import Assumed, irregularity
 from railsim.observation.estimate import BANDS
-from railsim.observation.grid import on_grid
+from railsim.observation.pieces import on_grid
 from railsim.result.sensors import all_sensors
 from railsim.track.irregularity import displacement
 
