@@ -37,6 +37,7 @@ CLOSE, MOST_TIMES = 0.1, 4  # standard deviations; times that derivatives are ta
 SAME = 3e-3  # change of a coordinate up to which derivatives are the same
 PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
+SHARES = 5  # of profiles that are tried before the search
 STRETCHED = 1e-3  # of the arc length, from which it is said
 ALONG = 20.0  # m, within which the place of a run is looked for
 SCALE = 5.0  # weight of a residual in units of the noise beyond which a robust loss yields
@@ -139,6 +140,7 @@ def _solved(problem: Problem, loss: str) -> Identified:
     stated = problem.form.kind == "history"
     known = stated and all(np.isfinite(one.noise).all() for one in problem.runs)
     _weigh(problem, x, stated=stated)
+    x = _at_best_shares(problem, x)
     near = stated and all(len(one.run.at) * one.step > LONG * PART for one in problem.runs)
     if near:
         x = _by_a_part(problem, x, bounds, loss)
@@ -222,6 +224,18 @@ def _covariance(problem: Problem, x: Floats, jacobian: Floats) -> tuple[Floats, 
     with np.errstate(divide="ignore"):
         inverse = np.where(singular > 1e-10 * singular[0], 1.0 / singular, 1e6)
     return inflation * (right.T * inverse**2) @ right, inflation
+
+
+def _at_best_shares(problem: Problem, x: Floats) -> Floats:
+    """Return coordinates with each share where it fits best: contacts have more than one valley."""
+    for k, one in enumerate(problem.parameters):
+        if one.is_share:
+            points = [x.copy() for _ in range(SHARES)]
+            for point, share in zip(points, np.linspace(*one.bounds, SHARES), strict=True):
+                point[k] = share
+            sums = [float(row @ row) for row in problem.vectors(points)]
+            x = points[int(np.argmin(sums))]
+    return x
 
 
 def _by_a_part(problem: Problem, x: Floats, bounds: Floats, loss: str) -> Floats:

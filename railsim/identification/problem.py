@@ -186,6 +186,11 @@ class Problem:
         ]
         return np.concatenate([*rows, self.before(x)])
 
+    def vectors(self, points: Sequence[Floats]) -> list[Floats]:
+        """Return `vector` at several points, which are simulated together."""
+        self._evaluated([(x, k, self.place) for x in points for k in range(len(self.runs))])
+        return [self.vector(x) for x in points]
+
     def before(self, x: Floats) -> Floats:
         """Return the weighted residuals of what was known before."""
         known = [k for k, one in enumerate(self.parameters) if one.spread is not None]

@@ -12,7 +12,8 @@ import railsim
 from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
-from railsim.identification.parameters import Model, parsed, scaled
+from railsim.identification.fit import _at_best_shares
+from railsim.identification.parameters import Model, Parameter, parsed, scaled
 from railsim.identification.residuals import whiteness
 
 SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
@@ -409,3 +410,15 @@ def test_a_stretched_arc_length_is_said(tmp_path):
     np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=head, comments="")
     one = railsim.identify(quarter(), path, [PRIMARY, SECONDARY], band=(0.5, 14.0), workers=1)
     assert any("stretched by -3.0" in words for words in one.remarks)
+
+
+def test_a_share_of_profiles_begins_in_the_deepest_of_several_valleys():
+    """The sum of squares over the share has valleys at 0.2 and, deeper, at 0.7."""
+
+    class Valleys:
+        parameters = (Parameter("k", ("k",)), Parameter("share", (), ("a", "b"), 0.0, 1.0))
+
+        def vectors(self, points):
+            return [np.array([(x[1] - 0.2) * (x[1] - 0.7), 0.1 * (x[1] - 0.7)]) for x in points]
+
+    assert _at_best_shares(Valleys(), np.zeros(2)).tolist() == [0.0, 0.75]
