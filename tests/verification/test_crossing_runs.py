@@ -182,3 +182,21 @@ def test_flange_that_climbs_goes_on():
     run = thrown(0.006, 0.9, load_track("crossing_56e1_r245_1in9.25").replace(check_rail=[]))
     assert run.status == "complete"
     assert np.abs(run["wheelset_lateral"][:, 0]).max() > 0.0125
+
+
+@FURTHER
+def test_wheel_falls_where_the_nose_is_missing():
+    """Behind the wing, which has gone aside, at walking pace."""
+    part = load_track("crossing_56e1_r245_1in9.25").sections[0].model_dump(exclude_none=True)
+    contours = []
+    for one in part["contours"]:
+        y, z = np.array(one["y"]), np.array(one["z"])
+        wing = (y > 15e-3 + 0.09 * (one["s"] - 0.11)) | (one["s"] < 0.11)
+        if -0.3 < one["s"] < 1.0:
+            contours.append({"s": one["s"], "y": y[wing].tolist(), "z": z[wing].tolist()})
+    wing_alone = part | {"begin": 49.9, "end": 50.8, "contours": contours}
+    track = load_track("crossing_56e1_r245_1in9.25").replace(sections=[wing_alone], check_rail=[])
+    run = simulate(load_vehicle("coach_manchester"), track, speed=1.2, start=39.2, until=40.1)
+    assert run.status == "derailed"
+    assert "found no rail under a wheel" in run.attributes["status_reason"]
+    assert 0.4 < run["wheelset_distance"][-1, 0] - NOSE < 0.6
