@@ -38,9 +38,10 @@
     PATCH_SPEED,
     SLOPE_ALONG,
     SLOPE_ACROSS,
+    SECANT_ALONG,
     RISE,
-) = range(35)
-PATCH_ROWS = 35
+) = range(36)
+PATCH_ROWS = 36
 
 # columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
 # force of check rails and its wear number
@@ -62,12 +63,12 @@ PATCH_ROWS = 35
 WHEEL_COLUMNS = 13
 
 # columns of Work.contact_jacobian[b], what the contact takes from the wheelset's speeds, for the
-# implicit part of the step: creep forces along the track [N s/m], the same times the lever c_z
-# [N s], in yaw [N m s]; then in y, z and roll [N s/m, N s, N m s] the upper half of the symmetric
-# matrix of the creep forces across, and row by row that of the normal forces with the friction that
-# follows them
-J_ALONG, J_ALONG_LEVER, J_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 9
-CONTACT_JACOBIAN = 18
+# implicit part of the step: slopes of the creep forces along the track, their secants [N s/m], the
+# latter times the lever c_z [N s], in yaw [N m s]; then in y, z and roll [N s/m, N s, N m s] the
+# upper half of the symmetric matrix of the creep forces across, and row by row that of the normal
+# forces with the friction that follows them
+J_ALONG, J_SECANT, J_SECANT_LEVER, J_SECANT_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 4, 10
+CONTACT_JACOBIAN = 19
 
 # columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
 # [1], change of the rate over `AHEAD` [m/s]; what is added to the radius [m]; where a rail's

@@ -33,7 +33,7 @@ from railsim.kernels.support import (
 
 
 @compiled(python=False, ordered=True)
-def creep_slopes(n, patches, speed, G, along, across):
+def creep_slopes(n, patches, speed, G, along, across, secant_along):
     """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
     Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
@@ -48,8 +48,8 @@ def creep_slopes(n, patches, speed, G, along, across):
         Read only.
     speed, G : float
         Speed of travel [m/s]; shear modulus, reduced by the third body [Pa].
-    along, across : float64[>= n]
-        Written; zero without friction or load.
+    along, across, secant_along : float64[>= n]
+        Written; zero without friction or load.  `secant_along`: the force along over the slip.
     """
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     c11, c22, c23 = patches.c11, patches.c22, patches.c23
@@ -71,6 +71,7 @@ def creep_slopes(n, patches, speed, G, along, across):
         scale = unit * per_speed if loaded else 0.0
         along[i] = scale * c11[i] * (share * tangent + (1.0 - share) * secant)
         across[i] = scale * c22[i] * (share * secant + (1.0 - share) * tangent)
+        secant_along[i] = scale * c11[i] * secant
 
 
 @compiled(python=False)

@@ -8,7 +8,14 @@ smoothed accelerations and the last drives.  Elastic rails: see `support_step`.
 
 from railsim.kernels import compiled
 from railsim.kernels.actuators import ACTION, AXLE
-from railsim.kernels.contact_columns import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
+from railsim.kernels.contact_columns import (
+    J_ALONG,
+    J_NORMAL,
+    J_SECANT,
+    J_SECANT_LEVER,
+    J_SECANT_YAW,
+    J_SLIP,
+)
 from railsim.kernels.driving import table_value_slope
 from railsim.kernels.internal import advanced, hold_within, slides_together
 from railsim.kernels.rhs import euler_rates
@@ -43,6 +50,10 @@ SMOOTHING = 0.3
 # spin of a driven or braked wheelset: a brake that holds it would chatter.
 SMOOTHING_ELASTIC = 1.0
 LONGER = 100.0
+# The creep force of a wheelset that slides along the track has no slope, but the sign of the slip:
+# where the secant times h/m, z, is above 1 the slip would alternate from step to step.  An implicit
+# part of 1 - 1/z of the secant ends that; this is the 1, with what a secant may be short of slopes.
+SECANT = 1.4
 SPIN = 4  # component of a body about its y axis
 
 
@@ -123,22 +134,16 @@ def soften_contact(bodies, jacobian, b, rate, before, h, last):
     that would not follow, the longer one.
     """
     v = 6 * b
-    mass = 1.0 / bodies.row[b, MASS]
-    along = jacobian[b, J_ALONG]
-    if along > 0.0:
-        soften_slip(
-            rate,
-            before,
-            v,
-            v + 4,
-            jacobian[b, J_ALONG_LEVER] / along,
-            along,
-            mass,
-            1.0 / bodies.row[b, I_2],
-            max(last, h),
-        )
+    mass, turning = 1.0 / bodies.row[b, MASS], 1.0 / bodies.row[b, I_2]
+    secant, step = jacobian[b, J_SECANT], max(last, h)
+    if secant > 0.0:
+        lever = jacobian[b, J_SECANT_LEVER] / secant
+        z = step * secant * (mass + lever * lever * turning)
+        along = max(jacobian[b, J_ALONG], min(1.0, SECANT - 1.0 / z) * secant)
+        soften_slip(rate, before, v, v + 4, lever, along, mass, turning, step)
+        yaw = jacobian[b, J_SECANT_YAW] * along / secant
+        soften(rate, before, v + 5, yaw, 1.0 / bodies.row[b, I_3], last)
     soften_across(jacobian, b, rate, before, v, mass, 1.0 / bodies.row[b, I_1], last)
-    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], last)
 
 
 @compiled(python=False)

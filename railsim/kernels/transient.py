@@ -26,7 +26,14 @@ fall with the ratio of a to the wavelength; one order of delay as in Shen and Li
 from math import exp, expm1
 
 from railsim.kernels import compiled
-from railsim.kernels.contact_columns import PATCH_SPEED, SLOPE_ACROSS, SLOPE_ALONG, XI_X, A
+from railsim.kernels.contact_columns import (
+    PATCH_SPEED,
+    SECANT_ALONG,
+    SLOPE_ACROSS,
+    SLOPE_ALONG,
+    XI_X,
+    A,
+)
 from railsim.kernels.support import PATCH_STATE, SKIP, TRACED, TRANSIENT_SIZE, transient_begin
 from railsim.kernels.system import LAST_STEP
 
@@ -86,6 +93,7 @@ def give_back_creepages(system, work, n, state):
             at_once = 1.0 + expm1(-z) / z if z > 0.0 else 0.0
             patch[SLOPE_ALONG, k] *= at_once
             patch[SLOPE_ACROSS, k] *= at_once
+            patch[SECANT_ALONG, k] *= at_once
 
 
 @compiled(python=False)

@@ -34,8 +34,9 @@ from railsim.kernels.contact_columns import (
     C_Y,
     C_Z,
     J_ALONG,
-    J_ALONG_LEVER,
-    J_YAW,
+    J_SECANT,
+    J_SECANT_LEVER,
+    J_SECANT_YAW,
     M_Z,
     NORMAL,
     NORMAL_DAMPING,
@@ -44,6 +45,7 @@ from railsim.kernels.contact_columns import (
     NORMAL_Z,
     PATCH_SPEED,
     PHI,
+    SECANT_ALONG,
     SLOPE_ACROSS,
     SLOPE_ALONG,
     T_X,
@@ -117,7 +119,7 @@ def add_creep_forces(system, work, n, speed, state):
             wheel[w, side, W_PHI] = scale * patch[PHI, k]
             wheel[w, side, W_C_Y] = cy
             wheel[w, side, W_C_Z] = cz
-        along, across = patch[SLOPE_ALONG, k], patch[SLOPE_ACROSS, k]
+        secant, across = patch[SECANT_ALONG, k], patch[SLOPE_ACROSS, k]
         damping = patch[NORMAL_DAMPING, k]
         if system.support.elastic:
             add_slopes(work, w, side, k, across)
@@ -127,9 +129,10 @@ def add_creep_forces(system, work, n, speed, state):
             across /= 1.0 + across * (c * c * y + s * s * z)
             contact_damping = damping + lag * patch[NORMAL_STIFFNESS, k]
             damping /= 1.0 + contact_damping * (s * s * y + c * c * z)
-        work.contact_jacobian[b, J_ALONG] += along
-        work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
-        work.contact_jacobian[b, J_YAW] += along * cy * cy
+        work.contact_jacobian[b, J_ALONG] += patch[SLOPE_ALONG, k]
+        work.contact_jacobian[b, J_SECANT] += secant
+        work.contact_jacobian[b, J_SECANT_LEVER] += secant * cz
+        work.contact_jacobian[b, J_SECANT_YAW] += secant * cy * cy
         add_damping(work, b, k, across, damping)
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
@@ -182,7 +185,8 @@ def wheel_rail(system, work, speed, state):
         follow_creepages(system, work, n, state)
     creep_forces(n, contact.law, patches, work.creep)
     G = contact.law.k_adhesion * contact.law.G
-    creep_slopes(n, patches, speed, G, patch[SLOPE_ALONG], patch[SLOPE_ACROSS])
+    slopes = patch[SLOPE_ALONG], patch[SLOPE_ACROSS], patch[SECANT_ALONG]
+    creep_slopes(n, patches, speed, G, *slopes)
     if rarely(contact.transient != 0):
         give_back_creepages(system, work, n, state)
     add_creep_forces(system, work, n, speed, state)
