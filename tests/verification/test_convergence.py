@@ -34,6 +34,34 @@ def peaks(result):
     return {name: np.nanmax(np.abs(result[name])) for name in QUANTITIES}
 
 
+@pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
+def test_slow_in_a_curve_the_default_step_finds_the_position_of_a_short_one(vehicle):
+    """120 mm of cant excess at 5 m/s.
+
+    The slip of wheelsets that slide along the track once alternated from step to step, which held
+    the trailing bogie elsewhere: guiding forces of -9 instead of -22 kN.
+    """
+    lengths, cant = (60.0, 40.0, 60.0), (0.0, None, 0.15)
+    track = load_track("curve_r250").replace(
+        plan=[
+            {"type": kind, "length": length} | ({"radius": 250.0} if kind == "CIR" else {})
+            for kind, length in zip(("STR", "CLO", "CIR"), lengths, strict=True)
+        ],
+        cant=[
+            {"type": "LIR" if value is None else "CST", "length": length}
+            | ({} if value is None else {"cant": value})
+            for value, length in zip(cant, lengths, strict=True)
+        ],
+    )
+    runs = [
+        simulate(load_vehicle(vehicle), track, speed=5.0, until=150.0, settings=Settings(step=step))
+        for step in (None, 5e-4)
+    ]
+    assert runs[0].attributes["step"] >= 1e-3
+    np.testing.assert_allclose(runs[0].Y, runs[1].Y, rtol=0.0, atol=100.0)
+    np.testing.assert_allclose(runs[0].Y[-1], runs[1].Y[-1], rtol=0.0, atol=20.0)
+
+
 def test_halving_the_step_moves_no_peak_by_half_a_per_cent(run, default):
     assert peaks(run(step=0.5 * default.attributes["step"])) == pytest.approx(
         peaks(default), rel=5e-3
