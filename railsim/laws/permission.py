@@ -59,11 +59,12 @@ def check_laws(laws: Iterable[tuple[str, Law]]) -> None:
     """Raise InputError with all of some named laws that are not permitted."""
     allowed = "--allow-code, or --law FILE with this file; in Python allow_code=True"
     words = "is code of {}, which is not executed"
-    Faults(
+    faults = (
         Fault("laws", name, f"'{name}' {words.format(law.file or 'a result')}", allowed)
         for name, law in laws
         if not is_allowed(law.source or "")
-    ).check()
+    )
+    Faults(dict.fromkeys(faults)).check()  # runs of a study have a law in common
 
 
 def permitted_part(definition: D) -> D:
