@@ -94,6 +94,8 @@ from railsim.kernels.wheel_surface import foreseen_heights
 WAY, SLIP, WHOLE_STEP = 5e-6, 2.5e-3, 1.25e-3
 GAIN, REST, FORGOTTEN = 0.3, 0.05, 0.01
 LARGE_Y, LARGE_Z = 0.1, 0.3
+# least relaxation of a correction; growth of the squared imbalance beyond which slopes are forgotten
+LEAST_RELAXATION, WORSE = 0.05, 4.0
 # bounds of what slopes learn [N/m, N s/m]: a rail stays damped
 LEAST_K, MOST_K, MOST_D = -2e7, 3e8, 3e5
 
@@ -319,11 +321,13 @@ def bounded(value, least, most):
 
 
 @compiled(inline=True)
-def relax_corrections(work, wheels, y, z, begins):
+def relax_corrections(work, state, wheels, learnt, y, z, begins):
     """Multiply imbalances of eight rails so that corrections do what the last ones missed.
 
     The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
-    dominates, convergence as with the secant.  `begins`: nothing was corrected before.
+    dominates, convergence as with the secant.  Where the last correction has more than doubled the
+    imbalance, what the slopes have learnt is wrong, and forgotten.  `begins`: nothing was corrected
+    before; `learnt`: where the state keeps what the slopes have learnt.
     """
     rails = pair_starts(wheels, 0, SUPPORT_STEP, 2)
     factor = pair_starts(wheels, 0, SUPPORT_STEP, 1)
@@ -334,7 +338,12 @@ def relax_corrections(work, wheels, y, z, begins):
         d_y, d_z = y - b_y, z - b_z
         square = d_y * d_y + d_z * d_z
         found = -(b_y * d_y + b_z * d_z) / square * last
-        relaxation = where_beyond(square, 0.0, bounded(found, 0.3, 3.0), last)
+        relaxation = where_beyond(square, 0.0, bounded(found, LEAST_RELAXATION, 3.0), last)
+        zero, one = spread(0.0), spread(1.0)
+        more = y * y + z * z - WORSE * (b_y * b_y + b_z * b_z)
+        keep = where_beyond(larger(zero, more + beside(more)), 0.0, zero, one)
+        y_y, z_y, y_slip, z_slip = load_rows(state, learnt, 0, 4)
+        store_rows(state, learnt, 0, (keep * y_y, keep * z_y, keep * y_slip, keep * z_slip))
     store_rows(work.support_step, rails, BEFORE, (y, z))
     store_rows(work.support_step, factor, RELAXATION, (relaxation,))
     return relaxation * y, relaxation * z
@@ -468,7 +477,7 @@ def move_rails(system, work, state, wheels, h, begins):
     either = error_y * error_y + error_z * error_z
     free = where_beyond(either, 0.0, spread(0.0), moves)
     store_rows(state, learnt, L_ERROR_Y, (error_y + free * b[0], error_z + free * b[1]))
-    y, z = relax_corrections(work, wheels, b[0], b[1], begins)
+    y, z = relax_corrections(work, state, wheels, learnt, b[0], b[1], begins)
     c = 1.0 + load_rows(state, pair_starts(wheels, begin + WEIGHT, SUPPORT_SIZE, 0), 0, 1)[0]
     r = solve_track(
         system.support,
