@@ -94,7 +94,7 @@ from railsim.kernels.wheel_surface import foreseen_heights
 WAY, SLIP, WHOLE_STEP = 5e-6, 2.5e-3, 1.25e-3
 GAIN, REST, FORGOTTEN = 0.3, 0.05, 0.01
 LARGE_Y, LARGE_Z = 0.1, 0.3
-# least relaxation of a correction; growth of the squared imbalance beyond which slopes are forgotten
+# least relaxation of a correction; growth of the squared imbalance beyond which it is forgotten
 LEAST_RELAXATION, WORSE = 0.05, 4.0
 # bounds of what slopes learn [N/m, N s/m]: a rail stays damped
 LEAST_K, MOST_K, MOST_D = -2e7, 3e8, 3e5
