@@ -8,12 +8,16 @@ allowed but unusual is a remark.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from railsim.definitions.base import Remark
 from railsim.definitions.track.alignment_rules import alignment_remarks
+from railsim.definitions.track.elements import TrackElement
 from railsim.definitions.track.section import Section
-from railsim.definitions.track.tables import TrackElement, TrackTables
 from railsim.errors import Fault
+
+if TYPE_CHECKING:
+    from railsim.definitions.track.definition import Track
 
 # Ramps steeper than this are remarked on: exceptional limit of EN 13803 (2017) for the cant ramp.
 STEEPEST_CANT_RAMP = 2.5e-3
@@ -24,28 +28,28 @@ ASTRAY_CANT = 1e-3
 SMALL = 1e-6
 
 
-def curvature_sections(track: TrackTables) -> list[Section]:
+def curvature_sections(track: "Track") -> list[Section]:
     """Return the plan as curvature over arc length [1/m]."""
     return _sections("plan", track.plan)[0]
 
 
-def cant_sections(track: TrackTables) -> list[Section]:
+def cant_sections(track: "Track") -> list[Section]:
     """Return the cant over arc length [m]; empty where there is none."""
     return _sections("cant", track.cant)[0]
 
 
-def gradient_sections(track: TrackTables) -> list[Section]:
+def gradient_sections(track: "Track") -> list[Section]:
     """Return the gradient over arc length [1]; empty for a level track."""
     return _sections("vertical", track.vertical)[0]
 
 
-def is_straight_and_level(track: TrackTables) -> bool:
+def is_straight_and_level(track: "Track") -> bool:
     """Whether a track has neither curves nor cant nor gradients."""
     sections = (*curvature_sections(track), *cant_sections(track), *gradient_sections(track))
     return not any(section.start_value or section.end_value for section in sections)
 
 
-def track_faults(track: TrackTables) -> list[Fault]:
+def track_faults(track: "Track") -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
     _, faults = _sections("plan", track.plan)
     cant, cant_faults = _sections("cant", track.cant)
@@ -56,7 +60,7 @@ def track_faults(track: TrackTables) -> list[Fault]:
     return faults
 
 
-def track_remarks(track: TrackTables) -> list[Remark]:
+def track_remarks(track: "Track") -> list[Remark]:
     """Return what is allowed in a track but unusual."""
     plan, cant, vertical = curvature_sections(track), cant_sections(track), gradient_sections(track)
     remarks = _curvature_steps(plan)
@@ -169,7 +173,7 @@ def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -
     return [Remark(name, text)]
 
 
-def _beyond_the_track(track: TrackTables) -> list[Remark]:
+def _beyond_the_track(track: "Track") -> list[Remark]:
     """Remark on irregularities of which the track sees nothing."""
     remarks = []
     for index, part in enumerate(track.irregularities):
