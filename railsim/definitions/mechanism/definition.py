@@ -28,6 +28,7 @@ from railsim.definitions.mechanism.parts import (
     Ground,
     Joint,
     PointName,
+    Positive,
     Quantity,
     QuantityOrAuto,
     Start,
@@ -95,9 +96,9 @@ class Motion(Definition):
     """Actuator whose force drives the motion; by default the same, of an angle that of `[solve]`"""
     law: Literal["constant_speed", "polynomial_345", "table"] = "constant_speed"
     """Constant speed, the 3-4-5 polynomial from rest to rest, or a table"""
-    speed: Quantity | None = None
+    speed: Positive | None = None
     """Speed of the length [m/s] or angle [rad/s], for a constant speed"""
-    duration: Quantity | None = None
+    duration: Positive | None = None
     """Time for the whole range [s]"""
     table: tuple[tuple[Quantity, Quantity], ...] | None = None
     """Rows [time s, change of length m or angle rad since the start], a cubic spline"""
@@ -125,7 +126,7 @@ class Release(Definition):
     """Value of the driver where it is let go [rad or m]"""
     until: Quantity
     """Value of the driver at which the motion ends [rad or m]"""
-    duration: Quantity = 10.0
+    duration: Positive = 10.0
     """Time after which it ends in any case [s]"""
 
 
@@ -177,15 +178,15 @@ class Lid(Definition):
 
     element: GasSpringName
     """Gas spring whose `F1` is checked"""
-    mass: Quantity
+    mass: Positive
     """Mass of the lid G [kg]"""
-    centre: Quantity
+    centre: Positive
     """Lever of its centre of gravity about the hinge, lid open D [m]"""
-    lever: Quantity
+    lever: Positive
     """Lever of the springs about the hinge, lid open b [m]"""
-    springs: Quantity = 2.0
+    springs: Positive = 2.0
     """Number of springs n"""
-    factor: Quantity = 1.1
+    factor: Positive = 1.1
     """Factor of safety alpha"""
 
 
