@@ -22,11 +22,11 @@ from railsim.definitions.mechanism.parts import (
     Body,
     BodyName,
     CatalogueName,
-    Driver,
     Element,
     GasSpringName,
     Ground,
     Joint,
+    Pair,
     PointName,
     Positive,
     Quantity,
@@ -36,6 +36,30 @@ from railsim.definitions.mechanism.parts import (
 from railsim.errors import Fault, argument_error, nearest
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
+
+
+class Driver(Definition):
+    """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
+
+    angle: BodyName | None = None
+    """Body whose angle it is"""
+    length: Pair | None = None
+    """Points whose distance it is"""
+    coordinate: PointName | None = None
+    """Point whose coordinate it is"""
+    axis: Literal["x", "y"] = "y"
+    """Which coordinate"""
+    zero: Quantity = 0.0
+    """What the angle, length or coordinate is where the driver is 0 [rad or m]"""
+    start: Quantity = 0.0
+    """Value of the driver at the start of the motion [rad or m]"""
+    end: Quantity
+    """Value of the driver at its end [rad or m]"""
+
+    @check
+    def _one(self) -> None:
+        if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
+            raise ValueError("one of 'angle', 'length' and 'coordinate'")
 
 
 class Sampling(Definition):

@@ -451,30 +451,6 @@ class GasSpring(Definition):
     """Lowest and highest temperature in service [C]"""
 
 
-class Driver(Definition):
-    """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
-
-    angle: BodyName | None = None
-    """Body whose angle it is"""
-    length: Pair | None = None
-    """Points whose distance it is"""
-    coordinate: PointName | None = None
-    """Point whose coordinate it is"""
-    axis: Literal["x", "y"] = "y"
-    """Which coordinate"""
-    zero: Quantity = 0.0
-    """What the angle, length or coordinate is where the driver is 0 [rad or m]"""
-    start: Quantity = 0.0
-    """Value of the driver at the start of the motion [rad or m]"""
-    end: Quantity
-    """Value of the driver at its end [rad or m]"""
-
-    @check
-    def _one(self) -> None:
-        if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
-            raise ValueError("one of 'angle', 'length' and 'coordinate'")
-
-
 class Angle(Definition):
     """An angle between two lines, folded to 0 to 90 degrees."""
 

@@ -66,21 +66,27 @@ class OwnOutput(LawUse):
     """Words for axes and tables; by default its name"""
 
 
-BODY_SIGNALS = ("displacement", "velocity", "acceleration", "angle", "angular_velocity")
-ELEMENT_SIGNALS = ("deflection", "rate", "force", "power")
-WHEEL_SIGNALS = ("wheel_speed", "Q", "Y")
+BODY_SIGNALS = {
+    "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "angle": "rad",
+    "angular_velocity": "rad/s",
+}  # fmt: skip
+ELEMENT_SIGNALS = {"deflection": "m", "rate": "m/s", "force": "N", "power": "W"}
+WHEEL_SIGNALS = {"wheel_speed": "m/s", "Q": "N", "Y": "N"}
+OTHER_SIGNALS = {
+    "curvature": "1/m", "cant_angle": "rad", "speed": "m/s", "speed_change": "m/s2",
+    "distance": "m", "time": "s",
+}  # fmt: skip
+SIGNALS = {**BODY_SIGNALS, **ELEMENT_SIGNALS, **WHEEL_SIGNALS, **OTHER_SIGNALS}
+"""SI units of what can be measured."""
+ABOUT_AXES = {"deflection": "rad", "rate": "rad/s", "force": "N m"}
+"""Those of an element about an axis."""
 ANGLES = ("roll", "pitch", "yaw")
-TRACK_SIGNALS = ("curvature", "cant_angle")
 
 
 class Signal(Definition):
     """Something that is measured during a run."""
 
-    quantity: Literal[
-        "displacement", "velocity", "acceleration", "angle", "angular_velocity",
-        "deflection", "rate", "force", "power", "wheel_speed", "Q", "Y",
-        "curvature", "cant_angle", "speed", "speed_change", "distance", "time",
-    ]  # fmt: skip
+    quantity: Literal[tuple(SIGNALS)]  # type: ignore[valid-type]
     """Of a `body`: displacement and velocity of a point against the track, what an accelerometer
     reads there, angle against the track, absolute angular velocity; of an `element`: deflection,
     its rate, force, power; of a `wheelset`: speed of its circumference, wheel loads; of the track:
@@ -113,13 +119,8 @@ class Signal(Definition):
     @property
     def unit(self) -> str:
         """SI unit of what is measured."""
-        of_element = ("rad", "rad/s", "N m", "W") if self.axis in ANGLES else ("m", "m/s", "N", "W")
-        return {
-            **dict(zip(BODY_SIGNALS, ("m", "m/s", "m/s2", "rad", "rad/s"), strict=True)),
-            **dict(zip(ELEMENT_SIGNALS, of_element, strict=True)),
-            **{"wheel_speed": "m/s", "Q": "N", "Y": "N", "curvature": "1/m", "cant_angle": "rad"},
-            **{"speed": "m/s", "speed_change": "m/s2", "distance": "m", "time": "s"},
-        }[self.quantity]
+        about = ABOUT_AXES.get(self.quantity) if self.axis in ANGLES else None
+        return about or SIGNALS[self.quantity]
 
     @check
     def _what_belongs_together(self) -> None:
@@ -131,7 +132,7 @@ class Signal(Definition):
             raise ValueError("'side' belongs to Q and Y and only to them")
         if self.quantity in BODY_SIGNALS and self.axis is None:
             raise ValueError(f"{self.quantity} needs 'axis'")
-        linear = self.quantity in BODY_SIGNALS[:3]
+        linear = self.quantity in ("displacement", "velocity", "acceleration")
         if linear and self.axis in ANGLES:
             raise ValueError(f"the axis of {self.quantity} is x, y or z")
         if not linear and self.quantity in BODY_SIGNALS and self.axis in ("x", "y", "z"):
