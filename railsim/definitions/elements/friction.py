@@ -12,6 +12,7 @@ from railsim.definitions.base import (
     NonNegative,
     NonNegativeVector,
     Positive,
+    Share,
     Vector,
     check,
 )
@@ -32,7 +33,7 @@ class SlidingFriction(Definition):
     velocity of stick-slip motion, Wear 82, 277-289.
     """
 
-    sliding_ratio: Annotated[Finite, Field(gt=0.0, le=1.0)] = 1.0
+    sliding_ratio: Share = 1.0
     """Friction at high sliding speed over that at rest [1]; 1: it does not fall"""
     stribeck_speed: Positive | None = None
     """Sliding speed at which the difference has fallen to 1/e of itself [m/s]"""
@@ -58,18 +59,18 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
 
     SUPPORTS: ClassVar = "on axles"
     kind: Literal["friction"]
-    friction_force: NonNegativeVector = (0.0, 0.0, 0.0)
+    friction_force: NonNegativeVector = NOTHING
     """Constant part of the largest friction force along x, y, z [N]"""
-    friction_coefficient: NonNegativeVector = (0.0, 0.0, 0.0)
+    friction_coefficient: NonNegativeVector = NOTHING
     """Part that grows with the vertical spring force, along x, y, z [1]"""
-    stick_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    stick_stiffness: NonNegativeVector = NOTHING
     """Stiffness of the sticking pad along x, y, z, needed where there is friction [N/m]"""
     friction_limit: Literal["circle", "axes"] = "circle"
     """`circle`: one contact slides in any direction, its force within a circle (an ellipse where
     the limits differ); `axes`: contacts of their own along each axis"""
-    stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    stiffness: NonNegativeVector = NOTHING
     """Stiffness of the parallel spring along x, y, z [N/m]"""
-    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    damping: NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
     preload: AutoOrVector = "auto"
     """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
@@ -217,7 +218,7 @@ class CentrePlate(SlidingFriction, PairElement):
                 pad = SideBearer(
                     kind="side_bearer",
                     bodies=self.bodies,
-                    point=(0.0, 0.0, 0.0),
+                    point=NOTHING,
                     stiffness=0.25 * share * self.stiffness,
                     damping=0.25 * share * self.damping,
                     preload="auto" if self.preload == "auto" else 0.25 * share * self.preload,
@@ -272,7 +273,7 @@ class Wedge(VerticalSpring, PointElement):
     kind: Literal["wedge"]
     stiffness: NonNegativeVector
     """Stiffness of the wedge springs of one side along x, y, z [N/m]"""
-    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    damping: NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
     preload: AutoOrVector = "auto"
     """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""

@@ -25,7 +25,7 @@ from railsim.definitions.elements.base import (
     VerticalSpring,
     two_sided,
 )
-from railsim.definitions.elements.rows import Link, Mount, State
+from railsim.definitions.elements.rows import NOTHING, Link, Mount, State
 
 
 class SpringDamper(FreeLength, SidedElement):
@@ -108,15 +108,15 @@ class Bushing(VerticalSpring, PointElement):
 
     SUPPORTS: ClassVar = "on axles"
     kind: Literal["bushing"]
-    stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    stiffness: NonNegativeVector = NOTHING
     """Stiffness along x, y, z [N/m]"""
-    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    damping: NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
-    series_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    series_stiffness: NonNegativeVector = NOTHING
     """Stiffness in series with the damping of each axis [N/m]; 0 means rigid"""
-    rotational_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    rotational_stiffness: NonNegativeVector = NOTHING
     """Stiffness about x, y, z [N m/rad]"""
-    rotational_damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    rotational_damping: NonNegativeVector = NOTHING
     """Damping about x, y, z [N m s/rad]"""
     preload: AutoOrVector = "auto"
     """Force on body 1 in the nominal position along x, y, z [N], or `auto`: from the equilibrium"""
@@ -156,7 +156,7 @@ class ShearSpring(VerticalSpring, SidedElement):
     """Seat on body 1 and seat on body 2 [m]"""
     stiffness: NonNegativeVector
     """Stiffness along x, y, z [N/m]"""
-    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    damping: NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
     bending_stiffness: tuple[NonNegative, NonNegative] = (0.0, 0.0)
     """Bending stiffness about x and y [N m/rad]"""

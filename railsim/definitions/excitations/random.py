@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Flag, NonNegative, check
+from railsim.definitions.base import Finite, Flag, NonNegative, Whole, check
 from railsim.definitions.excitations.base import (
     CHANNELS,
     MIRROR,
@@ -42,7 +42,7 @@ class Random(Stretch):
     """Which spectra, by name; `own` needs `coefficients`"""
     coefficients: Coefficients | None = None
     """Own coefficients"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Whole = 1
     """Seed of the random phases: the same seed gives the same track"""
     wavelengths: Wavelengths = (3.0, 70.0)
     """Shortest and longest wavelength [m]; the variance is the integral of the spectrum between"""

@@ -5,13 +5,12 @@ from typing import Literal, Self
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Positive
+from railsim.definitions.base import OTHER_SIDE, Finite, Positive
 from railsim.definitions.excitations.base import Amplitude, Displacement, Irregular
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 
 Rails = Literal["left", "right", "both"]
-OTHER_RAIL: dict[str, Rails] = {"left": "right", "right": "left", "both": "both"}
 MOVED = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}
 
 
@@ -75,7 +74,7 @@ class Dip(Single):
 
     def mirrored(self) -> Self:
         """Return the same on the other rail."""
-        return self.model_copy(update={"rail": OTHER_RAIL[self.rail]})
+        return self.model_copy(update={"rail": OTHER_SIDE[self.rail]})
 
     def displacement(self, length: float) -> Displacement:
         """Return how it moves the rails."""
@@ -94,7 +93,7 @@ class Kink(Single):
 
     def mirrored(self) -> Self:
         """Return the opposite on the other rail."""
-        return self.model_copy(update={"rail": OTHER_RAIL[self.rail], "offset": -self.offset})
+        return self.model_copy(update={"rail": OTHER_SIDE[self.rail], "offset": -self.offset})
 
     def displacement(self, length: float) -> Displacement:
         """Return how it moves the rails."""

@@ -12,7 +12,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from railsim.definitions.base import EMPTY_TABLE, Count, Definition, Name, Remark, Text, check
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Count,
+    Definition,
+    Name,
+    Remark,
+    Text,
+    Whole,
+    check,
+)
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism.parts import (
     AUTO,
@@ -267,7 +276,7 @@ class Optimise(Definition):
     """Boxes that points may not leave"""
     starts: Count = 20
     """Number of starts of the search; the first is the file's own"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Whole = 1
     """Seed of the other starts"""
     assemblies: dict[Name, tuple[Quantity, ...]] = EMPTY_TABLE
     """Parameters that choose an assembly, with the values that starts may take"""

@@ -15,7 +15,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from railsim.definitions.base import EMPTY_TABLE, Definition, Flag, Name, check
+from railsim.definitions.base import EMPTY_TABLE, Definition, Flag, Name, Side, check
 from railsim.definitions.mechanism.expressions import Expression
 
 AUTO = "auto"
@@ -195,7 +195,7 @@ class Arc(Definition):
 
     radius: Positive
     """Radius [m]"""
-    turns: Literal["left", "right"]
+    turns: Side
     """Side to which the path turns on its way"""
     length: Positive | None = None
     """Length along the path [m], of a path of tangent arcs"""

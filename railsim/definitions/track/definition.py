@@ -18,6 +18,7 @@ from railsim.definitions.base import (
     NonNegative,
     NonNegativePair,
     Remark,
+    Share,
     Speed,
     Text,
     TextPair,
@@ -57,7 +58,6 @@ FrictionRows = Annotated[
     both_sides(),
     SIDED_ROWS,
 ]
-Share = Annotated[Finite, Field(gt=0, le=1)]
 ThirdBody = Annotated[
     tuple[Share, Share],
     AfterValidator(_softer_in_slip),

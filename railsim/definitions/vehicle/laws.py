@@ -7,7 +7,7 @@ told apart by it, and workers get it.  Nothing is executed here (see `railsim.la
 import ast
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -16,11 +16,14 @@ from railsim.definitions.base import (
     Count,
     Definition,
     Finite,
+    Flag,
     Name,
     NonNegative,
     Positive,
+    Side,
     Text,
     Vector,
+    Whole,
     check,
 )
 from railsim.errors import Fault, InputError, input_error, nearest
@@ -37,7 +40,7 @@ class Law(Definition):
     """Name of the function; by default that of the law"""
     source: Text | None = None
     """Text of the file, as results carry it"""
-    compiled: Annotated[bool, Field(strict=True)] = True
+    compiled: Flag = True
     """`false`: called as Python, slowly"""
 
     @check
@@ -99,7 +102,7 @@ class Signal(Definition):
     """Full name of the element"""
     wheelset: Text | None = None
     """Full name of the wheelset"""
-    side: Literal["left", "right"] | None = None
+    side: Side | None = None
     """Side of the wheel, of `Q` and `Y`"""
     axis: Literal["x", "y", "z", "roll", "pitch", "yaw"] | None = None
     """Axis; of a link its line, by default"""
@@ -111,7 +114,7 @@ class Signal(Definition):
     """Time after which a sample is known [s]; needs `rate`"""
     noise: NonNegative = 0.0
     """Standard deviation of normal noise of each sample [unit of the quantity]; needs `rate`"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Whole = 1
     """Seed of the noise"""
     resolution: NonNegative = 0.0
     """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
