@@ -80,12 +80,12 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
         raise input_error("", str(error), hint, key=key) from None
 
 
-def coordinates(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:
+def coordinates(where: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
     """Coordinates of a point in its body's axes."""
     if isinstance(where, Polar):
-        radius, angle = number(where.radius, values, key), number(where.angle, values, key)
+        radius, angle = number(where.radius, values), number(where.angle, values)
         return radius * np.cos(angle), radius * np.sin(angle)
-    return number(where[0], values, key), number(where[1], values, key)
+    return number(where[0], values), number(where[1], values)
 
 
 def point_names(mechanism: Mechanism) -> list[str]:
