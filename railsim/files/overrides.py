@@ -13,7 +13,7 @@ from typing import Any
 
 from railsim.errors import Faults
 from railsim.files.key_paths import descend, full_path, key_path
-from railsim.files.sources import OVERRIDE, Source, located_fault, override_fault, replace_origin
+from railsim.files.sources import OVERRIDE, Source, located_fault, replace_origin
 from railsim.text import shortened
 from railsim.units import number_with_unit
 
@@ -22,10 +22,7 @@ Read = Callable[[Any], Any]
 
 
 def apply_overrides(
-    source: Source,
-    overrides: Iterable[str],
-    free: Sequence[str] = (),
-    defaults: dict[str, Any] | None = None,
+    source: Source, overrides: Iterable[str], free: Sequence[str], defaults: dict[str, Any]
 ) -> Source:
     """Return the source with `key.path=value` texts applied in their order.
 
@@ -35,15 +32,11 @@ def apply_overrides(
     source gives no value, so that `fastsim_grid.0=20` changes one of two. Raises InputError: an
     assignment that means nothing; all of them at once.
     """
-    texts = [overrides] if isinstance(overrides, str) else overrides
-    return _changed(source, map(_parsed, texts), free, defaults, OVERRIDE)
+    return _changed(source, map(_parsed, overrides), free, defaults, OVERRIDE)
 
 
 def with_values(
-    source: Source,
-    values: Mapping[str, Any],
-    free: Sequence[str] = (),
-    defaults: dict[str, Any] | None = None,
+    source: Source, values: Mapping[str, Any], free: Sequence[str], defaults: dict[str, Any]
 ) -> Source:
     """Return the source with values of Python at `key.path`s; as `apply_overrides`.
 
@@ -76,7 +69,7 @@ def _changed(
     source: Source,
     assignments: Iterable[tuple[str, Read | None]],
     free: Sequence[str],
-    defaults: dict[str, Any] | None,
+    defaults: dict[str, Any],
     origin: str,
 ) -> Source:
     """Return the source with keys set to what is made of their present values."""
@@ -136,6 +129,6 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
         else:
             key = text.partition("=")[0]
             allowed = "a path that begins with vehicle., track. or settings."
-            faults.append(override_fault(key, "unknown beginning", allowed))
+            faults.append(located_fault(OVERRIDE, key, "unknown beginning", allowed))
     faults.check()
     return sorted_ones

@@ -55,15 +55,10 @@ KeyPath = tuple[str, ...]
 OVERRIDE = "overrides"  # parameter that holds assignments, for the command line `--set`
 
 
-def override_fault(key: str, found: str, allowed: str = "") -> Fault:
-    """Return the fault of an assignment."""
-    return argument_fault(OVERRIDE, key, found, allowed, "--set")
-
-
 def located_fault(file: str, key: str, found: str, allowed: str) -> Fault:
     """Return the fault of a key that came from a file or from an assignment."""
     if file == OVERRIDE:
-        return override_fault(key, found, allowed)
+        return argument_fault(OVERRIDE, key, found, allowed, "--set")
     return Fault(file, key, found, allowed)
 
 

@@ -141,7 +141,8 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
     named = [column for column in columns if column]
     values = np.array(table).reshape(len(table), len(named))
     rows = _rows(named, values, how)
-    faults += [(numbers[k], *words) for k, *words in _row_faults(rows, named, values)]
+    found = _row_faults(rows, named, values)
+    faults += [(numbers[k], what, allowed) for k, what, allowed in found]
     faults.sort(key=lambda fault: fault[0])
     Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
@@ -180,10 +181,10 @@ def _row_faults(
     """Rows that cannot be: index, what was found, and what is allowed."""
     s, rails = rows[:, 0], np.abs(rows[:, 1:])
     step, change = np.diff(s), np.abs(np.diff(rows[:, 1:], axis=0)).max(axis=1)
-    for k in np.flatnonzero(step <= 0.0):
+    for k in np.flatnonzero(step <= 0.0).tolist():
         allowed = "arc lengths that increase from row to row; or falling_mileage = true"
         yield k + 1, f"s = {s[k + 1]:g} m does not increase", allowed
-    for k in np.flatnonzero((step > 0.0) & (change > STEEPEST * step)):
+    for k in np.flatnonzero((step > 0.0) & (change > STEEPEST * step)).tolist():
         allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
         yield k + 1, f"{change[k] * 1e3:.3g} mm within {step[k]:.3g} m", allowed
     absolute = np.zeros(len(rows), dtype=bool)  # the distance of the rails, not its deviation
@@ -191,11 +192,11 @@ def _row_faults(
         if name == "gauge":
             gauge = abs(unit) * (written - offset)
             absolute |= (gauge > 0.6) & (gauge < 2.0)
-    for k in np.flatnonzero(absolute):
+    for k in np.flatnonzero(absolute).tolist():
         allowed = "its deviation; give the nominal one by offset = { gauge = 1435.0 }"
         yield k, "an absolute gauge", allowed
     largest = rails.max(axis=1)
-    for k in np.flatnonzero(~absolute & (largest > LARGEST)):
+    for k in np.flatnonzero(~absolute & (largest > LARGEST)).tolist():
         allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
         yield k, f"a displacement of {largest[k]:g} m", allowed
 
