@@ -30,7 +30,9 @@ from railsim.units import speed_in_si
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Share = Annotated[Finite, Field(gt=0, le=1)]
 Count = Annotated[int, Field(strict=True, gt=0)]
+Whole = Annotated[int, Field(strict=True, ge=0)]
 Flag = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Name = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
@@ -39,6 +41,9 @@ Speed = Annotated[
     float, Field(strict=True, allow_inf_nan=False, gt=0), BeforeValidator(speed_in_si)
 ]
 """Speed [m/s]; texts with units are taken too"""
+
+Side = Literal["left", "right"]
+OTHER_SIDE: dict[str, Any] = {"left": "right", "right": "left", "both": "both"}
 
 Vector = tuple[Finite, Finite, Finite]
 PositiveVector = tuple[Positive, Positive, Positive]

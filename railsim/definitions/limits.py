@@ -29,9 +29,6 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 
-COMFORT_LIMITS_FORMAT = "railsim-comfort-limits/1"
-
-
 Rows = Annotated[tuple[tuple[Positive, Positive], ...], Field(min_length=1), rises("first column")]
 Probability = Annotated[float, Field(strict=True, ge=0.5, lt=1.0)]
 ZoneName = Annotated[str, Field(pattern="^[1-4]$")]

@@ -1,14 +1,14 @@
 """From files to definitions, with every fault of a file reported at once.
 
-`load_vehicle`, `load_track` and their like read one file each; `FORMATS` holds every definition by
-its `format` key.  What is checked beyond the single values stands in each definition.
+`load_vehicle`, `load_track` and their like read one file each; `definition_of` gives the definition
+of a `format`.  What is checked beyond the single values stands in each definition.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib import import_module
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, TypeVar
 
 from railsim.definitions.file_definition import FileDefinition, format_fault, loaded
 from railsim.definitions.settings import Settings
@@ -17,7 +17,6 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import wrong_type
 from railsim.errors import InputError, input_error
 from railsim.files import sources
-from railsim.files.access import is_file
 from railsim.files.sources import Source
 
 if TYPE_CHECKING:
@@ -36,52 +35,36 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=FileDefinition)
 Overrides = Iterable[str] | str
 
-_HOMES = {
-    "railsim-vehicle/1": ("vehicle.definition", "Vehicle"),
-    "railsim-track/1": ("track.definition", "Track"),
-    "railsim-settings/1": ("settings", "Settings"),
-    "railsim-spring/1": ("spring", "TrailingArmSuspension"),
-    "railsim-mechanism/1": ("mechanism.definition", "Mechanism"),
-    "railsim-limits/1": ("limits", "RunningLimits"),
-    "railsim-scenario/1": ("study.scenario", "Scenario"),
-    "railsim-comfort-limits/1": ("limits", "ComfortLimits"),
-    "railsim-published/1": ("published", "Published"),
-    "railsim-study/1": ("study.definition", "Study"),
-    "railsim-stationary-limits/1": ("limits", "StationaryLimits"),
-    "railsim-wear-law/1": ("wear_law", "WearLawFile"),
-    "railsim-wheel-limits/1": ("limits", "WheelLimits"),
-    "railsim-measurement/1": ("measurement", "MeasurementFile"),
-    "railsim-validation-limits/1": ("limits", "ValidationLimits"),
+FORMATS = {
+    "railsim-vehicle/1": "vehicle.definition:Vehicle",
+    "railsim-track/1": "track.definition:Track",
+    "railsim-settings/1": "settings:Settings",
+    "railsim-spring/1": "spring:TrailingArmSuspension",
+    "railsim-mechanism/1": "mechanism.definition:Mechanism",
+    "railsim-limits/1": "limits:RunningLimits",
+    "railsim-scenario/1": "study.scenario:Scenario",
+    "railsim-comfort-limits/1": "limits:ComfortLimits",
+    "railsim-published/1": "published:Published",
+    "railsim-study/1": "study.definition:Study",
+    "railsim-stationary-limits/1": "limits:StationaryLimits",
+    "railsim-wear-law/1": "wear_law:WearLawFile",
+    "railsim-wheel-limits/1": "limits:WheelLimits",
+    "railsim-measurement/1": "measurement:MeasurementFile",
+    "railsim-validation-limits/1": "limits:ValidationLimits",
 }
+"""Where the definition of every file is, by its `format` key."""
 
 
-class _Formats(Mapping[str, type[FileDefinition]]):
-    """Definitions by their `format` key, each imported when it is asked for."""
-
-    def __getitem__(self, key: str) -> type[FileDefinition]:
-        module, name = _HOMES[key]
-        home = import_module(f"railsim.definitions.{module}")
-        kind: type[FileDefinition] = getattr(home, name)
-        return kind
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_HOMES)
-
-    def __len__(self) -> int:
-        return len(_HOMES)
-
-
-FORMATS = _Formats()
-"""Every definition of a file by its `format` key."""
+def definition_of(format_name: str) -> type[FileDefinition]:
+    """Return the definition of a format, imported when it is asked for."""
+    found: type[FileDefinition] = resolve_name(f"railsim.definitions.{FORMATS[format_name]}")
+    return found
 
 
 def load(model: type[D], path: str | Path, overrides: Overrides = ()) -> D:
     """Load a file of a kind, or a shipped one by its name."""
-    return loaded(model, _file_source(path, model.KIND), overrides)
-
-
-def _file_source(path: str | Path, kind: str) -> Source:
-    return sources.read_source(sources.find_file(path, kind), kind)
+    file = sources.find_file(path, model.KIND)
+    return loaded(model, sources.read_source(file, model.KIND), overrides)
 
 
 def load_vehicle(path: str | Path, overrides: Overrides = ()) -> Vehicle:
@@ -136,16 +119,9 @@ def load_mechanism(path: str | Path, overrides: Overrides = ()) -> "Mechanism":
     >>> load_mechanism("atr95_lift_5", "parameters.a1=0.16").parameters["a1"]
     0.16
     """
-    source = _file_source(path, "mechanism")
-    optimise = source.data.get("optimise")
-    name = optimise.get("reference") if isinstance(optimise, dict) else None
-    if isinstance(optimise, dict) and isinstance(name, str):
-        beside = Path(source.file_of(("optimise", "reference"))).parent / name
-        if is_file(beside):
-            optimise["reference"] = str(beside.resolve())
     from railsim.definitions.mechanism.definition import Mechanism
 
-    return loaded(Mechanism, source, overrides)
+    return load(Mechanism, path, overrides)
 
 
 def load_scenario(path: str | Path, overrides: Overrides = ()) -> "Scenario":
@@ -195,23 +171,9 @@ def load_study(path: str | Path, overrides: Overrides = ()) -> "Study":
 
     Names of files that lie beside it count from its folder.
     """
-    source = _file_source(path, "study")
-    folder = Path(source.file).parent
-    data = source.data
-    for key in ("vehicles", "tracks"):
-        if isinstance(data.get(key), list):
-            data[key] = [_beside(folder, name) for name in data[key]]
-    if "settings" in data:
-        data["settings"] = _beside(folder, data["settings"])
     from railsim.definitions.study.definition import Study
 
-    return loaded(Study, source, overrides)
-
-
-def _beside(folder: Path, name: Any) -> Any:
-    if isinstance(name, str) and name and (folder / name).is_file():
-        return str((folder / name).resolve())
-    return name
+    return load(Study, path, overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:
@@ -243,9 +205,9 @@ def load_any(path: str | Path, overrides: Iterable[str] = ()) -> FileDefinition:
     file = sources.find_any(path)
     data = sources.read_toml(file)
     head = data.get("format")
-    model = FORMATS.get(head) if isinstance(head, str) else None
-    if model is None:
+    if not isinstance(head, str) or head not in FORMATS:
         raise InputError([format_fault(str(path), head, FORMATS)])
+    model = definition_of(head)
     return loaded(model, sources.read_source(file, model.KIND, data), overrides)
 
 

@@ -19,6 +19,7 @@ from railsim.definitions.base import (
     NonNegative,
     Positive,
     Text,
+    Whole,
     check,
 )
 from railsim.definitions.file_definition import FileDefinition
@@ -97,7 +98,7 @@ class Channel(Definition):
     `yaw_rate` (of the body) of the run itself"""
     column: Text | None = None
     """Its name in the files (a path in HDF5); by default that of the channel"""
-    index: tuple[Annotated[int, Field(strict=True, ge=0)], ...] = ()
+    index: tuple[Whole, ...] = ()
     """Which series of an array with more dimensions than time, from 0: `[0, 1]` (HDF5, MATLAB)"""
     unit: Text | None = None
     """Unit of the file; by default SI"""

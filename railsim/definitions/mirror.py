@@ -6,9 +6,8 @@ mirrored track gives the mirrored result, which checks all signs.
 
 from typing import TypeVar
 
-from railsim.definitions.base import Vector
+from railsim.definitions.base import OTHER_SIDE, Vector
 from railsim.definitions.elements.base import Element
-from railsim.definitions.excitations.single import OTHER_RAIL
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.tables import Assembly, Axlebox, Body, Placement, Wheelset
@@ -62,7 +61,7 @@ def _mirrored_group(group: Group) -> Group:
                     "radius": w.radius[::-1],
                     "profile": w.profile[::-1],
                     "out_of_round": {
-                        key: part.model_copy(update={"wheel": OTHER_RAIL[part.wheel]})
+                        key: part.model_copy(update={"wheel": OTHER_SIDE[part.wheel]})
                         for key, part in w.out_of_round.items()
                     },
                 }

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import Count, Definition, Finite, NonNegative, Positive, Text
+from railsim.definitions.base import Count, Definition, Finite, NonNegative, Positive, Side, Text
 from railsim.definitions.file_definition import FileDefinition
 from railsim.notation import QUANTITIES
 
@@ -21,7 +21,7 @@ class PublishedValue(Definition):
     """Quantity of a result"""
     wheelset: Count = 1
     """Wheelset, from the leading end"""
-    side: Literal["left", "right"] | None = None
+    side: Side | None = None
     """Wheel, for quantities that have one"""
     read: Literal["largest", "smallest"] | NonNegative
     """Largest or smallest value over the run, or the time of the value from the start of the track

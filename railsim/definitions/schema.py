@@ -8,12 +8,13 @@
 import json
 import re
 import sys
-import typing
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.base import Definition, meanings
-from railsim.definitions.loading import FORMATS
+from pydantic.json_schema import GenerateJsonSchema
+
+from railsim.definitions.base import meanings
+from railsim.definitions.loading import FORMATS, definition_of
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _BEGIN = r"<!-- keys: (?P<format>\S+) (?P<name>\w+) -->\n"
@@ -26,14 +27,8 @@ def json_schema(format_name: str) -> dict[str, Any]:
     A file that `extends` another is only a part of a definition: of such a file the schema checks
     `format`, `extends` and `remove`; the whole is checked when it is loaded.
     """
-    model = FORMATS[format_name]
-    full = model.model_json_schema()
-    _describe(full, model)
-    known = _parts(model)
-    for name, part in full.get("$defs", {}).items():
-        if name in known:
-            _describe(part, known[name])
-    full = _tidy(full)
+    model = definition_of(format_name)
+    full = model.model_json_schema(schema_generator=_Generator)
     definitions = full.pop("$defs", {})
     return {
         "$schema": DIALECT,
@@ -56,54 +51,45 @@ def json_schema(format_name: str) -> dict[str, Any]:
     }
 
 
-def _parts(model: type[Definition]) -> dict[str, type[Definition]]:
-    """All definitions that a definition is made of, by their names."""
-    found: dict[str, type[Definition]] = {}
-    waiting: list[Any] = [model]
-    while waiting:
-        one = waiting.pop()
-        if not (isinstance(one, type) and issubclass(one, Definition)):
-            waiting += typing.get_args(one)
-        elif one.__name__ not in found:
-            found[one.__name__] = one
-            waiting += [field.annotation for field in one.model_fields.values()]
-    return found
+class _Generator(GenerateJsonSchema):
+    """Adds what the texts below the fields say; leaves out titles and nulls, which TOML lacks."""
 
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
 
-def _describe(schema: dict[str, Any], model: type[Definition]) -> None:
-    """Write into a definition's schema what the texts below its fields say."""
-    said = meanings(model)
-    for name, field in schema.get("properties", {}).items():
-        if name in said and "description" not in field:
-            field["description"] = said[name]
-            schema["properties"][name] = dict(sorted(field.items()))
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().model_schema(schema)
+        found.pop("title")
+        said = meanings(schema["cls"])
+        for name, field in found.get("properties", {}).items():
+            if name in said:
+                field.setdefault("description", said[name])
+        return found
 
+    def nullable_schema(self, schema: Any) -> dict[str, Any]:
+        return self.generate_inner(schema["schema"])
 
-def _tidy(node: Any) -> Any:
-    """Return a schema without titles, nulls and repeated members, which TOML does not need."""
-    if isinstance(node, list):
-        return [_tidy(member) for member in node]
-    if not isinstance(node, dict):
-        return node
-    tidy = {key: _tidy(value) for key, value in node.items() if not _noise(key, value)}
-    options = tidy.get("anyOf", [])
-    if {"type": "null"} in options:
-        options.remove({"type": "null"})
-        if len(options) == 1:
-            tidy.update(tidy.pop("anyOf")[0])
-    members = tidy.get("prefixItems", [])
-    if members and all(member == members[0] for member in members):
-        tidy["items"] = tidy.pop("prefixItems")[0]
-    if "patternProperties" in tidy:
-        tidy["additionalProperties"] = False
-    return tidy
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().default_schema(schema)
+        if found.get("default", "") is None:
+            del found["default"]
+        return found
 
+    def tuple_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().tuple_schema(schema)
+        members = found.get("prefixItems", [])
+        if members and all(member == members[0] for member in members):
+            found["items"] = found.pop("prefixItems")[0]
+        return found
 
-def _noise(key: str, value: Any) -> bool:
-    """Whether a keyword has no meaning here; a property that has its name by chance is a table."""
-    if key == "title":
-        return isinstance(value, str)
-    return key == "discriminator" or (key == "default" and value is None)
+    def dict_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().dict_schema(schema)
+        return {**found, "additionalProperties": False} if "patternProperties" in found else found
+
+    def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().tagged_union_schema(schema)
+        found.pop("discriminator", None)
+        return found
 
 
 def schema_name(format_name: str) -> str:

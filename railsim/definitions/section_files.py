@@ -2,8 +2,8 @@
 
 The first two are those of the program CONTACT (user guide, "variable profiles"): offset and scale
 of the positions, number of sections, numbers of features, kinks and accelerations, kind of
-interpolation, then position and file of each section, and for each section where along its contour
-the features lie.  The project's own list is a CSV with the columns `s` (m) or `angle` (rad), and
+interpolation, then position and file of each section; where the features lie, which follows, is not
+read.  The project's own list is a CSV with the columns `s` (m) or `angle` (rad), and
 `file`, or `y` and `z` (m) with a row for every point.  A section's file has two columns y, z;
 values beyond 1 are taken for millimetres.
 """
@@ -27,7 +27,6 @@ from railsim.text import LONGEST_FILE, shortened
 MOST_SECTIONS = 2000
 FEWEST_POINTS = 8
 WIDEST = 0.4  # m, of a section
-ABSENT = -1.0  # of a feature that a section lacks
 NARROWEST = 0.01  # m
 
 
@@ -36,13 +35,11 @@ class SectionList:
     """Sections in the order of their positions.
 
     `positions`, shape (n,): arc length [m] or angle [rad]; `points`, shape (2, k): y, z along the
-    contour of each section [m]; `features`, shape (n, m): lengths along the contours at which
-    features lie [m], nan where a section lacks one; m = 0 where no features are given.
+    contour of each section [m].
     """
 
     positions: Floats
     points: tuple[Floats, ...]
-    features: Floats
 
 
 def read_sections(path: str | Path, kind: str) -> SectionList:
@@ -59,9 +56,8 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
     text = read_text(path, TABLE_BYTES)
     if suffix == ".csv":
         positions, points = _own_list(path, text, kind)
-        features = np.full((len(positions), 0), np.nan)
     else:
-        positions, names, features = _slc(path, text, 1.0 if kind == "wheel" else 1e-3)
+        positions, names = _slc(path, text, 1.0 if kind == "wheel" else 1e-3)
         read = {name: _section(path, name) for name in dict.fromkeys(names)}
         points = [read[name] for name in names]
     if len(positions) < 2 or len(positions) > MOST_SECTIONS:
@@ -69,15 +65,15 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
     for before, after in pairwise(positions):
         if after <= before:
             raise _wrong(path, "", f"position {after:g} after {before:g}", "rising positions")
-    return SectionList(np.array(positions), tuple(points), features)
+    return SectionList(np.array(positions), tuple(points))
 
 
 def _wrong(path: Path, key: str, found: str, allowed: str) -> InputError:
     return input_error(str(path), found, allowed, key=key)
 
 
-def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Floats]:
-    """Positions [m or rad], files and features of a list of the program CONTACT."""
+def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str]]:
+    """Positions [m or rad] and files of a list of the program CONTACT."""
     lines = [
         (number, stripped)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -102,7 +98,7 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Fl
     if scale == 0.0:
         raise _wrong(path, "", "scale 0", "the scale of the positions, not zero")
     n = int(numbers("the number of sections", 1)[0])
-    n_features = int(numbers("the numbers of features, kinks and accelerations", 3)[0])
+    numbers("the numbers of features, kinks and accelerations", 3)
     numbers("the kind of interpolation", 1)
     positions, names = [], []
     for _ in range(n):
@@ -113,16 +109,7 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Fl
             raise _wrong(path, f"line {row[0]}", f"'{shown}'", f"position and 'file', {n} times")
         positions.append(unit * scale * (offset + numbers("a position", 1, row)[0]))
         names.append(quoted.group(1))
-    features = np.full((n, 0), np.nan)
-    if n_features > 1:
-        last = [row for row in rows if len(row[1].split()) >= n_features + 1]
-        if len(last) != n:
-            found = f"{len(last)} rows of {n_features} features"
-            raise _wrong(path, "", found, f"{n}, one of every section")
-        table = [numbers("a position and features", n_features + 1, row) for row in last]
-        features = np.array(table)[:, 1 : n_features + 1]
-        features = np.where(features == ABSENT, np.nan, 1e-3 * features)
-    return positions, names, features
+    return positions, names
 
 
 def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Floats]]:

@@ -20,7 +20,7 @@ from railsim.definitions.base import (
     Remark,
     Text,
     check,
-    rising,
+    rises,
 )
 from railsim.definitions.file_definition import FileDefinition
 from railsim.errors import Fault, nearest
@@ -29,16 +29,7 @@ Row = tuple[NonNegative, Positive]
 Range = tuple[Positive, Positive]
 
 
-def _rising_table(rows: Sequence[Sequence[float]]) -> Sequence[Sequence[float]]:
-    if not rows:
-        raise ValueError("a table needs one row at least")
-    if not rising(rows):
-        raise ValueError("the first column must increase from row to row")
-    return rows
-
-
 def _polyline(rows: Sequence[Sequence[float]]) -> Sequence[Sequence[float]]:
-    _rising_table(rows)
     if any(upper < lower for lower, upper in rows):
         raise ValueError("rows [tau_min, tau_max]: the upper stress must not be below the lower")
     return rows
@@ -56,10 +47,13 @@ _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems":
 NumberOrTable = Annotated[
     tuple[Row, ...],
     BeforeValidator(lambda v: v if isinstance(v, list | tuple) else ((0.0, v),)),
-    AfterValidator(_rising_table),
+    Field(min_length=1),
+    rises("first column"),
     WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _ROW, "minItems": 1}]}),
 ]
-Polyline = Annotated[tuple[Row, ...], AfterValidator(_polyline)]
+Polyline = Annotated[
+    tuple[Row, ...], Field(min_length=2), rises("first column"), AfterValidator(_polyline)
+]
 Bounds = Annotated[Range, AfterValidator(_ordered)]
 
 
@@ -149,7 +143,7 @@ class Fatigue(Definition):
     """Lowest dynamic load [N]; by default the tare load - 35 %"""
     tare: Text = "ODM"
     """Name of the tare load among `loads`"""
-    goodman: Polyline = Field(min_length=2)
+    goodman: Polyline
     """Rows [tau_min, tau_max] of the Goodman-Smith line [Pa]"""
 
 

@@ -9,12 +9,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 from railsim.errors import Faults
 from railsim.files.key_paths import descend, full_path, key_path
-from railsim.files.sources import OVERRIDE, Source, located_fault, override_fault, replace_origin
+from railsim.files.sources import OVERRIDE, Source, located_fault, replace_origin
 from railsim.text import shortened
 from railsim.units import number_with_unit
 
@@ -23,10 +22,7 @@ Read = Callable[[Any], Any]
 
 
 def apply_overrides(
-    source: Source,
-    overrides: Iterable[str],
-    free: Sequence[str] = (),
-    defaults: Mapping[str, Any] = MappingProxyType({}),
+    source: Source, overrides: Iterable[str], free: Sequence[str], defaults: dict[str, Any]
 ) -> Source:
     """Return the source with `key.path=value` texts applied in their order.
 
@@ -36,15 +32,11 @@ def apply_overrides(
     source gives no value, so that `fastsim_grid.0=20` changes one of two. Raises InputError: an
     assignment that means nothing; all of them at once.
     """
-    texts = [overrides] if isinstance(overrides, str) else overrides
-    return _changed(source, map(_parsed, texts), free, defaults, OVERRIDE)
+    return _changed(source, map(_parsed, overrides), free, defaults, OVERRIDE)
 
 
 def with_values(
-    source: Source,
-    values: Mapping[str, Any],
-    free: Sequence[str] = (),
-    defaults: Mapping[str, Any] = MappingProxyType({}),
+    source: Source, values: Mapping[str, Any], free: Sequence[str], defaults: dict[str, Any]
 ) -> Source:
     """Return the source with values of Python at `key.path`s; as `apply_overrides`.
 
@@ -77,42 +69,31 @@ def _changed(
     source: Source,
     assignments: Iterable[tuple[str, Read | None]],
     free: Sequence[str],
-    defaults: Mapping[str, Any],
+    defaults: dict[str, Any],
     origin: str,
 ) -> Source:
     """Return the source with keys set to what is made of their present values."""
-    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
+    data = deepcopy(source.data)
+    changed = replace(source, data=data, origin=dict(source.origin))
     faults = Faults()
     for key, read in assignments:
         try:
             if read is None:
                 raise KeyError("an assignment key.path=value is needed")
-            _assign(changed, key, read, free, defaults, origin)
+            path = key_path(key)
+            if path[0] in free and len(path) > 2:
+                path = [path[0], ".".join(path[1:-1]), path[-1]]
+            else:
+                path = full_path(data, path, defaults)
+            parent, last = descend(data, path, path[0] in free, defaults)
+            present = parent[last] if not isinstance(parent, dict) or last in parent else None
+            parent[last] = read(present)
+            names = tuple(str(descend(data, path[:end])[1]) for end in range(1, len(path) + 1))
+            replace_origin(changed.origin, names, present, parent[last], origin)
         except KeyError as problem:
             faults.append(located_fault(origin, key, str(problem.args[0]), ""))
     faults.check()
     return changed
-
-
-def _assign(
-    source: Source,
-    key: str,
-    read: Read,
-    free: Sequence[str],
-    defaults: Mapping[str, Any],
-    origin: str,
-) -> None:
-    """Set one key to what `read` makes of the value that is there."""
-    path = key_path(key)
-    if path[0] in free and len(path) > 2:
-        path = [path[0], ".".join(path[1:-1]), path[-1]]
-    else:
-        path = full_path(source.data, path, dict(defaults))
-    parent, last = descend(source.data, path, path[0] in free, dict(defaults))
-    present = parent[last] if not isinstance(parent, dict) or last in parent else None
-    parent[last] = read(present)
-    names = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
-    replace_origin(source.origin, names, present, parent[last], origin)
 
 
 def _value(written: str, present: Any) -> Any:
@@ -148,6 +129,6 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
         else:
             key = text.partition("=")[0]
             allowed = "a path that begins with vehicle., track. or settings."
-            faults.append(override_fault(key, "unknown beginning", allowed))
+            faults.append(located_fault(OVERRIDE, key, "unknown beginning", allowed))
     faults.check()
     return sorted_ones

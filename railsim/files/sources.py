@@ -39,6 +39,8 @@ LAWS = "laws"
 """Folder of a library with Python files of laws."""
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
+FILE_KEYS_OF = {"study": {"vehicles", "tracks", "settings"}, "mechanism": {"reference"}}
+"""Further ones in the files of a kind."""
 
 DEEPEST = 50  # levels of tables and lists
 MOST_KEYS = 100_000  # in a file; the largest vehicles and tracks have less
@@ -53,15 +55,10 @@ KeyPath = tuple[str, ...]
 OVERRIDE = "overrides"  # parameter that holds assignments, for the command line `--set`
 
 
-def override_fault(key: str, found: str, allowed: str = "") -> Fault:
-    """Return the fault of an assignment."""
-    return argument_fault(OVERRIDE, key, found, allowed, "--set")
-
-
 def located_fault(file: str, key: str, found: str, allowed: str) -> Fault:
     """Return the fault of a key that came from a file or from an assignment."""
     if file == OVERRIDE:
-        return override_fault(key, found, allowed)
+        return argument_fault(OVERRIDE, key, found, allowed, "--set")
     return Fault(file, key, found, allowed)
 
 
@@ -261,7 +258,7 @@ def text_source(text: str, file: str, kind: str) -> Source:
 
 def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ...]) -> Source:
     data, base_name, removed = _without_extends(data, path)
-    _anchor_files(data, path.parent)
+    _anchor_files(data, path.parent, FILE_KEYS | FILE_KEYS_OF.get(kind, set()))
     own = Source(str(path), data, dict.fromkeys(_paths(data, ()), str(path)))
     if base_name is None:
         return own
@@ -351,14 +348,14 @@ def _remove(base: Source, key: str, file: str) -> list[Fault]:
     return []
 
 
-def _anchor_files(node: Any, folder: Path) -> None:
+def _anchor_files(node: Any, folder: Path, keys: set[str]) -> None:
     """Make the names of existing files absolute, so that they mean the same from everywhere."""
     members = node.items() if isinstance(node, dict) else enumerate(node)
     for key, value in list(members):
-        if key in FILE_KEYS:
+        if key in keys:
             node[key] = _anchored(value, folder)
         elif isinstance(value, dict | list):
-            _anchor_files(value, folder)
+            _anchor_files(value, folder, keys)
 
 
 def _anchored(value: Any, folder: Path) -> Any:

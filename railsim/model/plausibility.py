@@ -13,8 +13,8 @@ from railsim.arrays import Floats
 from railsim.definitions import Vehicle
 from railsim.definitions.base import Remark
 from railsim.definitions.elements.base import FreeLength
-from railsim.definitions.elements.side_bearer import SideBearer
-from railsim.definitions.elements.spring_damper import SpringDamper
+from railsim.definitions.elements.friction import SideBearer
+from railsim.definitions.elements.springs import SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.errors import ModelError
 

@@ -126,7 +126,7 @@ def _range(
     assert part.contours is not None
     contours = tuple(np.array([contour.y, contour.z]) for contour in part.contours)
     positions = np.array([contour.s for contour in part.contours])
-    sections = SectionList(positions, contours, np.zeros((len(contours), 0)))
+    sections = SectionList(positions, contours)
     y, z = contours[0]
     try:
         face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face

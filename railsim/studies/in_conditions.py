@@ -17,7 +17,7 @@ from railsim.definitions import Track, Vehicle
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.study.scenario import Speed, TestCondition
-from railsim.definitions.track.tables import Circle
+from railsim.definitions.track.elements import Circle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, input_error

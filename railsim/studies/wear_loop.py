@@ -24,7 +24,7 @@ from railsim.contact import contact_geometry
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import WheelLimits
 from railsim.definitions.settings import InitialState
-from railsim.definitions.track.tables import Straight
+from railsim.definitions.track.elements import Straight
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, Faults, InputError, ModelError, RailsimError, input_error
 from railsim.profiles import Profile, load_profile

@@ -8,7 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from railsim.definitions.loading import FORMATS, load_any, load_vehicle
+from railsim.definitions.loading import FORMATS, definition_of, load_any, load_vehicle
 from railsim.definitions.schema import filled, json_schema, schema_name
 from railsim.files import sources
 
@@ -38,7 +38,7 @@ def test_key_tables_of_the_manual_are_up_to_date(page):
 
 @pytest.mark.parametrize("format_name", ["railsim-vehicle/1", "railsim-track/1"])
 def test_manual_shows_every_definition_of_a_format(format_name):
-    kind = FORMATS[format_name].KIND
+    kind = definition_of(format_name).KIND
     text = (DOCS / "user" / f"{kind}_file.md").read_text()
     for name in json_schema(format_name)["$defs"]:
         assert f"<!-- keys: {format_name} {name} -->" in text

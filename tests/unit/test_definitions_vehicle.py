@@ -156,6 +156,13 @@ def test_sided_element_takes_the_axlebox_of_its_side():
     assert {box.parent for box in boxes} == {"front"}
 
 
+def test_axlebox_stands_on_the_wheelset_even_beside_a_body_of_its_name():
+    box = {"wheelset": "axle", "position": [0.0, 1.0, -0.46], "pitch_inertia": 10.0}
+    arm = {"placements": [{"name": "front"}], "bodies": {"axle": BODY}, "axleboxes": {"box": box}}
+    flat = flatten(vehicle(wheelsets={"axle": WHEELSET}, assemblies={"arm": arm}))
+    assert flat.body("front.box").parent == "axle"
+
+
 def test_element_without_side_must_say_which_axlebox():
     (fault,) = faults_of(with_axleboxes())
     assert "elements.link.bodies.1: no body 'box'" in fault

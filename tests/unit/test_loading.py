@@ -9,6 +9,7 @@ import pytest
 from railsim.definitions.loading import (
     load_any,
     load_settings,
+    load_study,
     load_track,
     load_track_text,
     load_vehicle,
@@ -395,6 +396,14 @@ def test_profile_file_is_found_beside_the_file_that_names_it(write):
     profile = write("worn.csv", "y_mm,z_mm\n")
     path = write("mine.toml", TRACK + 'rail = ["worn.csv", "60E1"]\n')
     assert load_track(path).rail == (str(profile.resolve()), "60E1")
+
+
+def test_vehicles_of_a_study_are_found_beside_it_by_all_that_loads_it(write):
+    own = write("mine.toml", 'extends = "coach_manchester"\n')
+    text = 'format = "railsim-study/1"\nname = "s"\nvehicles = ["mine.toml", "coach_25t"]\n'
+    path = write("study.toml", text + 'tracks = ["straight"]\nspeeds = [20.0]\n')
+    for load in (load_study, load_any):
+        assert load(path).vehicles == (str(own.resolve()), "coach_25t")
 
 
 def test_text_of_a_track_reads_back():

@@ -34,7 +34,7 @@ def path_of_the_wheel():
     contours = load_track("crossing_56e1_r245_1in9.25").sections[0].contours
     points = tuple(np.array([one.y, one.z]) for one in contours)
     places = np.array([one.s for one in contours])
-    parts = rail_parts(SectionList(places, points, np.zeros((len(contours), 0))))
+    parts = rail_parts(SectionList(places, points))
     wheel = wheel_curve(load_profile("S1002", "wheel"), 0.46, 0.75)
     s = np.arange(-0.56, 1.7, 2e-3)
     gaps = [rigid_gaps(part, s, 0.46, [(wheel.y, wheel.r)], np.zeros(1)) for part in parts]

@@ -138,7 +138,7 @@ def test_height_on_a_nose_that_rises(wheel):
     folder = ROOT / "tests" / "data" / "sections"
     y, z = 1e-3 * np.loadtxt(folder / "cross_nose_0.csv", delimiter=",", skiprows=1).T
     s = np.linspace(-0.1, 0.1, 21)
-    sections = SectionList(s, tuple(np.array([y, z - 0.1 * at]) for at in s), np.zeros((21, 0)))
+    sections = SectionList(s, tuple(np.array([y, z - 0.1 * at]) for at in s))
     nose = rail_parts(sections)
     with (folder / "cross_nose_s0_dev.csv").open() as lines:
         (row,) = ({k: float(v) for k, v in row.items()} for row in csv.DictReader(lines))

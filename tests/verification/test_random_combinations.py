@@ -18,7 +18,7 @@ from test_lateral_ramp import ramp
 
 import railsim
 from railsim.bench.scenarios import IRREGULAR
-from railsim.definitions.excitations.kink import Kink
+from railsim.definitions.excitations.single import Kink
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.settings import Settings

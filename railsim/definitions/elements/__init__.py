@@ -1,11 +1,11 @@
-"""Force elements of a vehicle file, one module a kind, told apart by their key `kind`.
+"""Force elements of a vehicle file, told apart by their key `kind`.
 
 A force element acts between two bodies, named in the order [body 1, body 2].  Its parameters are
 those of the element as written (on the right for `sides = "both"`); `mirrored` gives the copy on
 the other side or in a mirrored assembly.  Tables hold rows [displacement or velocity, force].
 
-Every module of this package belongs to the registry `KINDS`: file format, schema, key tables,
-arrays and preloads read it.  `base` and `rows` hold what the kinds share.
+Every kind in a module of this package belongs to the registry `KINDS`: file format, schema, key
+tables, arrays and preloads read it.  `base` and `rows` hold what the kinds share.
 """
 
 from typing import TYPE_CHECKING, Annotated, Union

@@ -1,10 +1,10 @@
-"""Forces that follow a command, and what they share with forces by laws of one's own."""
+"""Forces that follow a command or a law of one's own."""
 
 from typing import Literal, Self
 
 from pydantic import PrivateAttr
 
-from railsim.definitions.base import NonNegative, Positive, check
+from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative, Positive, check
 from railsim.definitions.elements.base import PointElement, Signs
 from railsim.definitions.elements.rows import AXES, Act
 
@@ -105,3 +105,17 @@ class Actuator(CommandedElement):
     def rows(self) -> list[Act]:
         """One actuator."""
         return [self.act(mode=self.command, stiffness=self.stiffness, damping=self.damping)]
+
+
+class LawElement(CommandedElement):
+    """A force by a law of one's own, a compiled Python function."""
+
+    kind: Literal["law"]
+    law: Name
+    """Name of the law in the table `laws`"""
+    parameters: dict[Name, Finite] = EMPTY_TABLE
+    """Values of the function's further arguments, by name"""
+
+    def rows(self) -> list[Act]:
+        """One element with a law."""
+        return [self.act(mode="law", law=self.law, parameters=dict(self.parameters))]

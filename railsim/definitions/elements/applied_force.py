@@ -37,10 +37,6 @@ class AppliedForce(Element):
         if self.force_table is None and self.torque_table is None:
             raise ValueError("'force_table' or 'torque_table' is needed")
 
-    def end_points(self) -> tuple[Vector, Vector] | None:
-        """Point of action as written, twice [m]; None for the centre of gravity."""
-        return None if self.point is None else (self.point, self.point)
-
     def mirrored(self, signs: Signs) -> Self:
         """Return the load in a mirrored placement; a torque turns opposite to a force."""
         handed = signs[0] * signs[1] * signs[2]

@@ -15,7 +15,7 @@ from railsim.definitions.base import (
     Text,
     Vector,
     check,
-    rising,
+    rises,
 )
 from railsim.definitions.elements.rows import NOTHING, Mount, Row, Rows, Triple
 
@@ -28,8 +28,6 @@ Compression = Annotated[
 def _characteristic(rows: Rows) -> Rows:
     if len(rows) < 2:
         raise ValueError("a table needs two rows at least")
-    if not rising(rows):
-        raise ValueError("the first column must increase from row to row")
     if any(after[1] < before[1] for before, after in pairwise(rows)):
         raise ValueError("the force must not fall from row to row (negative stiffness or damping)")
     first, last = rows[0][0], rows[-1][0]
@@ -42,7 +40,9 @@ def _characteristic(rows: Rows) -> Rows:
     return rows
 
 
-Characteristic = Annotated[tuple[tuple[Finite, Finite], ...], AfterValidator(_characteristic)]
+Characteristic = Annotated[
+    tuple[tuple[Finite, Finite], ...], rises("first column"), AfterValidator(_characteristic)
+]
 
 
 def two_sided(rows: Rows) -> Rows:
@@ -83,7 +83,8 @@ class Element(Definition):
 
     def end_points(self) -> tuple[Vector, Vector] | None:
         """Points on body 1 and body 2 as written [m]; None where the element has none."""
-        return None
+        point, points = getattr(self, "point", None), getattr(self, "points", None)
+        return points if point is None else (point, point)
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored placement; `signs` holds -1 for each reversed axis."""
@@ -164,12 +165,6 @@ class PointElement(SidedElement):
     def has_points(self) -> bool:
         """Whether it acts at points."""
         return True
-
-    def end_points(self) -> tuple[Vector, Vector] | None:
-        """Points on body 1 and body 2 as written [m]; None where it acts at none."""
-        if self.points is not None or self.point is None:
-            return self.points
-        return self.point, self.point
 
 
 class FreeLength(PairElement):
@@ -253,5 +248,5 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
 
     def mount(self, **more: Any) -> Mount:
         """The row of its spring with what a kind adds."""
-        own = {"stiffness": self.stiffness, "damping": self.damping}
-        return Mount(**{**own, "preload": self.known_preload, **more})
+        own = {"stiffness": self.stiffness, "damping": self.damping, "preload": self.known_preload}
+        return Mount(**own | more)

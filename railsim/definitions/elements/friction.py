@@ -1,5 +1,6 @@
-"""Dry friction: what pads have in common, and the friction pad or leaf spring."""
+"""Dry friction: pads, leaf springs, side bearers, centre plates, wedges."""
 
+from math import cos, pi, sin, sqrt, tan
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -8,12 +9,21 @@ from railsim.definitions.base import (
     AutoOrVector,
     Definition,
     Finite,
+    NonNegative,
     NonNegativeVector,
     Positive,
+    Share,
+    Vector,
     check,
 )
-from railsim.definitions.elements.base import PointElement, VerticalSpring
-from railsim.definitions.elements.rows import FrictionLimit, Mount, pads
+from railsim.definitions.elements.base import (
+    Compression,
+    Element,
+    PairElement,
+    PointElement,
+    VerticalSpring,
+)
+from railsim.definitions.elements.rows import NOTHING, FrictionLimit, Mount, Rows, pads
 
 
 class SlidingFriction(Definition):
@@ -23,7 +33,7 @@ class SlidingFriction(Definition):
     velocity of stick-slip motion, Wear 82, 277-289.
     """
 
-    sliding_ratio: Annotated[Finite, Field(gt=0.0, le=1.0)] = 1.0
+    sliding_ratio: Share = 1.0
     """Friction at high sliding speed over that at rest [1]; 1: it does not fall"""
     stribeck_speed: Positive | None = None
     """Sliding speed at which the difference has fallen to 1/e of itself [m/s]"""
@@ -49,18 +59,18 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
 
     SUPPORTS: ClassVar = "on axles"
     kind: Literal["friction"]
-    friction_force: NonNegativeVector = (0.0, 0.0, 0.0)
+    friction_force: NonNegativeVector = NOTHING
     """Constant part of the largest friction force along x, y, z [N]"""
-    friction_coefficient: NonNegativeVector = (0.0, 0.0, 0.0)
+    friction_coefficient: NonNegativeVector = NOTHING
     """Part that grows with the vertical spring force, along x, y, z [1]"""
-    stick_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    stick_stiffness: NonNegativeVector = NOTHING
     """Stiffness of the sticking pad along x, y, z, needed where there is friction [N/m]"""
     friction_limit: Literal["circle", "axes"] = "circle"
     """`circle`: one contact slides in any direction, its force within a circle (an ellipse where
     the limits differ); `axes`: contacts of their own along each axis"""
-    stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    stiffness: NonNegativeVector = NOTHING
     """Stiffness of the parallel spring along x, y, z [N/m]"""
-    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    damping: NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
     preload: AutoOrVector = "auto"
     """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
@@ -83,5 +93,233 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         return [
             self.mount(
                 friction=(x, y, z), states=pads(self.stick_stiffness, (x, y, z), together=together)
+            )
+        ]
+
+
+class SideBearer(SlidingFriction, PointElement):
+    """A sliding pad on which body 2 rests on body 1: pressure without tension, friction in x and y.
+
+    The friction force has any direction in the plane and at most mu N; where the pad lifts there is
+    none.
+    """
+
+    SUPPORTS: ClassVar = "always"
+    kind: Literal["side_bearer"]
+    stiffness: Positive
+    """Vertical stiffness [N/m]"""
+    damping: NonNegative = 0.0
+    """Vertical damping while it carries [N s/m]"""
+    preload: Compression = 0.0
+    """Compression in the nominal position [N], or `auto`: from the equilibrium"""
+    clearance: NonNegative = 0.0
+    """Vertical clearance in the nominal position [m]"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction [1]"""
+    stick_stiffness: Positive
+    """Horizontal stiffness of the sticking pad [N/m]"""
+    stop_travel: Positive | None = None
+    """Further compression after which a solid stop carries [m]"""
+    stop_stiffness: Positive | None = None
+    """Stiffness of the solid stop beside that of the pad [N/m]"""
+
+    @check
+    def _one_nominal_state(self) -> None:
+        if self.clearance > 0.0 and self.preload != 0.0:
+            raise ValueError("either 'preload' or 'clearance', not both")
+        if (self.stop_travel is None) != (self.stop_stiffness is None):
+            raise ValueError("'stop_travel' and 'stop_stiffness' belong together")
+
+    @property
+    def vertical_stiffness(self) -> float:
+        """Stiffness of what carries in the nominal position [N/m]."""
+        return self.stiffness if self.clearance == 0.0 else 0.0
+
+    @property
+    def vertical_damping(self) -> float:
+        """Damping while it carries there [N s/m]."""
+        return self.damping if self.clearance == 0.0 else 0.0
+
+    @property
+    def stop_table(self) -> Rows | None:
+        """Force of the solid stop over the travel of body 2, zero above it."""
+        if self.stop_travel is None or self.stop_stiffness is None:
+            return None
+        first = self.stop_travel + self.clearance
+        return ((-1.0, 0.0), (first, 0.0), (first + 1.0, self.stop_stiffness))
+
+    def rows(self) -> list[Mount]:
+        """One mount that presses, with pads in the plane and a table for the solid stop."""
+        sliding = self.limit(0.0, self.friction_coefficient)
+        friction = (sliding, sliding, self.limit())
+        load = -self.stiffness * self.clearance if self.preload == 0.0 else self.preload
+        return [
+            Mount(
+                stiffness=(0.0, 0.0, self.stiffness),
+                damping=(0.0, 0.0, self.damping),
+                friction=friction,
+                states=pads((self.stick_stiffness, self.stick_stiffness, 0.0), friction),
+                tables=(None, None, self.stop_table),
+                one_sided=True,
+                preload=NOTHING if load == "auto" else (0.0, 0.0, load),
+            )
+        ]
+
+
+class CentrePlate(SlidingFriction, PairElement):
+    """Flat plate (ring) of body 2 that turns and slides on a bowl of body 1.
+
+    The pressure is that of an elastic layer without tension; it follows a tilted body 2 to the
+    edge.  Eight pads at the nodes of Gauss's rule carry it: under even pressure the yaw moment of
+    friction is exactly 2/3 mu N (R^3 - r^3)/(R^2 - r^2), the tilting stiffness k (R^2 + r^2)/4.
+    """
+
+    SUPPORTS: ClassVar = "always"
+    kind: Literal["centre_plate"]
+    point: Vector
+    """Centre of the contact surface [m]"""
+    radius: Positive
+    """Outer radius R of the contact surface [m]"""
+    inner_radius: NonNegative = 0.0
+    """Inner radius r of the contact surface, 0 for a disc [m]"""
+    stiffness: Positive
+    """Vertical stiffness of the whole plate [N/m]"""
+    damping: NonNegative = 0.0
+    """Vertical damping of the whole plate while it carries [N s/m]"""
+    preload: Compression = "auto"
+    """Compression in the nominal position [N], or `auto`: from the equilibrium"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction [1]"""
+    stick_stiffness: Positive
+    """Horizontal stiffness of the whole sticking plate [N/m]"""
+
+    @check
+    def _a_ring(self) -> None:
+        if self.inner_radius >= self.radius:
+            raise ValueError("'inner_radius' must be smaller than 'radius'")
+
+    @property
+    def vertical_stiffness(self) -> float:
+        """Stiffness of what carries [N/m]."""
+        return self.stiffness
+
+    @property
+    def vertical_damping(self) -> float:
+        """Damping while it carries [N s/m]."""
+        return self.damping
+
+    def parts(self) -> list[tuple[str, Vector, Element]]:
+        """Pads that carry the plate: suffix of the name, offset from the centre [m], pad."""
+        found: list[tuple[str, Vector, Element]] = []
+        rule = _gauss_on_ring(self.inner_radius, self.radius)
+        for ring, (radius, share) in enumerate(rule):
+            for quarter in range(4):
+                angle = 0.5 * pi * quarter + 0.25 * pi * ring
+                pad = SideBearer(
+                    kind="side_bearer",
+                    bodies=self.bodies,
+                    point=NOTHING,
+                    stiffness=0.25 * share * self.stiffness,
+                    damping=0.25 * share * self.damping,
+                    preload="auto" if self.preload == "auto" else 0.25 * share * self.preload,
+                    friction_coefficient=self.friction_coefficient,
+                    stick_stiffness=0.25 * share * self.stick_stiffness,
+                    sliding_ratio=self.sliding_ratio,
+                    stribeck_speed=self.stribeck_speed,
+                )
+                offset = (radius * cos(angle), radius * sin(angle), 0.0)
+                found.append((f"pad_{4 * ring + quarter + 1}", offset, pad))
+        return found
+
+    def rows(self) -> list[Mount]:
+        """None of its own: its pads stand in the arrays."""
+        return []
+
+
+def _gauss_on_ring(inner: float, outer: float) -> list[tuple[float, float]]:
+    """Two radii and shares of the area that integrate r^0 to r^3 over a ring exactly.
+
+    The radii are the zeros of r^2 - a r + b, orthogonal to 1 and r with the weight r dr.
+
+    Examples
+    --------
+    >>> [(round(r, 4), round(share, 4)) for r, share in _gauss_on_ring(0.0, 1.0)]
+    [(0.3551, 0.3639), (0.8449, 0.6361)]
+    """
+    m0, m1, m2, m3 = (
+        2.0 / (k + 2) * (outer ** (k + 2) - inner ** (k + 2)) / (outer**2 - inner**2)
+        for k in range(4)
+    )
+    # int (r^2 - a r + b) r^j r dr = 0 for j = 0, 1
+    a = (m3 * m0 - m1 * m2) / (m2 * m0 - m1 * m1)
+    b = (a * m1 - m2) / m0
+    half = sqrt(0.25 * a * a - b)
+    near, far = 0.5 * a - half, 0.5 * a + half
+    share = (m1 - near) / (far - near)
+    return [(near, 1.0 - share), (far, share)]
+
+
+class Wedge(VerticalSpring, PointElement):
+    """Friction wedges of one side of a three-piece bogie, on their springs.
+
+    Body 1 is the side frame, body 2 the bolster, whose inclined faces rest on the wedges; the wedge
+    springs stand on the side frame (variable friction).  Without mass and with a smooth inclined
+    face the force on the column is N = (F + T_z)/tan(angle), with F the spring force and T_z the
+    friction that holds the wedge up: mu N is larger on the way down than on the way up.
+    """
+
+    SUPPORTS: ClassVar = "always"
+    MUST_PRESS: ClassVar = True
+    kind: Literal["wedge"]
+    stiffness: NonNegativeVector
+    """Stiffness of the wedge springs of one side along x, y, z [N/m]"""
+    damping: NonNegativeVector = NOTHING
+    """Damping along x, y, z [N s/m]"""
+    preload: AutoOrVector = "auto"
+    """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+    angle: Annotated[Finite, Field(gt=0.0, lt=1.5)]
+    """Angle between the inclined face and the column's face [rad]"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction on the column [1]"""
+    stick_stiffness: tuple[Positive, Positive]
+    """Stiffness of the sticking wedges along y and z [N/m]"""
+
+    @check
+    def _wedge_slides(self) -> None:
+        if self.friction_coefficient >= tan(self.angle):
+            raise ValueError(
+                "the wedge locks itself: 'friction_coefficient' must be smaller than tan(angle) = "
+                f"{tan(self.angle):.3g}"
+            )
+        if self.stiffness[2] == 0.0:
+            raise ValueError("the wedges need springs: 'stiffness' along z")
+
+    @check
+    def _wedge_presses(self) -> None:
+        if self.preload != "auto" and self.preload[2] < 0.0:
+            raise ValueError(
+                "wedges press and never pull: 'preload' along z, on the side frame and positive "
+                f"downwards, must not be negative; found {self.preload[2]:g}"
+            )
+        if self.points is not None and self.points[0][2] < self.points[1][2]:
+            raise ValueError(
+                "the bolster, body 2, rests on the wedges, which stand on the side frame, body 1: "
+                "the point on body 1 must not lie above that on body 2 (z points down)"
+            )
+
+    @property
+    def share(self) -> float:
+        """Friction over spring force while the wedge slides level: mu/tan(angle)."""
+        return self.friction_coefficient / tan(self.angle)
+
+    def rows(self) -> list[Mount]:
+        """One mount that presses, with skew pads along y and z."""
+        sliding = FrictionLimit(coefficient=self.share)
+        friction = (FrictionLimit(), sliding, sliding)
+        return [
+            self.mount(
+                friction=friction,
+                states=pads((0.0, *self.stick_stiffness), friction, skew=self.share),
+                one_sided=True,
             )
         ]

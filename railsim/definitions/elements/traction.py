@@ -1,4 +1,4 @@
-"""Torques on wheelsets: what drives and brakes have in common, and the drive."""
+"""Torques on wheelsets: drives and brakes."""
 
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -56,3 +56,17 @@ class Traction(AxleTorque):
         tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), rises("speed")
     ]
     """Rows [speed m/s, torque on the wheelset N m], forwards positive, linear, constant beyond"""
+
+
+class Brake(AxleTorque):
+    """Braking torque on a wheelset over the vehicle's speed; body 1 takes the reaction.
+
+    It acts against the wheelset's rotation and vanishes with it.
+    """
+
+    BRAKES: ClassVar = True
+    kind: Literal["brake"]
+    torque_table: Annotated[
+        tuple[tuple[NonNegative, NonNegative], ...], Field(min_length=1), rises("speed")
+    ]
+    """Rows [speed m/s, torque on the wheelset N m], linear in between, constant beyond"""

@@ -1,4 +1,4 @@
-"""Irregularities of a track file, one module a shape, told apart by their key `type`.
+"""Irregularities of a track file, told apart by their key `type`.
 
 Each rail is displaced laterally (y, positive to the right) and vertically (z, positive downwards)
 from the position that plan, cant and vertical profile give it; several irregularities add up.  A

@@ -6,13 +6,13 @@ z_right; y to the right, z down) [m] and their derivatives along the track [1].
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Definition, Finite
+from railsim.definitions.base import Definition, Finite, check
 
 Displacement = Callable[[Floats], tuple[Floats, Floats]]
 
@@ -70,6 +70,29 @@ class Irregular(Definition):
     @abstractmethod
     def displacement(self, length: float) -> Displacement:
         """Return how it moves the rails of a track whose plan has some length [m]."""
+
+
+class Stretch(Irregular):
+    """An irregularity from `begin` to `end`, by default the end of the plan."""
+
+    if TYPE_CHECKING:  # the fields of its types
+        begin: float
+        end: float | None
+
+    @check
+    def _has_a_length(self) -> None:
+        if self.end is not None and self.end <= self.begin:
+            raise ValueError("'end' must lie behind 'begin'")
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.begin, length if self.end is None else self.end
+
+
+def rails_moved(channel: Channel) -> Floats:
+    """Rails moved by one metre of a channel, the cross level a difference of heights; a column."""
+    # each rail has half of the difference
+    return np.array(SHARES[channel])[:, None] * (0.5 if channel == "cross_level" else 1.0)
 
 
 def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displacement:

@@ -7,20 +7,20 @@ import numpy as np
 from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative, check
+from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative
 from railsim.definitions.excitations.base import (
     MIRROR,
-    SHARES,
     Channel,
     Displacement,
-    Irregular,
+    Stretch,
     faded,
+    rails_moved,
 )
 
 PER_WAVE = 200  # differences of the rate over the shortest wave; error 3e-8 of it
 
 
-class ByLaw(Irregular):
+class ByLaw(Stretch):
     """What a law of one's own gives over the arc length."""
 
     type: Literal["law"]
@@ -42,18 +42,9 @@ class ByLaw(Irregular):
     fade: NonNegative = 10.0
     """Length over which it fades in and out within its ends [m]"""
 
-    @check
-    def _has_a_length(self) -> None:
-        if self.end is not None and self.end <= self.begin:
-            raise ValueError("'end' must lie behind 'begin'")
-
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""
         return self.model_copy(update={"factor": MIRROR[self.channel] * self.factor})
-
-    def extent(self, length: float) -> tuple[float, float]:
-        """Return where it begins and ends [m]."""
-        return self.begin, length if self.end is None else self.end
 
     def resolution(self) -> float:
         """Return a sixteenth of the shortest wavelength [m]."""
@@ -74,9 +65,7 @@ class ByLaw(Irregular):
         [m].
         """
         h, (begin, end) = self.shortest / PER_WAVE, self.extent(length)
-        shares = self.factor * np.array(SHARES[self.channel])[:, None]
-        if self.channel == "cross_level":
-            shares *= 0.5  # each rail has half of the difference
+        shares = self.factor * rails_moved(self.channel)
 
         def moved(s: Floats) -> tuple[Floats, Floats]:
             at = {k: function(np.clip(s + k * h, begin, end)) for k in (-2, -1, 0, 1, 2)}

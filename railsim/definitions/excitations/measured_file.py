@@ -4,40 +4,37 @@ The rows become part of the track, so that a result carries its irregularities w
 """
 
 import csv
-import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
 
 from railsim.arrays import Floats
 from railsim.definitions.embedding import embed, tables_of
-from railsim.definitions.excitations.base import COLUMNS
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
-from railsim.errors import Fault, Faults, InputError, counted, input_error, nearest
+from railsim.errors import Fault, Faults, counted, input_error, nearest
 from railsim.files.access import TABLE_BYTES, read_bytes
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
-# what a column adds to y_left, z_left, y_right, z_right
+# what a column adds to s, y_left, z_left, y_right, z_right
 SHARES = {
-    "y_left": (1.0, 0.0, 0.0, 0.0),
-    "z_left": (0.0, 1.0, 0.0, 0.0),
-    "y_right": (0.0, 0.0, 1.0, 0.0),
-    "z_right": (0.0, 0.0, 0.0, 1.0),
-    "y": (1.0, 0.0, 1.0, 0.0),
-    "z": (0.0, 1.0, 0.0, 1.0),
-    "cross_level": (0.0, -0.5, 0.0, 0.5),
-    "gauge": (-0.5, 0.0, 0.5, 0.0),
+    "s": (1.0, 0.0, 0.0, 0.0, 0.0),
+    "y_left": (0.0, 1.0, 0.0, 0.0, 0.0),
+    "z_left": (0.0, 0.0, 1.0, 0.0, 0.0),
+    "y_right": (0.0, 0.0, 0.0, 1.0, 0.0),
+    "z_right": (0.0, 0.0, 0.0, 0.0, 1.0),
+    "y": (0.0, 1.0, 0.0, 1.0, 0.0),
+    "z": (0.0, 0.0, 1.0, 0.0, 1.0),
+    "cross_level": (0.0, 0.0, -0.5, 0.0, 0.5),
+    "gauge": (0.0, -0.5, 0.0, 0.5, 0.0),
 }
 LARGEST = 0.5  # m
 # Change of a displacement over distance between two rows beyond which no wheel could follow: a step
 # in the record, or a wrong unit.
 STEEPEST = 0.2
-
-Rows = list[tuple[float, ...]]
 
 
 def embed_measured(data: dict[str, Any]) -> list[Fault]:
@@ -56,11 +53,10 @@ def _embed(key: str, table: dict[str, Any]) -> None:
     how = _definition(table)
     if how is None:
         return  # refused by the definition
-    rows, wrong = read_measured(path, how)
-    Faults(wrong).check()
+    rows = read_measured(path, how)
     for name in ("file", *READING):
         table.pop(name, None)
-    table["rows"] = [list(row) for row in rows]
+    table["rows"] = rows.tolist()
 
 
 def _definition(table: dict[str, Any]) -> Measured | None:
@@ -84,7 +80,7 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
             continue
         plain = how.model_copy(update={"chord": None, "band": None})
         path = Path(table["file"])
-        before, after = (np.array(read_measured(path, one)[0]) for one in (plain, how))
+        before, after = (read_measured(path, one) for one in (plain, how))
         before[:, 0] += how.shift
         after[:, 0] += how.shift
         after[:, 1:] *= how.scale
@@ -92,189 +88,178 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
     return found
 
 
-def read_measured(path: Path, how: Measured) -> tuple[Rows, list[Fault]]:
-    """Read rows [s, y_left, z_left, y_right, z_right] in m, and the faults of the file."""
+def read_measured(path: Path, how: Measured) -> Floats:
+    """Read rows [s, y_left, z_left, y_right, z_right] in m.
+
+    Raises InputError: the faults of the file.
+    """
     try:
-        return _rows_of(
-            path, read_bytes(path, TABLE_BYTES).decode(how.encoding or "utf-8-sig"), how
-        )
+        text = read_bytes(path, TABLE_BYTES).decode(how.encoding or "utf-8-sig")
+        return _rows_of(path, text, how)
     except LookupError:
         allowed = "a name such as utf-8, latin-1 or utf-16"
-        return [], [Fault("", "encoding", f"unknown encoding '{how.encoding}'", allowed)]
+        found, key = f"unknown encoding '{how.encoding}'", "encoding"
+        raise input_error("", found, allowed, key) from None
     except UnicodeDecodeError as error:
         found = f"byte {error.start} is not {error.encoding}"
-        return [], [Fault(str(path), "", found, 'its encoding, such as encoding = "latin-1"')]
-    except InputError as error:
-        return [], list(error.faults)
+        raise input_error(str(path), found, 'its encoding, such as encoding = "latin-1"') from None
     except csv.Error as error:
-        return [], [Fault(str(path), "", f"no CSV ({error})", "a header and rows of numbers")]
+        raise input_error(str(path), f"no CSV ({error})", "a header and rows of numbers") from None
 
 
-def _rows_of(path: Path, text: str, how: Measured) -> tuple[Rows, list[Fault]]:
+class Column(NamedTuple):
+    """A column of a file."""
+
+    name: str  # ours
+    unit: float = 1.0  # m
+    offset: float = 0.0  # value of the undisplaced rails
+
+
+def _rows_of(path: Path, text: str, how: Measured) -> Floats:
     numbered = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not numbered:
-        return [], [Fault(str(path), "", "empty", "a header and rows of numbers")]
+        raise input_error(str(path), "empty", "a header and rows of numbers")
     delimiter = next((d for d in (";", "\t") if d in numbered[0][1]), ",")
     head = [cell.strip() for cell in next(csv.reader([numbered[0][1]], delimiter=delimiter))]
-    header, faults = _mapped(path, head, how) if how.columns else _header(path, head)
-    if faults:
-        return [], faults
-    header = [column and _with_unit(column, how) for column in header]
-    rows: Rows = []
-    begin = 0.0
+    columns = _mapped(path, head, how.columns) if how.columns else _header(path, head)
+    columns = [column and _as_told(column, how) for column in columns]
+    faults: list[tuple[int, str, str]] = []  # number of the line, found, allowed
+    numbers, table = [], []
     for number, line in numbered[1:]:
         if delimiter != ",":
             line = line.replace(",", ".")  # a decimal comma
         cells = next(csv.reader([line], delimiter=delimiter))
-        problem = _problem(cells, header)
-        if problem:
-            faults.append(Fault(str(path), f"line {number}", *problem))
-            continue
-        row = _row(header, cells)
-        if how.falling_mileage:
-            begin = row[0] if not rows else begin
-            row = (begin - row[0], *row[1:])
-        faults += _row_faults(path, number, row, rows, _absolute_gauge(header, cells))
-        rows.append(row)
-    if not faults and len(rows) < 4:
-        faults.append(Fault(str(path), "", f"{len(rows)} rows", "four rows at least"))
-    if not faults and (how.chord or how.band):
-        rows, faults = _filtered(path, rows, how)
-    return rows, counted(faults)
+        try:
+            table.append(_numbers(cells, columns))
+            numbers.append(number)
+        except ValueError as problem:
+            faults.append((number, *problem.args))
+    named = [column for column in columns if column]
+    values = np.array(table).reshape(len(table), len(named))
+    rows = _rows(named, values, how)
+    found = _row_faults(rows, named, values)
+    faults += [(numbers[k], what, allowed) for k, what, allowed in found]
+    faults.sort(key=lambda fault: fault[0])
+    Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
+    if len(rows) < 4:
+        raise input_error(str(path), f"{len(rows)} rows", "four rows at least")
+    return _filtered(path, rows, how)
 
 
-def _filtered(path: Path, rows: Rows, how: Measured) -> tuple[Rows, list[Fault]]:
-    table = np.array(rows)
-    step = equal_step(table[:, 0])
+def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[float]:
+    """Numbers of a row in the columns that are read.
+
+    Raises ValueError: what was found, and what is allowed.
+    """
+    if len(cells) != len(columns):
+        raise ValueError(f"{len(cells)} values", f"{len(columns)} values as in the header")
+    try:
+        values = [float(cell) for cell, column in zip(cells, columns, strict=True) if column]
+    except ValueError:
+        raise ValueError("not a number", "numbers only") from None
+    if not np.isfinite(values).all():
+        raise ValueError("not a finite number", "finite numbers only; leave gaps out")
+    return values
+
+
+def _rows(columns: Sequence[Column], values: Floats, how: Measured) -> Floats:
+    rows = np.zeros((len(values), 5))
+    for (name, unit, offset), written in zip(columns, values.T, strict=True):
+        rows += np.outer(written - offset, np.multiply(SHARES[name], unit))
+    if how.falling_mileage:
+        rows[:, 0] = rows[:1, 0] - rows[:, 0]
+    return rows
+
+
+def _row_faults(
+    rows: Floats, columns: Sequence[Column], values: Floats
+) -> Iterator[tuple[int, str, str]]:
+    """Rows that cannot be: index, what was found, and what is allowed."""
+    s, rails = rows[:, 0], np.abs(rows[:, 1:])
+    step, change = np.diff(s), np.abs(np.diff(rows[:, 1:], axis=0)).max(axis=1)
+    for k in np.flatnonzero(step <= 0.0).tolist():
+        allowed = "arc lengths that increase from row to row; or falling_mileage = true"
+        yield k + 1, f"s = {s[k + 1]:g} m does not increase", allowed
+    for k in np.flatnonzero((step > 0.0) & (change > STEEPEST * step)).tolist():
+        allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
+        yield k + 1, f"{change[k] * 1e3:.3g} mm within {step[k]:.3g} m", allowed
+    absolute = np.zeros(len(rows), dtype=bool)  # the distance of the rails, not its deviation
+    for (name, unit, offset), written in zip(columns, values.T, strict=True):
+        if name == "gauge":
+            gauge = abs(unit) * (written - offset)
+            absolute |= (gauge > 0.6) & (gauge < 2.0)
+    for k in np.flatnonzero(absolute).tolist():
+        allowed = "its deviation; give the nominal one by offset = { gauge = 1435.0 }"
+        yield k, "an absolute gauge", allowed
+    largest = rails.max(axis=1)
+    for k in np.flatnonzero(~absolute & (largest > LARGEST)).tolist():
+        allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
+        yield k, f"a displacement of {largest[k]:g} m", allowed
+
+
+def _filtered(path: Path, rows: Floats, how: Measured) -> Floats:
+    """Rows with the chord's response inverted and within the band, as the definition asks."""
+    if not how.chord and not how.band:
+        return rows
+    step = equal_step(rows[:, 0])
     if step is None:
-        key = "chord" if how.chord else "band"
-        found = "rows at unequal steps"
-        return rows, [Fault(str(path), "s", found, f"equal steps within 1 % (needed for '{key}')")]
-    values = table[:, 1:].T
+        allowed = f"equal steps within 1 % (needed for '{'chord' if how.chord else 'band'}')"
+        raise input_error(str(path), "rows at unequal steps", allowed, "s")
+    values = rows[:, 1:].T
     if how.chord:
         values = from_chord(values, step, how.chord)
     if how.band:
         band = BANDS[how.band] if isinstance(how.band, str) else how.band
         values = band_passed(values, step, band)
-    return [(s, *row) for s, row in zip(table[:, 0].tolist(), values.T.tolist(), strict=True)], []
+    return np.column_stack([rows[:, 0], values.T])
 
 
-Column = tuple[str, float, float]  # our name, unit [m], value of the undisplaced rails
-
-
-def _with_unit(column: Column, how: Measured) -> Column:
+def _as_told(column: Column, how: Measured) -> Column:
+    """Return a column with the unit, sign and offset that the definition gives it."""
     name, unit, _ = column
     if how.units and name in how.units:
         unit = UNITS[f"_{how.units[name]}"]
-    offset = (how.offset or {}).get(name, 0.0)
-    return name, -unit if name in how.reverse else unit, offset
+    return Column(name, -unit if name in how.reverse else unit, (how.offset or {}).get(name, 0.0))
 
 
-def _mapped(path: Path, head: list[str], how: Measured) -> tuple[list[Column | None], list[Fault]]:
-    """Name and unit of every column that is named; None for the others."""
-    assert how.columns is not None  # by the caller
+def _mapped(path: Path, head: list[str], named: dict[str, str]) -> list[Column | None]:
+    """Columns that the definition names; None for the others."""
     columns: list[Column | None] = [None] * len(head)
-    faults = []
-    for name, theirs in how.columns.items():
-        if name not in ("s", *SHARES):
-            allowed = nearest(name, ["s", *SHARES])
+    faults = Faults()
+    for name, theirs in named.items():
+        if name not in SHARES:
+            allowed = nearest(name, SHARES)
             faults.append(Fault("", f"columns.{name}", "unknown quantity", allowed))
         elif theirs not in head:
             found = f"no column '{theirs}'"
             faults.append(Fault(str(path), "header", found, nearest(theirs, head)))
         else:
-            columns[head.index(theirs)] = (name, 1.0, 0.0)
-    if "s" not in how.columns:
+            columns[head.index(theirs)] = Column(name)
+    if "s" not in named:
         faults.append(Fault("", "columns", "no column for s", "the arc length or mileage s"))
-    return columns, faults
+    faults.check()
+    return columns
 
 
-def _header(path: Path, cells: list[str]) -> tuple[list[Column | None], list[Fault]]:
-    """Return name and unit of every column."""
+def _header(path: Path, cells: list[str]) -> list[Column | None]:
+    """Columns by a header with our names, with the unit behind."""
     columns: list[Column | None] = []
-    faults = []
+    faults = Faults()
     for cell in cells:
-        found = [(name, unit, 0.0) for name, unit in _names(cell) if name in ("s", *SHARES)]
+        read = [(cell.removesuffix(end), unit) for end, unit in UNITS.items() if cell.endswith(end)]
+        found = [Column(name, unit) for name, unit in read if name in SHARES]
         if not found:
-            allowed = nearest(cell, ["s", *SHARES]) + "; or name it in 'columns'"
+            allowed = nearest(cell, SHARES) + "; or name it in 'columns'"
             faults.append(Fault(str(path), "header", f"unknown column '{cell}'", allowed))
         columns += found[:1]
-    names = [column[0] for column in columns if column]
+    names = [column.name for column in columns if column]
     if "s" not in names:
         faults.append(Fault(str(path), "header", "no column s", "the arc length s in m"))
     if len(set(names)) < len(names):
         faults.append(Fault(str(path), "header", "a column occurs twice", "each column once"))
-    return columns, faults
-
-
-def _names(cell: str) -> Iterator[tuple[str, float]]:
-    for ending, unit in UNITS.items():
-        if cell.endswith(ending):
-            yield cell.removesuffix(ending), unit
-
-
-def _problem(cells: list[str], header: list[Column | None]) -> tuple[str, str] | None:
-    if len(cells) != len(header):
-        return f"{len(cells)} values", f"{len(header)} values as in the header"
-    try:
-        values = [float(cell) for cell, column in zip(cells, header, strict=True) if column]
-    except ValueError:
-        return "not a number", "numbers only"
-    if not all(math.isfinite(value) for value in values):
-        return "not a finite number", "finite numbers only; leave gaps out"
-    return None
-
-
-def _absolute_gauge(header: list[Column | None], cells: list[str]) -> bool:
-    """Whether a column of gauge holds the distance of the rails instead of its deviation."""
-    return any(
-        column is not None
-        and column[0] == "gauge"
-        and 0.6 < abs(column[1]) * (float(cell) - column[2]) < 2.0
-        for column, cell in zip(header, cells, strict=True)
-    )
-
-
-def _row_faults(
-    path: Path, number: int, row: tuple[float, ...], before: Rows, absolute_gauge: bool
-) -> list[Fault]:
-    line = f"line {number}"
-    faults = []
-    if before and row[0] <= before[-1][0]:
-        found = f"s = {row[0]:g} m does not increase"
-        allowed = "arc lengths that increase from row to row; or falling_mileage = true"
-        faults.append(Fault(str(path), line, found, allowed))
-    elif before:
-        steepest = max(abs(new - old) for new, old in zip(row[1:], before[-1][1:], strict=True))
-        if steepest > STEEPEST * (row[0] - before[-1][0]):
-            found = f"{steepest * 1e3:.3g} mm within {row[0] - before[-1][0]:.3g} m"
-            allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
-            faults.append(Fault(str(path), line, found, allowed))
-    largest = max(abs(value) for value in row[1:])
-    if absolute_gauge:
-        allowed = "its deviation; give the nominal one by offset = { gauge = 1435.0 }"
-        faults.append(Fault(str(path), line, "an absolute gauge", allowed))
-    elif largest > LARGEST:
-        allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
-        faults.append(Fault(str(path), line, f"a displacement of {largest:g} m", allowed))
-    return faults
-
-
-def _row(header: list[Column | None], cells: list[str]) -> tuple[float, ...]:
-    s = 0.0
-    rails = [0.0] * len(COLUMNS)
-    for column, cell in zip(header, cells, strict=True):
-        if column is None:
-            continue
-        name, unit, offset = column
-        value = float(cell) - offset
-        if name == "s":
-            s = unit * value
-            continue
-        for index, share in enumerate(SHARES[name]):
-            rails[index] += share * unit * value
-    return (s, *rails)
+    faults.check()
+    return columns

@@ -15,14 +15,14 @@ import numpy as np
 from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Flag, NonNegative, check
+from railsim.definitions.base import Finite, Flag, NonNegative, Whole, check
 from railsim.definitions.excitations.base import (
     CHANNELS,
     MIRROR,
     SHARES,
     Channel,
     Displacement,
-    Irregular,
+    Stretch,
     Wavelengths,
     faded,
 )
@@ -34,7 +34,7 @@ POINTS_PER_WAVE = 32
 PERIOD_IN_WAVES = 20.0
 
 
-class Random(Irregular):
+class Random(Stretch):
     """Stationary random irregularities from power spectral densities."""
 
     type: Literal["random"]
@@ -42,7 +42,7 @@ class Random(Irregular):
     """Which spectra, by name; `own` needs `coefficients`"""
     coefficients: Coefficients | None = None
     """Own coefficients"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Whole = 1
     """Seed of the random phases: the same seed gives the same track"""
     wavelengths: Wavelengths = (3.0, 70.0)
     """Shortest and longest wavelength [m]; the variance is the integral of the spectrum between"""
@@ -63,8 +63,6 @@ class Random(Irregular):
     def _complete(self) -> None:
         if (self.spectrum == "own") != (self.coefficients is not None):
             raise ValueError("'coefficients' belong to spectrum = \"own\" and only to it")
-        if self.end is not None and self.end <= self.begin:
-            raise ValueError("'end' must lie behind 'begin'")
         channels = self.channels or ()
         if len(set(channels)) < len(channels):
             raise ValueError("'channels' names one irregularity twice")
@@ -74,10 +72,6 @@ class Random(Irregular):
     def mirrored(self) -> Self:
         """Return the mirror image of the same realisation."""
         return self.model_copy(update={"mirror": not self.mirror})
-
-    def extent(self, length: float) -> tuple[float, float]:
-        """Return where it begins and ends [m]."""
-        return self.begin, length if self.end is None else self.end
 
     def resolution(self) -> float:
         """Return a sixteenth of the shortest wavelength [m]."""

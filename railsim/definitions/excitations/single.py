@@ -1,17 +1,16 @@
-"""What single disturbances have in common: place, length and shape."""
+"""Single disturbances: dips, kinks, twists."""
 
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, Positive
-from railsim.definitions.excitations.base import Displacement, Irregular
+from railsim.definitions.base import OTHER_SIDE, Finite, Positive
+from railsim.definitions.excitations.base import Amplitude, Displacement, Irregular
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 
 Rails = Literal["left", "right", "both"]
-OTHER_RAIL: dict[str, Rails] = {"left": "right", "right": "left", "both": "both"}
 MOVED = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}
 
 
@@ -60,3 +59,60 @@ class Single(Irregular):
         down = Section("", "", half, self.length, 1.0, 0.0)
         profile = RoundedProfile([up, down], self.length / 10.0)
         return profile(u + half), profile.rate(u + half)
+
+
+class Dip(Single):
+    """A single vertical disturbance: a dipped joint, a hump."""
+
+    type: Literal["dip"]
+    depth: Amplitude
+    """Displacement in the middle, positive downwards [m]"""
+    rail: Rails = "both"
+    """Which rail"""
+    shape: Literal["cosine", "triangle"] = "cosine"
+    """`cosine`: one wave of 1 - cos; `triangle`: two straights, kinks rounded over length / 10"""
+
+    def mirrored(self) -> Self:
+        """Return the same on the other rail."""
+        return self.model_copy(update={"rail": OTHER_SIDE[self.rail]})
+
+    def displacement(self, length: float) -> Displacement:
+        """Return how it moves the rails."""
+        left, right = MOVED[self.rail]
+        return self.moved(0.0, self.depth * left, 0.0, self.depth * right)
+
+
+class Kink(Single):
+    """A single lateral disturbance: a kink of the alignment."""
+
+    type: Literal["kink"]
+    offset: Amplitude
+    """Displacement in the middle, positive to the right [m]"""
+    rail: Rails = "both"
+    """Which rail"""
+
+    def mirrored(self) -> Self:
+        """Return the opposite on the other rail."""
+        return self.model_copy(update={"rail": OTHER_SIDE[self.rail], "offset": -self.offset})
+
+    def displacement(self, length: float) -> Displacement:
+        """Return how it moves the rails."""
+        left, right = MOVED[self.rail]
+        return self.moved(self.offset * left, 0.0, self.offset * right, 0.0)
+
+
+class Twist(Single):
+    """A single disturbance of the cross level: one rail rises, the other sinks by half of it."""
+
+    type: Literal["twist"]
+    height: Amplitude
+    """Change of cross level in the middle, positive = left rail higher [m]"""
+
+    def mirrored(self) -> Self:
+        """Return the opposite change."""
+        return self.model_copy(update={"height": -self.height})
+
+    def displacement(self, length: float) -> Displacement:
+        """Return how it moves the rails."""
+        half = 0.5 * self.height
+        return self.moved(0.0, -half, 0.0, half)

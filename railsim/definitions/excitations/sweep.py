@@ -6,21 +6,21 @@ import numpy as np
 from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Finite, NonNegative, check
+from railsim.definitions.base import Finite, NonNegative
 from railsim.definitions.excitations.base import (
     MIRROR,
-    SHARES,
     Amplitude,
     Channel,
     Displacement,
-    Irregular,
+    Stretch,
     faded,
+    rails_moved,
 )
 
 Wavelength = Annotated[Finite, Field(ge=0.2, le=1000.0)]
 
 
-class Sweep(Irregular):
+class Sweep(Stretch):
     """Waves of one amplitude whose wavelength goes from one value to another.
 
     Each octave of wavelengths takes the same length of track.
@@ -42,19 +42,10 @@ class Sweep(Irregular):
     fade: NonNegative = 10.0
     """Length over which it fades in and out within its ends [m]"""
 
-    @check
-    def _has_a_length(self) -> None:
-        if self.end <= self.begin:
-            raise ValueError("'end' must lie behind 'begin'")
-
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""
         sign = MIRROR[self.channel]
         return self.model_copy(update={"amplitude": sign * self.amplitude})
-
-    def extent(self, length: float) -> tuple[float, float]:
-        """Return where it begins and ends [m]."""
-        return self.begin, self.end
 
     def resolution(self) -> float:
         """Return a sixteenth of the shorter wavelength [m]."""
@@ -75,9 +66,7 @@ class Sweep(Irregular):
 
         first, last = self.wavelengths
         extent, octaves = self.end - self.begin, np.log(first / last)
-        shares = self.amplitude * np.array(SHARES[self.channel])[:, None]
-        if self.channel == "cross_level":
-            shares *= 0.5  # each rail has half of the difference
+        shares = self.amplitude * rails_moved(self.channel)
 
         def moved(s: Floats) -> tuple[Floats, Floats]:
             u = np.clip((s - self.begin) / extent, 0.0, 1.0)

@@ -12,7 +12,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from railsim.definitions.base import EMPTY_TABLE, Count, Definition, Name, Remark, Text, check
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Count,
+    Definition,
+    Name,
+    Remark,
+    Text,
+    Whole,
+    check,
+)
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism.parts import (
     AUTO,
@@ -22,12 +31,13 @@ from railsim.definitions.mechanism.parts import (
     Body,
     BodyName,
     CatalogueName,
-    Driver,
     Element,
     GasSpringName,
     Ground,
     Joint,
+    Pair,
     PointName,
+    Positive,
     Quantity,
     QuantityOrAuto,
     Start,
@@ -35,6 +45,30 @@ from railsim.definitions.mechanism.parts import (
 from railsim.errors import Fault, argument_error, nearest
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
+
+
+class Driver(Definition):
+    """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
+
+    angle: BodyName | None = None
+    """Body whose angle it is"""
+    length: Pair | None = None
+    """Points whose distance it is"""
+    coordinate: PointName | None = None
+    """Point whose coordinate it is"""
+    axis: Literal["x", "y"] = "y"
+    """Which coordinate"""
+    zero: Quantity = 0.0
+    """What the angle, length or coordinate is where the driver is 0 [rad or m]"""
+    start: Quantity = 0.0
+    """Value of the driver at the start of the motion [rad or m]"""
+    end: Quantity
+    """Value of the driver at its end [rad or m]"""
+
+    @check
+    def _one(self) -> None:
+        if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
+            raise ValueError("one of 'angle', 'length' and 'coordinate'")
 
 
 class Sampling(Definition):
@@ -95,9 +129,9 @@ class Motion(Definition):
     """Actuator whose force drives the motion; by default the same, of an angle that of `[solve]`"""
     law: Literal["constant_speed", "polynomial_345", "table"] = "constant_speed"
     """Constant speed, the 3-4-5 polynomial from rest to rest, or a table"""
-    speed: Quantity | None = None
+    speed: Positive | None = None
     """Speed of the length [m/s] or angle [rad/s], for a constant speed"""
-    duration: Quantity | None = None
+    duration: Positive | None = None
     """Time for the whole range [s]"""
     table: tuple[tuple[Quantity, Quantity], ...] | None = None
     """Rows [time s, change of length m or angle rad since the start], a cubic spline"""
@@ -125,7 +159,7 @@ class Release(Definition):
     """Value of the driver where it is let go [rad or m]"""
     until: Quantity
     """Value of the driver at which the motion ends [rad or m]"""
-    duration: Quantity = 10.0
+    duration: Positive = 10.0
     """Time after which it ends in any case [s]"""
 
 
@@ -177,15 +211,15 @@ class Lid(Definition):
 
     element: GasSpringName
     """Gas spring whose `F1` is checked"""
-    mass: Quantity
+    mass: Positive
     """Mass of the lid G [kg]"""
-    centre: Quantity
+    centre: Positive
     """Lever of its centre of gravity about the hinge, lid open D [m]"""
-    lever: Quantity
+    lever: Positive
     """Lever of the springs about the hinge, lid open b [m]"""
-    springs: Quantity = 2.0
+    springs: Positive = 2.0
     """Number of springs n"""
-    factor: Quantity = 1.1
+    factor: Positive = 1.1
     """Factor of safety alpha"""
 
 
@@ -242,7 +276,7 @@ class Optimise(Definition):
     """Boxes that points may not leave"""
     starts: Count = 20
     """Number of starts of the search; the first is the file's own"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Whole = 1
     """Seed of the other starts"""
     assemblies: dict[Name, tuple[Quantity, ...]] = EMPTY_TABLE
     """Parameters that choose an assembly, with the values that starts may take"""

@@ -5,26 +5,32 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.base import Remark
+from railsim.definitions.base import Definition, Remark
 from railsim.definitions.mechanism.definition import RESULTS, Mechanism
 from railsim.definitions.mechanism.expressions import Expression
-from railsim.definitions.mechanism.parts import AirSpring, Cam, Cylinder, GasSpring, Link, Reference
+from railsim.definitions.mechanism.parts import (
+    AirSpring,
+    Cam,
+    Cylinder,
+    GasSpring,
+    Reference,
+    least_values,
+)
 from railsim.definitions.mechanism.values import (
     body_name,
     ends,
+    members,
     number,
     parameter_values,
     part_sizes,
     point_names,
     sizes,
-    texts_of,
 )
 from railsim.errors import Fault, Faults, InputError, nearest
 
 LARGEST = 50.0  # m; no mechanism of a vehicle is larger
 OUT_OF_PROPORTION = 100.0
 MOST_TURNED = 12.5  # rad; two turns
-ABSOLUTE_ZERO = -273.15  # C
 ROWS = {"revolute": 2, "link": 1, "slot": 1, "prismatic": 2, "cam": 1}
 
 
@@ -76,7 +82,7 @@ def _parameter_faults(mechanism: Mechanism) -> Iterator[Fault]:
     used: set[str] = set()
     for name in sorted(parameters.keys() & derived.keys()):
         yield _fault(f"derived.{name}", "is a parameter too", "another name")
-    for key, expression in texts_of(Expression, mechanism):
+    for key, expression in members(Expression, mechanism):
         for name in sorted(expression.names - known.keys()):
             hint = nearest(name, known) if known else "there are no parameters"
             yield _fault(key, f"no parameter '{name}' in '{expression}'", hint)
@@ -117,7 +123,7 @@ def _reference_faults(mechanism: Mechanism) -> Iterator[Fault]:
     faults = []
     if "ground" in mechanism.bodies:
         faults.append(_fault("bodies.ground", "the ground is no body", "it is [ground]"))
-    found = [(key, name.kind, str(name)) for key, name in texts_of(Reference, mechanism)]
+    found = [(key, name.kind, str(name)) for key, name in members(Reference, mechanism)]
     found += [(f"start.{name}", "body", name) for name in mechanism.start]
     for key, kind, name in found:
         if name not in allowed[kind]:
@@ -183,7 +189,7 @@ def _value_faults(mechanism: Mechanism, case: str | None) -> list[Fault]:
         values = parameter_values(chosen)
     if faults:
         return faults
-    for key, expression in texts_of(Expression, chosen):
+    for key, expression in members(Expression, chosen):
         if key.startswith(("parameters.", "derived.", "cases.")):
             continue
         if automatic := expression.names & chosen.automatic:
@@ -196,57 +202,25 @@ def _value_faults(mechanism: Mechanism, case: str | None) -> list[Fault]:
         except InputError as error:
             where = f" in case '{case}'" if case else ""
             faults += [_fault(f.key, f.found + where, f.allowed) for f in error.faults]
-    return faults or [*_positive_faults(chosen, values)]
+    return faults or [*_range_faults(chosen, values)]
 
 
-POSITIVE: dict[Any, tuple[str, ...]] = {
-    Link: ("length",),
-    Cylinder: ("bore", "count", "supply_pressure"),
-    GasSpring: ("F1", "progression", "stroke", "extended"),
-}
-POSITIVE_OF = {
-    "motion": ("speed", "duration"),
-    "release": ("speed", "duration"),
-    "lid": ("mass", "centre", "lever", "springs", "factor"),
-}
-NOT_NEGATIVE = {
-    "mass",
-    "inertia",
-    "stiffness",
-    "damping",
-    "friction",
-    "moment",
-    "rod",
-    "end_damping",
-}
-
-
-def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[Fault]:
-    for table in ("bodies", "joints", "actuators", "elements"):
+def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[Fault]:
+    """Values out of their ranges, and tables that do not rise."""
+    yield from _least_faults(mechanism, values)
+    for table in ("actuators", "elements"):
         for name, part in getattr(mechanism, table).items():
-            key, positive = f"{table}.{name}", POSITIVE.get(type(part), ())
-            for field in type(part).model_fields:
-                if field in positive:
-                    yield from _above(part, key, field, values)
-                elif field in NOT_NEGATIVE:
-                    yield from _above(part, key, field, values, or_equal=True)
-            if isinstance(part, GasSpring):
-                yield from _gas_faults(key, part, values)
-            if isinstance(part, Cam):
-                for i, arc in enumerate(part.arcs):
-                    for field in ("radius", "length"):
-                        yield from _above(arc, f"{key}.arcs.{i}", field, values)
+            key = f"{table}.{name}"
+            if isinstance(part, GasSpring) and part.rod_end not in (None, *part.gas_spring):
+                allowed = " or ".join(part.gas_spring)
+                yield _fault(f"{key}.rod_end", f"'{part.rod_end}' is no end of it", allowed)
             if getattr(part, "table", None) is not None:
                 first = [number(row[0], values) for row in part.table]
                 if not np.all(np.diff(first) > 0.0):
-                    yield _fault(
-                        f"{key}.table", "first column not rising", "rising from row to row"
-                    )
+                    found, allowed = "first column not rising", "rising from row to row"
+                    yield _fault(f"{key}.table", found, allowed)
             if isinstance(part, AirSpring):
                 yield from _air_spring_faults(key, part, values)
-    for table, fields in POSITIVE_OF.items():
-        for field in fields:
-            yield from _above(getattr(mechanism, table), table, field, values)
     begin, end = (number(q, values) for q in (mechanism.driver.start, mechanism.driver.end))
     if begin == end:
         yield _fault("driver.end", f"{end:g}", "another value than driver.start")
@@ -261,37 +235,23 @@ def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterato
             yield _fault(f"optimise.bounds.{name}", found, allowed)
 
 
-def _above(
-    part: Any,
-    key: str,
-    field: str,
-    values: Mapping[str, Any],
-    *,
-    least: float = 0.0,
-    or_equal: bool = False,
-    allowed: str = "",
-) -> Iterator[Fault]:
-    """A value out of its range, at the parameter that says it where there is just one."""
-    quantity = getattr(part, field, None)
-    value = least if quantity is None else number(quantity, values)
-    if quantity is None or value > least or (or_equal and value == least):
-        return
-    key, found = f"{key}.{field}", f"{value:g}"
-    if isinstance(quantity, Expression):
-        if str(quantity) in quantity.names:
-            key, found = f"parameters.{quantity}", f"{value:g} (as {key})"
-        else:
-            found = f"'{quantity}' is {value:g}"
-    yield _fault(key, found, allowed or ("0 or greater" if or_equal else "greater than 0"))
-
-
-def _gas_faults(key: str, gas: GasSpring, values: Mapping[str, Any]) -> Iterator[Fault]:
-    if gas.rod_end is not None and gas.rod_end not in gas.gas_spring:
-        allowed = " or ".join(gas.gas_spring)
-        yield _fault(f"{key}.rod_end", f"'{gas.rod_end}' is no end of it", allowed)
-    compressed, cold = "1 or greater: the gas is compressed", f"above {ABSOLUTE_ZERO:g} C"
-    yield from _above(gas, key, "progression", values, least=1.0, or_equal=True, allowed=compressed)
-    yield from _above(gas, key, "temperature", values, least=ABSOLUTE_ZERO, allowed=cold)
+def _least_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[Fault]:
+    """Values that are too small, at the parameter that says it where there is just one."""
+    for at, part in members(Definition, mechanism):
+        for field, least in least_values(type(part)).items():
+            quantity = getattr(part, field)
+            if quantity is None:
+                continue
+            value = number(quantity, values)
+            if value > least.value or (value == least.value and not least.excluded):
+                continue
+            key, found = f"{at}.{field}", f"{value:g}"
+            if isinstance(quantity, Expression):
+                if str(quantity) in quantity.names:
+                    key, found = f"parameters.{quantity}", f"{value:g} (as {key})"
+                else:
+                    found = f"'{quantity}' is {value:g}"
+            yield _fault(key, found, least.allowed)
 
 
 def _air_spring_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> Iterator[Fault]:

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Union, get_args
+from functools import cache
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args
 
 from pydantic import (
     AfterValidator,
@@ -14,7 +15,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from railsim.definitions.base import EMPTY_TABLE, Definition, Flag, Name, check
+from railsim.definitions.base import EMPTY_TABLE, Definition, Flag, Name, Side, check
 from railsim.definitions.mechanism.expressions import Expression
 
 AUTO = "auto"
@@ -42,6 +43,32 @@ QuantityOrAuto = Annotated[
     PlainValidator(lambda value: AUTO if value == AUTO else _quantity(value)),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]
+
+
+class Least(NamedTuple):
+    """Smallest value of a quantity, checked where the parameters have values."""
+
+    value: float
+    allowed: str  # in words
+    excluded: bool = False
+
+
+Positive = Annotated[Quantity, Least(0.0, "greater than 0", excluded=True)]
+NonNegative = Annotated[Quantity, Least(0.0, "0 or greater")]
+
+
+@cache
+def least_values(kind: type[Definition]) -> dict[str, Least]:
+    """Smallest values of the quantities of a definition, by its fields."""
+    found = {}
+    for name, field in kind.model_fields.items():
+        notes = list(field.metadata)
+        for member in get_args(field.annotation):  # of an optional one
+            notes += getattr(member, "__metadata__", ())
+        for note in notes:
+            if isinstance(note, Least):
+                found[name] = note
+    return found
 
 
 class Reference(str):
@@ -102,11 +129,11 @@ class Body(Definition):
 
     points: dict[Name, Coordinates] = EMPTY_TABLE
     """Points by name in the body's axes [m]"""
-    mass: Quantity = 0.0
+    mass: NonNegative = 0.0
     """Mass [kg]"""
     centre: Coordinates = (0.0, 0.0)
     """Centre of gravity in the body's axes [m]"""
-    inertia: Quantity = 0.0
+    inertia: NonNegative = 0.0
     """Moment of inertia about the centre of gravity [kg m2]"""
     outline: tuple[Name, ...] = ()
     """Points joined by lines in drawings; by default all in their order"""
@@ -135,7 +162,7 @@ class Link(Definition):
 
     link: Pair
     """The points"""
-    length: Quantity
+    length: Positive
     """Distance between them [m]"""
 
 
@@ -166,11 +193,11 @@ class Prismatic(Definition):
 class Arc(Definition):
     """An arc of the path of the roller's centre on a cam."""
 
-    radius: Quantity
+    radius: Positive
     """Radius [m]"""
-    turns: Literal["left", "right"]
+    turns: Side
     """Side to which the path turns on its way"""
-    length: Quantity | None = None
+    length: Positive | None = None
     """Length along the path [m], of a path of tangent arcs"""
     centre: Coordinates | None = None
     """Centre in the cam's axes [m], instead of tangency"""
@@ -214,13 +241,13 @@ class Cylinder(Definition):
 
     cylinder: Pair
     """Its ends"""
-    bore: Quantity
+    bore: Positive
     """Bore of one cylinder [m]"""
-    rod: Quantity = 0.0
+    rod: NonNegative = 0.0
     """Diameter of the rod [m]; counts when the cylinder pulls"""
-    count: Quantity = 1.0
+    count: Positive = 1.0
     """Cylinders side by side"""
-    supply_pressure: Quantity
+    supply_pressure: Positive
     """Available pressure [Pa]"""
     acts: Literal["push", "pull", "both"] = "push"
     """Chamber under pressure; with 'both' the one that is needed"""
@@ -285,7 +312,7 @@ class PointMass(Definition):
 
     point_mass: PointName
     """Where it is"""
-    mass: Quantity
+    mass: NonNegative
     """Mass [kg]"""
 
 
@@ -327,7 +354,7 @@ class Spring(Definition):
 
     spring: Pair
     """Its ends"""
-    stiffness: Quantity | None = None
+    stiffness: NonNegative | None = None
     """Stiffness [N/m]"""
     free_length: Quantity | None = None
     """Length without force [m]"""
@@ -344,7 +371,7 @@ class TorsionSpring(Definition):
 
     torsion_spring: tuple[BodyName, BodyName]
     """The bodies; `ground` too"""
-    stiffness: Quantity | None = None
+    stiffness: NonNegative | None = None
     """Stiffness [N m/rad]"""
     free_angle: Quantity | None = None
     """Angle of the first body less that of the second without torque [rad]"""
@@ -361,7 +388,7 @@ class JointFriction(Definition):
 
     joint_friction: BodyName
     """Body that turns against the ground"""
-    moment: Quantity
+    moment: NonNegative
     """Torque against its motion [N m]"""
 
 
@@ -370,7 +397,7 @@ class Damper(Definition):
 
     damper: Pair
     """Its ends"""
-    damping: Quantity
+    damping: NonNegative
     """Damping [N s/m]"""
 
 
@@ -383,9 +410,9 @@ class Stop(Definition):
     """Distance at which it is met [m]"""
     side: Literal["shortest", "longest"] = "shortest"
     """Whether the distance may not become shorter, or not longer"""
-    stiffness: Quantity
+    stiffness: NonNegative
     """Stiffness [N/m]"""
-    damping: Quantity = 0.0
+    damping: NonNegative = 0.0
     """Damping while it is met [N s/m]"""
 
 
@@ -394,58 +421,34 @@ class GasSpring(Definition):
 
     gas_spring: Pair
     """Its ends"""
-    F1: Quantity
+    F1: Positive
     """Force at 20 C without friction: fully extended, or fully compressed if it pulls [N]"""
-    progression: Quantity
+    progression: Annotated[Quantity, Least(1.0, "1 or greater: the gas is compressed")]
     """Ratio of the force at the other end of the stroke to `F1`"""
-    stroke: Quantity
+    stroke: Positive
     """Stroke [m]"""
-    extended: Quantity
+    extended: Positive
     """Length fully extended [m]"""
     law: Literal["linear", "isothermal"] = "linear"
     """Force over the stroke"""
     acts: Literal["compression", "traction"] = "compression"
     """Whether it pushes or pulls"""
-    friction: Quantity = 0.0
+    friction: NonNegative = 0.0
     """Friction against the motion [N]"""
-    damping: Quantity = 0.0
+    damping: NonNegative = 0.0
     """Damping [N s/m]"""
-    end_damping: Quantity | None = None
+    end_damping: NonNegative | None = None
     """Damping over the last part of the extension (oil) [N s/m]"""
     end_length: Quantity = 0.0
     """Length of that part [m]"""
-    temperature: Quantity = 20.0
+    temperature: Annotated[Quantity, Least(-273.15, "above -273.15 C", excluded=True)] = 20.0
     """Temperature of the gas [C]"""
-    rod: Quantity | None = None
+    rod: NonNegative | None = None
     """Diameter of the rod [m], for the pressure of the gas"""
     rod_end: PointName | None = None
     """Point at which the rod is; it should be the lower one when compressed"""
     service: tuple[Quantity, Quantity] = (-30.0, 80.0)
     """Lowest and highest temperature in service [C]"""
-
-
-class Driver(Definition):
-    """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
-
-    angle: BodyName | None = None
-    """Body whose angle it is"""
-    length: Pair | None = None
-    """Points whose distance it is"""
-    coordinate: PointName | None = None
-    """Point whose coordinate it is"""
-    axis: Literal["x", "y"] = "y"
-    """Which coordinate"""
-    zero: Quantity = 0.0
-    """What the angle, length or coordinate is where the driver is 0 [rad or m]"""
-    start: Quantity = 0.0
-    """Value of the driver at the start of the motion [rad or m]"""
-    end: Quantity
-    """Value of the driver at its end [rad or m]"""
-
-    @check
-    def _one(self) -> None:
-        if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
-            raise ValueError("one of 'angle', 'length' and 'coordinate'")
 
 
 class Angle(Definition):

@@ -15,22 +15,22 @@ PARTS = ("length", "free_length", "stroke", "extended", "bore", "rod", "pin_to_p
 """Lengths of actuators and elements."""
 
 
-T = TypeVar("T", bound=str)
+T = TypeVar("T")
 
 
-def texts_of(kind: type[T], node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, T]]:
-    """Yield every text of a kind, such as an expression, in a definition with its dotted key."""
-    members: Any = ()
+def members(kind: type[T], node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, T]]:
+    """Yield everything of a kind, such as expressions, in a definition with its dotted key."""
     if isinstance(node, kind):
         yield ".".join(path), node
-    elif isinstance(node, BaseModel):
-        members = ((name, getattr(node, name)) for name in type(node).model_fields)
+    inner: Any = ()
+    if isinstance(node, BaseModel):
+        inner = ((name, getattr(node, name)) for name in type(node).model_fields)
     elif isinstance(node, Mapping):
-        members = node.items()
+        inner = node.items()
     elif isinstance(node, list | tuple):
-        members = enumerate(node)
-    for key, value in members:
-        yield from texts_of(kind, value, (*path, str(key)))
+        inner = enumerate(node)
+    for key, value in inner:
+        yield from members(kind, value, (*path, str(key)))
 
 
 def parameter_values(
@@ -80,12 +80,12 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
         raise input_error("", str(error), hint, key=key) from None
 
 
-def coordinates(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:
+def coordinates(where: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
     """Coordinates of a point in its body's axes."""
     if isinstance(where, Polar):
-        radius, angle = number(where.radius, values, key), number(where.angle, values, key)
+        radius, angle = number(where.radius, values), number(where.angle, values)
         return radius * np.cos(angle), radius * np.sin(angle)
-    return number(where[0], values, key), number(where[1], values, key)
+    return number(where[0], values), number(where[1], values)
 
 
 def point_names(mechanism: Mechanism) -> list[str]:
@@ -94,25 +94,10 @@ def point_names(mechanism: Mechanism) -> list[str]:
     return [*names, *(f"{b}.{p}" for b, part in mechanism.bodies.items() for p in part.points)]
 
 
-PAIRS = (
-    "revolute",
-    "link",
-    "slot",
-    "prismatic",
-    "cylinder",
-    "air_spring",
-    "piston",
-    "spring",
-    "damper",
-    "stop",
-    "gas_spring",
-)
-"""Keys of parts between two points."""
-
-
 def ends(part: Any) -> tuple[str, str] | None:
     """The two points of a joint, actuator or element between points; None of others."""
-    return next((pair for key in PAIRS if (pair := getattr(part, key, None)) is not None), None)
+    first = getattr(part, next(iter(type(part).model_fields)))  # the key that says what it is
+    return first if isinstance(first, tuple) and first[0].kind == "point" else None
 
 
 def points_of(part: Any) -> tuple[str, str]:

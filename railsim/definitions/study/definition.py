@@ -10,10 +10,12 @@ from railsim.definitions.base import (
     Count,
     Definition,
     Finite,
+    Flag,
     Name,
     NonNegative,
     Positive,
     Text,
+    Whole,
     check,
 )
 from railsim.definitions.file_definition import FileDefinition
@@ -21,13 +23,7 @@ from railsim.definitions.study.analyses import Analysis, needs_speed
 from railsim.definitions.study.design import Optimise
 from railsim.units import range_values
 
-Value = (
-    Annotated[bool, Field(strict=True)]
-    | Annotated[int, Field(strict=True)]
-    | Finite
-    | Text
-    | tuple[Finite | Text, ...]
-)
+Value = Flag | Annotated[int, Field(strict=True)] | Finite | Text | tuple[Finite | Text, ...]
 Values = Text | Annotated[tuple[Value, ...], Field(min_length=1)]
 
 
@@ -97,7 +93,7 @@ class Sample(Definition):
     """Latin hypercube, or the scrambled sequence of Sobol"""
     number: Count
     """How many values of each parameter; a power of two for `sobol`"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    seed: Whole = 0
     """Where the random numbers begin: the same seed gives the same sample"""
     parameters: Annotated[dict[Text, Spread], Field(min_length=1)]
     """Parameters by their paths, or `speed`"""

@@ -4,7 +4,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import EMPTY_TABLE, Count, Definition, Finite, Flag, Text, check
+from railsim.definitions.base import (
+    EMPTY_TABLE,
+    Count,
+    Definition,
+    Finite,
+    Flag,
+    Text,
+    Whole,
+    check,
+)
 
 
 class Variable(Definition):
@@ -76,7 +85,7 @@ class Optimise(Definition):
     """How many designs are computed at most"""
     batch: Count = 8
     """How many designs are computed at a time; of a genetic algorithm, its population"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    seed: Whole = 0
     """Where the random numbers begin: the same seed gives the same designs"""
 
     @check

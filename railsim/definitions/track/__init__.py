@@ -1,1 +1,1 @@
-"""Track files: `tables` as written, `layout` over arc length, `definition` what follows."""
+"""Track files: `definition` as written, `layout` over arc length, `support` beneath the rails."""

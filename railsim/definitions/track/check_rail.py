@@ -1,12 +1,19 @@
 """Check rails: third rails beside running rails, which guide the backs of flanges."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field
 
-from railsim.definitions.base import Definition, Finite, NonNegative, Positive, rises
+from railsim.definitions.base import (
+    OTHER_SIDE,
+    Definition,
+    Finite,
+    NonNegative,
+    Positive,
+    Side,
+    rises,
+)
 
-OTHER: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
 MOST_CHECK_RAILS = 100
 Width = Annotated[Finite, Field(ge=0.02, le=0.2)]
 FAR = 1e7  # m
@@ -20,7 +27,7 @@ def _rows(value: object) -> object:
 class CheckRail(Definition):
     """A check rail, or a guard rail of a sharp curve."""
 
-    rail: Literal["left", "right"]
+    rail: Side
     """Running rail beside which it stands; it holds the wheelset by the wheel on that rail"""
     flangeway: Annotated[
         tuple[tuple[Finite, Width], ...],
@@ -46,4 +53,4 @@ class CheckRail(Definition):
 
     def mirrored(self) -> Self:
         """Return the same beside the other rail."""
-        return self.model_copy(update={"rail": OTHER[self.rail]})
+        return self.model_copy(update={"rail": OTHER_SIDE[self.rail]})

@@ -1,23 +1,156 @@
-"""A track: the tables of its file, and what follows from them."""
+"""Track files, `railsim-track/1`: plan, cant, vertical profile, rails, friction, irregularities.
 
-from typing import Any, ClassVar
+Plan, cant and vertical profile are lists of elements, one behind the other, each with its length.
+A transition (CLO, LIR) takes its ends from its neighbours where it does not name them.  Curvature,
+cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
+"""
 
-from railsim.definitions.base import Remark
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from railsim.definitions.base import (
+    SIDED_ROWS,
+    Definition,
+    Finite,
+    Flag,
+    Name,
+    NonNegative,
+    NonNegativePair,
+    Remark,
+    Share,
+    Speed,
+    Text,
+    TextPair,
+    both_sides,
+    one_or_two,
+    pair,
+    rises,
+)
+from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured_file import embed_measured
+from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.track.check_rail import MOST_CHECK_RAILS, CheckRail
+from railsim.definitions.track.elements import CantElement, PlanElement, VerticalElement
 from railsim.definitions.track.layout import curvature_sections, track_faults, track_remarks
-from railsim.definitions.track.rail_sections import embed_rail_sections
-from railsim.definitions.track.tables import TrackTables
-from railsim.definitions.vehicle.laws import with_sources
+from railsim.definitions.track.rail_sections import MOST_RANGES, RailSections, embed_rail_sections
+from railsim.definitions.track.support import Support
+from railsim.definitions.vehicle.laws import Law, with_sources
 from railsim.errors import Fault
 from railsim.plottable import Plottable
 from railsim.table import Column, Table
 
+ArcLength = TypeVar("ArcLength", float, Any)
+MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
-class Track(TrackTables, Plottable):
+
+def _softer_in_slip(factors: tuple[float, float]) -> tuple[float, float]:
+    if factors[1] > factors[0]:
+        raise ValueError("the factor of the slip area is at most that of the adhesion area")
+    return factors
+
+
+Widening = Annotated[Finite, Field(ge=-0.05, le=0.1)]
+FrictionRows = Annotated[
+    tuple[tuple[Finite, NonNegative, NonNegative], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(),
+    SIDED_ROWS,
+]
+ThirdBody = Annotated[
+    tuple[Share, Share],
+    AfterValidator(_softer_in_slip),
+    BeforeValidator(pair),
+    one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
+]
+WideningRows = Annotated[
+    tuple[tuple[Finite, Widening, Widening], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(0.5),
+    SIDED_ROWS,
+]
+
+
+class FallingFriction(Definition):
+    """Friction that falls with the slip velocity w of a contact patch (Polach 2005).
+
+    mu(w) = mu ((1 - rest) exp(-decay w) + rest)
+    """
+
+    rest: Share
+    """Friction at very large slip over that without slip [1]"""
+    decay: NonNegative
+    """How fast it falls with the slip velocity [s/m]"""
+
+
+class Track(FileDefinition, Plottable):
     """A track: everything that its file says."""
 
     KIND: ClassVar = "track"
     OPEN_TABLES: ClassVar = ("friction_falling",)
+
+    format: Literal["railsim-track/1"]
+    name: Text
+    """What the track is called in tables and plots"""
+    source: Text | None = None
+    """Where the numbers come from"""
+    speed: Speed | None = None
+    """Highest speed permitted on the track [m/s]: remarks on the alignment refer to it, and the
+    speed `permitted` of a study"""
+    mileage: Finite = 0.0
+    """Mileage of s = 0 [m]; results hold the mileage of the reference body"""
+    falling_mileage: Flag = False
+    """The mileage falls in the direction of travel"""
+    gauge: Annotated[Finite, Field(ge=0.3, le=2.5)] = 1.435
+    """Distance between the gauge faces, 14 mm below the rail tops [m]"""
+    rail: TextPair = ("60E1", "60E1")
+    """Rail profile, a built-in name or a file, or [left, right]"""
+    inclination: Annotated[Finite, Field(ge=0, le=0.2)] = 0.025
+    """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
+    friction: NonNegativePair = (0.4, 0.4)
+    """Coefficient of friction, one number, or left and right [1]"""
+    friction_table: FrictionRows | None = None
+    """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
+    friction_falling: FallingFriction | None = None
+    """How friction falls with the slip velocity; by default it does not"""
+    third_body: ThirdBody = (1.0, 1.0)
+    """Factor of Kalker's coefficients by a layer of dirt or water, one number or [adhesion, slip]:
+    the second, for the slip area, is for the creep law `polach` only [1]"""
+    gauge_widening: WideningRows | None = None
+    """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
+    much each rail stands further out than the gauge says, one number being shared by both rails"""
+    rounding: Annotated[Finite, Field(ge=0.1, le=200)] = 10.0
+    """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
+    cant_rotation: Literal["centre", "inner_rail"] = "centre"
+    """Cant turns the track about its centre line, or about the inner (lower) rail"""
+    plan: tuple[PlanElement, ...] = Field(min_length=1, max_length=MOST_ELEMENTS)
+    """Elements of the plan, from s = 0 on; the first and the last continue beyond the ends"""
+    cant: tuple[CantElement, ...] = Field(default=(), max_length=MOST_ELEMENTS)
+    """Elements of the cant; where shorter than the plan, the last value continues"""
+    vertical: tuple[VerticalElement, ...] = Field(default=(), max_length=MOST_ELEMENTS)
+    """Elements of the vertical profile; where shorter than the plan, the last gradient continues"""
+
+    irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
+    """Displacements of the rails from their ideal positions; they add up"""
+    laws: dict[Name, Law] | None = None
+    """Laws of one's own by name: Python functions, executed by permission alone"""
+    sections: tuple[RailSections, ...] = Field(default=(), max_length=MOST_RANGES)
+    """Ranges in which the section of a rail changes, such as crossings"""
+    check_rail: tuple[CheckRail, ...] = Field(default=(), max_length=MOST_CHECK_RAILS)
+    """Check rails and guard rails"""
+    support: Support = Support()
+    """What carries the rails: rigid, or elastic as a moving track model"""
+
+    @property
+    def length(self) -> float:
+        """Length of the plan [m]."""
+        return sum(element.length for element in self.plan)
+
+    def mileage_at(self, s: "ArcLength") -> "ArcLength":
+        """Mileage at an arc length, or at an array of them [m]."""
+        return self.mileage - s if self.falling_mileage else self.mileage + s
 
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:

@@ -8,12 +8,16 @@ allowed but unusual is a remark.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from railsim.definitions.base import Remark
 from railsim.definitions.track.alignment_rules import alignment_remarks
+from railsim.definitions.track.elements import TrackElement
 from railsim.definitions.track.section import Section
-from railsim.definitions.track.tables import TrackElement, TrackTables
 from railsim.errors import Fault
+
+if TYPE_CHECKING:
+    from railsim.definitions.track.definition import Track
 
 # Ramps steeper than this are remarked on: exceptional limit of EN 13803 (2017) for the cant ramp.
 STEEPEST_CANT_RAMP = 2.5e-3
@@ -24,42 +28,48 @@ ASTRAY_CANT = 1e-3
 SMALL = 1e-6
 
 
-def curvature_sections(track: TrackTables) -> list[Section]:
+def curvature_sections(track: "Track") -> list[Section]:
     """Return the plan as curvature over arc length [1/m]."""
     return _sections("plan", track.plan)[0]
 
 
-def cant_sections(track: TrackTables) -> list[Section]:
+def cant_sections(track: "Track") -> list[Section]:
     """Return the cant over arc length [m]; empty where there is none."""
     return _sections("cant", track.cant)[0]
 
 
-def gradient_sections(track: TrackTables) -> list[Section]:
+def gradient_sections(track: "Track") -> list[Section]:
     """Return the gradient over arc length [1]; empty for a level track."""
     return _sections("vertical", track.vertical)[0]
 
 
-def is_straight_and_level(track: TrackTables) -> bool:
+def is_straight_and_level(track: "Track") -> bool:
     """Whether a track has neither curves nor cant nor gradients."""
     sections = (*curvature_sections(track), *cant_sections(track), *gradient_sections(track))
     return not any(section.start_value or section.end_value for section in sections)
 
 
-def track_faults(track: TrackTables) -> list[Fault]:
+def track_faults(track: "Track") -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
     _, faults = _sections("plan", track.plan)
     cant, cant_faults = _sections("cant", track.cant)
     _, vertical_faults = _sections("vertical", track.vertical)
     faults += cant_faults + vertical_faults
     if not cant_faults:
-        faults += _cant_steps(cant)
+        for before, behind in _steps(cant):
+            found = f"the cant steps from {before.end_value:g} to {behind.start_value:g} m"
+            faults.append(Fault("", behind.key, found, "a ramp (LIR) between the two elements"))
     return faults
 
 
-def track_remarks(track: TrackTables) -> list[Remark]:
+def track_remarks(track: "Track") -> list[Remark]:
     """Return what is allowed in a track but unusual."""
     plan, cant, vertical = curvature_sections(track), cant_sections(track), gradient_sections(track)
-    remarks = _curvature_steps(plan)
+    remarks = []
+    for before, behind in _steps(plan):
+        radii = [_written("radius", kappa) for kappa in (before.end_value, behind.start_value)]
+        text = f"the radius steps from {radii[0]} to {radii[1]} without a transition (CLO)"
+        remarks.append(Remark(behind.key, text))
     text = "the gradient steps without a vertical curve (LIR)"
     remarks += [Remark(behind.key, text) for _, behind in _steps(vertical)]
     remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
@@ -76,7 +86,12 @@ def track_remarks(track: TrackTables) -> list[Remark]:
     for k, part in enumerate(track.sections):
         if text := part.unusual():
             remarks.append(Remark(f"sections.{k}", text))
-    return remarks + _beyond_the_track(track)
+    for k, shape in enumerate(track.irregularities):
+        begin, end = shape.extent(track.length)
+        if end <= 0.0 or begin >= track.length:  # the track sees nothing of it
+            text = f"from {begin:g} to {end:g} m, beyond the track's {track.length:g} m"
+            remarks.append(Remark(f"irregularities.{k}", text))
+    return remarks
 
 
 # elements ---------------------------------------------------------------------------------------
@@ -134,32 +149,9 @@ def _written(word: str, value: float) -> str:
 # faults and remarks -------------------------------------------------------------------------------
 
 
-def _cant_steps(cant: Sequence[Section]) -> list[Fault]:
-    return [
-        Fault(
-            "",
-            behind.key,
-            f"the cant steps from {before.end_value:g} to {behind.start_value:g} m",
-            "a ramp (LIR) between the two elements",
-        )
-        for before, behind in _steps(cant)
-    ]
-
-
 def _steps(sections: Sequence[Section]) -> list[tuple[Section, Section]]:
     pairs = pairwise(sections)
     return [(a, b) for a, b in pairs if not _same(a.end_value, b.start_value)]
-
-
-def _curvature_steps(plan: Sequence[Section]) -> list[Remark]:
-    return [
-        Remark(
-            behind.key,
-            f"the radius steps from {_written('radius', before.end_value)} to "
-            f"{_written('radius', behind.start_value)} without a transition (CLO)",
-        )
-        for before, behind in _steps(plan)
-    ]
 
 
 def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:
@@ -167,17 +159,6 @@ def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -
         return []
     text = f"the list is longer ({sections[-1].end:g} m) than the plan ({plan[-1].end:g} m)"
     return [Remark(name, text)]
-
-
-def _beyond_the_track(track: TrackTables) -> list[Remark]:
-    """Remark on irregularities of which the track sees nothing."""
-    remarks = []
-    for index, part in enumerate(track.irregularities):
-        begin, end = part.extent(track.length)
-        if end <= 0.0 or begin >= track.length:
-            text = f"from {begin:g} to {end:g} m, beyond the track's {track.length:g} m"
-            remarks.append(Remark(f"irregularities.{index}", text))
-    return remarks
 
 
 def _cant_sizes(cant: Sequence[Section]) -> list[Remark]:

@@ -1,14 +1,13 @@
 """Rails whose section changes along the track: crossings, and rails that are worn in places."""
 
 from itertools import accumulate, pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field
 
-from railsim.definitions.base import Definition, Finite, Text, check
+from railsim.definitions.base import OTHER_SIDE, Definition, Finite, Side, Text, check
 from railsim.definitions.embedding import embed, tables_of
 from railsim.definitions.section_files import MOST_SECTIONS, read_sections
-from railsim.definitions.track.check_rail import OTHER
 from railsim.errors import Fault
 
 Coordinates = Annotated[tuple[Finite, ...], Field(min_length=8, max_length=2000)]
@@ -57,7 +56,7 @@ class Contour(Definition):
 class RailSections(Definition):
     """Sections of one rail over a range of the track."""
 
-    rail: Literal["left", "right"]
+    rail: Side
     """Which rail; sections are those of a right rail and mirrored for the left one"""
     file: Text | None = None
     """List of sections, `.slcs` or CSV with the columns `s` and `file`, or `s`, `y`, `z`; read when
@@ -120,7 +119,7 @@ class RailSections(Definition):
 
     def mirrored(self) -> Self:
         """Return the same as the other rail."""
-        return self.model_copy(update={"rail": OTHER[self.rail]})
+        return self.model_copy(update={"rail": OTHER_SIDE[self.rail]})
 
 
 def embed_rail_sections(data: dict[str, Any]) -> list[Fault]:

@@ -1,1 +1,1 @@
-"""Vehicle files: `tables` as written, `flatten` to plain lists, `definition` what follows."""
+"""Vehicle files: `definition` and its `tables` as written, `flatten` to plain lists."""

@@ -8,19 +8,25 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.elements.traction import AxleTorque
 from railsim.definitions.vehicle.loads import load_faults, loaded
-from railsim.definitions.vehicle.names import body_names, name_faults, resolve, sided_names
-from railsim.definitions.vehicle.tables import Group, Placement, VehicleTables, Wheelset
+from railsim.definitions.vehicle.names import name_faults, resolve, sided_names
+from railsim.definitions.vehicle.tables import Assembly, Placement, Wheelset
 from railsim.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from railsim.definitions.vehicle.definition import Vehicle
 
 # Allowed difference between an axle's height and the wheel radius, and the like [m].
 POSITION_TOLERANCE = 1e-3
+
+Group: TypeAlias = "Vehicle | Assembly"
+"""What holds parts: the vehicle itself or an assembly."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +158,13 @@ def wrong_type(kind: str, value: object) -> str:
     return f"the {kind} is {found}; give what railsim.load_{kind} returns"
 
 
-def flatten(vehicle: VehicleTables) -> FlatVehicle:
+def flatten(vehicle: "Vehicle") -> FlatVehicle:
     """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
     Raises InputError: names that mean nothing or are used twice, parts that do not fit together.
     TypeError: something else than a vehicle.
     """
-    if not isinstance(vehicle, VehicleTables):
+    if getattr(vehicle, "KIND", "") != "vehicle":
         raise TypeError(wrong_type("vehicle", vehicle))
     stored: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
     if KEPT not in stored:
@@ -171,15 +177,14 @@ def flatten(vehicle: VehicleTables) -> FlatVehicle:
     return stored[KEPT]
 
 
-def _flat(vehicle: VehicleTables) -> FlatVehicle:
+def _flat(vehicle: "Vehicle") -> FlatVehicle:
     vehicle = loaded(vehicle)
-    known, _ = body_names(vehicle.model_dump())
     frames = list(_frames(vehicle, _Frame()))
     bodies = [body for group, frame in frames for body in _bodies(group, frame)]
     wheelsets = [body for group, frame in frames for body in _wheelsets(group, frame)]
     wheelsets.sort(key=lambda body: -body.position[0])
     order = {body.name: index for index, body in enumerate(wheelsets)}
-    boxes = [box for group, frame in frames for box in _axleboxes(group, frame, known)]
+    boxes = [box for group, frame in frames for box in _axleboxes(group, frame, order)]
     boxes.sort(key=lambda box: order[box.parent or ""])
     flat = (*bodies, *wheelsets, *boxes)
     positions = {body.name: body.position for body in flat}
@@ -201,10 +206,10 @@ def _wheelsets(group: Group, frame: _Frame) -> Iterator[FlatBody]:
         yield FlatBody(frame.full(name), "wheelset", wheelset.mass, wheelset.inertia, at, wheelset)
 
 
-def _axleboxes(group: Group, frame: _Frame, known: dict[str, str]) -> Iterator[FlatBody]:
+def _axleboxes(group: Group, frame: _Frame, wheelsets: Mapping[str, int]) -> Iterator[FlatBody]:
     for name, box in group.axleboxes.items():
-        parent = resolve(box.wheelset, frame.scope, None, known)
-        for sided, side in sided_names(name, {"sides": box.sides}):
+        parent = resolve(box.wheelset, frame.scope, None, wheelsets)
+        for sided, side in sided_names(name, box.sides):
             yield FlatBody(
                 frame.full(sided),
                 "axlebox",
@@ -218,7 +223,7 @@ def _axleboxes(group: Group, frame: _Frame, known: dict[str, str]) -> Iterator[F
 
 def _elements(group: Group, frame: _Frame, positions: dict[str, Vector]) -> Iterator[FlatElement]:
     for name, element in group.elements.items():
-        for sided, side in sided_names(name, {"sides": getattr(element, "sides", None)}):
+        for sided, side in sided_names(name, getattr(element, "sides", None)):
             ends = [resolve(body, frame.scope, side, positions) or "" for body in element.bodies]
             points = element.end_points()
             if points is None:
@@ -240,7 +245,7 @@ def _sum(one: Sequence[float], two: Sequence[float]) -> Vector:
     return (one[0] + two[0], one[1] + two[1], one[2] + two[2])
 
 
-def position_faults(vehicle: VehicleTables) -> list[Fault]:
+def position_faults(vehicle: "Vehicle") -> list[Fault]:
     """Return which parts of a vehicle stand where they cannot; the faults' file is left empty."""
     if wrong := load_faults(vehicle):
         return wrong
@@ -250,7 +255,7 @@ def position_faults(vehicle: VehicleTables) -> list[Fault]:
     return list(found.values())
 
 
-def _position_faults(vehicle: VehicleTables) -> Iterator[Fault]:
+def _position_faults(vehicle: "Vehicle") -> Iterator[Fault]:
     flat, keys = _flat(vehicle), _keys(vehicle)
     wheelsets = flat.of_kind("wheelset")
     for body in wheelsets:
@@ -277,13 +282,13 @@ def _position_faults(vehicle: VehicleTables) -> Iterator[Fault]:
         yield from _torque_faults(group, frame, kinds)
 
 
-def _keys(vehicle: VehicleTables) -> dict[str, str]:
+def _keys(vehicle: "Vehicle") -> dict[str, str]:
     return {
         frame.full(sided): frame.key(table, name)
         for group, frame in _frames(vehicle, _Frame())
         for table in ("wheelsets", "axleboxes")
         for name, part in getattr(group, table).items()
-        for sided, _ in sided_names(name, {"sides": getattr(part, "sides", None)})
+        for sided, _ in sided_names(name, getattr(part, "sides", None))
     }
 
 

@@ -7,7 +7,7 @@ told apart by it, and workers get it.  Nothing is executed here (see `railsim.la
 import ast
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -16,11 +16,14 @@ from railsim.definitions.base import (
     Count,
     Definition,
     Finite,
+    Flag,
     Name,
     NonNegative,
     Positive,
+    Side,
     Text,
     Vector,
+    Whole,
     check,
 )
 from railsim.errors import Fault, InputError, input_error, nearest
@@ -37,7 +40,7 @@ class Law(Definition):
     """Name of the function; by default that of the law"""
     source: Text | None = None
     """Text of the file, as results carry it"""
-    compiled: Annotated[bool, Field(strict=True)] = True
+    compiled: Flag = True
     """`false`: called as Python, slowly"""
 
     @check
@@ -66,21 +69,27 @@ class OwnOutput(LawUse):
     """Words for axes and tables; by default its name"""
 
 
-BODY_SIGNALS = ("displacement", "velocity", "acceleration", "angle", "angular_velocity")
-ELEMENT_SIGNALS = ("deflection", "rate", "force", "power")
-WHEEL_SIGNALS = ("wheel_speed", "Q", "Y")
+BODY_SIGNALS = {
+    "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "angle": "rad",
+    "angular_velocity": "rad/s",
+}  # fmt: skip
+ELEMENT_SIGNALS = {"deflection": "m", "rate": "m/s", "force": "N", "power": "W"}
+WHEEL_SIGNALS = {"wheel_speed": "m/s", "Q": "N", "Y": "N"}
+OTHER_SIGNALS = {
+    "curvature": "1/m", "cant_angle": "rad", "speed": "m/s", "speed_change": "m/s2",
+    "distance": "m", "time": "s",
+}  # fmt: skip
+SIGNALS = {**BODY_SIGNALS, **ELEMENT_SIGNALS, **WHEEL_SIGNALS, **OTHER_SIGNALS}
+"""SI units of what can be measured."""
+ABOUT_AXES = {"deflection": "rad", "rate": "rad/s", "force": "N m"}
+"""Those of an element about an axis."""
 ANGLES = ("roll", "pitch", "yaw")
-TRACK_SIGNALS = ("curvature", "cant_angle")
 
 
 class Signal(Definition):
     """Something that is measured during a run."""
 
-    quantity: Literal[
-        "displacement", "velocity", "acceleration", "angle", "angular_velocity",
-        "deflection", "rate", "force", "power", "wheel_speed", "Q", "Y",
-        "curvature", "cant_angle", "speed", "speed_change", "distance", "time",
-    ]  # fmt: skip
+    quantity: Literal[tuple(SIGNALS)]  # type: ignore[valid-type]
     """Of a `body`: displacement and velocity of a point against the track, what an accelerometer
     reads there, angle against the track, absolute angular velocity; of an `element`: deflection,
     its rate, force, power; of a `wheelset`: speed of its circumference, wheel loads; of the track:
@@ -93,7 +102,7 @@ class Signal(Definition):
     """Full name of the element"""
     wheelset: Text | None = None
     """Full name of the wheelset"""
-    side: Literal["left", "right"] | None = None
+    side: Side | None = None
     """Side of the wheel, of `Q` and `Y`"""
     axis: Literal["x", "y", "z", "roll", "pitch", "yaw"] | None = None
     """Axis; of a link its line, by default"""
@@ -105,7 +114,7 @@ class Signal(Definition):
     """Time after which a sample is known [s]; needs `rate`"""
     noise: NonNegative = 0.0
     """Standard deviation of normal noise of each sample [unit of the quantity]; needs `rate`"""
-    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    seed: Whole = 1
     """Seed of the noise"""
     resolution: NonNegative = 0.0
     """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
@@ -113,13 +122,8 @@ class Signal(Definition):
     @property
     def unit(self) -> str:
         """SI unit of what is measured."""
-        of_element = ("rad", "rad/s", "N m", "W") if self.axis in ANGLES else ("m", "m/s", "N", "W")
-        return {
-            **dict(zip(BODY_SIGNALS, ("m", "m/s", "m/s2", "rad", "rad/s"), strict=True)),
-            **dict(zip(ELEMENT_SIGNALS, of_element, strict=True)),
-            **{"wheel_speed": "m/s", "Q": "N", "Y": "N", "curvature": "1/m", "cant_angle": "rad"},
-            **{"speed": "m/s", "speed_change": "m/s2", "distance": "m", "time": "s"},
-        }[self.quantity]
+        about = ABOUT_AXES.get(self.quantity) if self.axis in ANGLES else None
+        return about or SIGNALS[self.quantity]
 
     @check
     def _what_belongs_together(self) -> None:
@@ -131,7 +135,7 @@ class Signal(Definition):
             raise ValueError("'side' belongs to Q and Y and only to them")
         if self.quantity in BODY_SIGNALS and self.axis is None:
             raise ValueError(f"{self.quantity} needs 'axis'")
-        linear = self.quantity in BODY_SIGNALS[:3]
+        linear = self.quantity in ("displacement", "velocity", "acceleration")
         if linear and self.axis in ANGLES:
             raise ValueError(f"the axis of {self.quantity} is x, y or z")
         if not linear and self.quantity in BODY_SIGNALS and self.axis in ("x", "y", "z"):

@@ -111,9 +111,9 @@ def placement_names(assembly: Mapping[str, Any]) -> list[str]:
     return [name for name in named if isinstance(name, str)]
 
 
-def sided_names(name: str, part: Mapping[str, Any]) -> list[tuple[str, str | None]]:
+def sided_names(name: str, sides: object) -> list[tuple[str, str | None]]:
     """Return the names that a part gets, each with its side: left and right, or just one."""
-    if part.get("sides") == "both":
+    if sides == "both":
         return [(f"{name}.{side}", side) for side in SIDES]
     return [(name, None)]
 
@@ -130,7 +130,7 @@ def body_names(parts: Mapping[str, Any]) -> tuple[dict[str, str], list[Fault]]:
         ):
             for name, part in group.table(table).items():
                 key = ".".join((*group.path, table, name))
-                for sided, _ in sided_names(name, part):
+                for sided, _ in sided_names(name, part.get("sides")):
                     full = group.full(sided)
                     if full in kinds:
                         found = f"the name '{full}' is used twice"
@@ -187,7 +187,7 @@ def _wrong_names(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator
             yield from group.unknown(axlebox.get("wheelset"), None, wheelsets, key, "wheelset")
         for name, element in group.table("elements").items():
             key = ".".join((*group.path, "elements", name))
-            for sided, side in sided_names(name, element):
+            for sided, side in sided_names(name, element.get("sides")):
                 yield from _wrong_ends(element, group, side, known, f"{key}.bodies")
                 if group.full(sided) in used:
                     found = f"the name '{group.full(sided)}' is used twice"

@@ -1,10 +1,4 @@
-"""Vehicle files, `railsim-vehicle/1`: bodies, wheelsets, axleboxes, force elements, assemblies.
-
-Everything is a table with its own name, so that an extending file can replace a part of it.
-Positions are those of the nominal vehicle at rest on straight level track: x forward from the
-vehicle's origin, y to the right, z down from the plane through the rail tops.  An assembly is a
-group that stands at each of its placements; its coordinates count from there.
-"""
+"""Parts of a vehicle file: bodies, wheelsets, axleboxes, assemblies, points, service."""
 
 from typing import Literal
 
@@ -24,9 +18,6 @@ from railsim.definitions.base import (
     Vector,
 )
 from railsim.definitions.elements import AnyElement
-from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.vehicle.laws import Controller, Law, Signal
-from railsim.definitions.vehicle.loads import LoadCase, LoadName
 from railsim.definitions.vehicle.out_of_round import OutOfRound
 
 
@@ -133,45 +124,3 @@ class Service(Definition):
     of this name in other conditions, without pooling their values"""
     fault: Flag = False
     """The condition is a fault, assessed for running safety only"""
-
-
-class VehicleTables(FileDefinition):
-    """Everything that the file of a vehicle says."""
-
-    format: Literal["railsim-vehicle/1"]
-    name: Text
-    """What the vehicle is called in tables and plots"""
-    source: Text | None = None
-    """Where the numbers come from"""
-    load: LoadName | None = None
-    """Load case in force; `design`, the default: the numbers of the bodies themselves"""
-    loads: dict[Name, LoadCase] = EMPTY_TABLE
-    """Load cases by name"""
-    reference: Text | None = None
-    """Full name of the body whose travelled distance is the vehicle's `distance`; by default the
-    first body, else the first wheelset"""
-    service: Service | None = None
-    """Approved operating conditions of the vehicle; assessments need it"""
-    sensors: dict[Name, Point] = EMPTY_TABLE
-    """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
-    standard ones"""
-    laws: dict[Name, Law] | None = None
-    """Laws of one's own by name: Python functions, executed by permission alone"""
-    signals: dict[Name, Signal] | None = None
-    """What is measured during a run, by name"""
-    controllers: dict[Name, Controller] | None = None
-    """What reads signals and commands actuators, by name"""
-    bodies: dict[Name, Body] = EMPTY_TABLE
-    """Bodies by name"""
-    wheelsets: dict[Name, Wheelset] = EMPTY_TABLE
-    """Wheelsets by name"""
-    axleboxes: dict[Name, Axlebox] = EMPTY_TABLE
-    """Axleboxes by name"""
-    elements: dict[Name, AnyElement] = EMPTY_TABLE
-    """Force elements by name"""
-    assemblies: dict[Name, Assembly] = EMPTY_TABLE
-    """Assemblies by name"""
-
-
-Group = VehicleTables | Assembly
-"""What holds parts: the vehicle itself or an assembly."""
