@@ -16,12 +16,10 @@ outwards (docs/validation/contact_geometry.md compares with the boundary-element
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.kernels import contact_table as fields
 from railsim.kernels.contact_table import HALF_LOAD, N_PATCH
-
-Floats = NDArray[np.float64]
 
 REFERENCE_LOAD = 30e3  # N, half a wheel's load on each patch of a pair
 REFERENCE_ROOT = 8e-3  # sqrt(m), of the penetration there

@@ -16,8 +16,9 @@ import warnings
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
@@ -26,8 +27,6 @@ from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.patches import CreepLaw, CreepScratch, Patches
-
-Array = NDArray[np.float64]
 
 LAWS = tuple(name for name, law in CREEP_LAWS.items() if not law.measured)
 """Names of the creep laws that need no curve of the user's own."""
@@ -44,9 +43,9 @@ class CreepForce(NamedTuple):
         Moment about the contact normal at the patch's centre, on the rail [N m].
     """
 
-    T_x: Array
-    T_y: Array
-    M_z: Array
+    T_x: Floats
+    T_y: Floats
+    M_z: Floats
 
 
 def creep_force(

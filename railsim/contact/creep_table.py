@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, RATIO_MAX, T_HALF
 from railsim.processes import workers_begin
@@ -41,8 +42,6 @@ from railsim.processes import workers_begin
 # the generator's solver; a run reads the finished table only
 if TYPE_CHECKING:
     from railsim.contact.exact_creep import RollingGrid
-
-Array = NDArray[np.float64]
 
 POISSON = 0.28
 """Poisson's ratio of the tabulated solutions; others scale Kalker's coefficients."""
@@ -66,7 +65,7 @@ class CreepNodes(NamedTuple):
     """
 
     force: NDArray[np.float32]
-    kalker: Array
+    kalker: Floats
 
 
 class CreepTable(NamedTuple):
@@ -84,24 +83,24 @@ class CreepTable(NamedTuple):
     """
 
     coefficients: NDArray[np.float32]
-    scale: Array
+    scale: Floats
 
 
 NO_TABLE = CreepTable(np.zeros(0, dtype=np.float32), np.zeros((0, 4)))
 """Stands for the table where another law is used."""
 
 
-def node_ratios() -> Array:
+def node_ratios() -> Floats:
     """Ratios a/b of the table's nodes."""
     return np.exp(np.linspace(-np.log(RATIO_MAX), np.log(RATIO_MAX), N_RATIO + 1))
 
 
-def spin_scale(ratio: Array, c11: Array, c22: Array) -> Array:
+def spin_scale(ratio: Floats, c11: Floats, c22: Floats) -> Floats:
     """Factor of ``phi sqrt(a b)`` in q: sqrt(c11 c22) rho/sqrt(a b)."""
     return np.asarray(np.sqrt(c11 * c22) * SPIN_ARM * np.sqrt(0.5 * (ratio + 1.0 / ratio)))
 
 
-def direction(theta: ArrayLike, psi: ArrayLike) -> Array:
+def direction(theta: ArrayLike, psi: ArrayLike) -> Floats:
     """Unit vector of (q_x, q_y, q_spin), last axis."""
     sin = np.sin(theta)
     parts = np.broadcast_arrays(np.cos(theta), sin * np.cos(psi), sin * np.sin(psi))
@@ -119,14 +118,14 @@ def grid_size(ratio: float) -> tuple[int, int]:
 class _Path:
     """Solutions along increasing t in one direction, each started from the one before."""
 
-    def __init__(self, grid: "RollingGrid", bound: Array | None = None) -> None:
+    def __init__(self, grid: "RollingGrid", bound: Floats | None = None) -> None:
         self.grid = grid
         self.bound = grid.bound.ravel() if bound is None else bound
         self.traction = np.zeros((2, grid.x.size))
         self.sticks = np.ones(grid.x.size, dtype=np.int64)
         self.slip = np.zeros((2, grid.x.size))
 
-    def force(self, xi_x: float, xi_y: float, phi: float) -> tuple[Array, bool]:
+    def force(self, xi_x: float, xi_y: float, phi: float) -> tuple[Floats, bool]:
         """(T_x, T_y, M_z) of normalised creepages, and whether the solver converged."""
         from railsim.kernels.halfspace import CONVERGED, rolling_traction
 
@@ -147,7 +146,7 @@ class _Path:
         return _resultant(grid, self.traction), bool(status == CONVERGED)
 
 
-def _resultant(grid: "RollingGrid", traction: Array) -> Array:
+def _resultant(grid: "RollingGrid", traction: Floats) -> Floats:
     area, x, y = grid.area.ravel(), grid.x.ravel(), grid.y.ravel()
     t_x, t_y = traction
     return np.array([area @ t_x, area @ t_y, area @ (x * t_y - y * t_x)])
@@ -162,7 +161,7 @@ def _grids(ratio: float) -> tuple["RollingGrid", "RollingGrid"]:
     return fine, rolling_grid(ratio, POISSON, nx // 2, ny // 2)
 
 
-def _extrapolated(fine: Array, coarse: Array) -> Array:
+def _extrapolated(fine: Floats, coarse: Floats) -> Floats:
     return fine + (fine - coarse) * _EXTRAPOLATION
 
 
@@ -180,7 +179,7 @@ def linear_coefficients(ratio: float) -> tuple[float, float, float, float]:
     return float(c11), float(c22), float(c23), float(c33)
 
 
-def full_sliding(ratio: float, xi: Array, n: int = 200) -> Array:
+def full_sliding(ratio: float, xi: Floats, n: int = 200) -> Floats:
     """Force where everything slides along the rigid slip, shape (..., 3) for xi of that shape.
 
     Hertz pressure summed over n strips of n cells at Gauss-like points (cosine along the strip).
@@ -204,7 +203,7 @@ def full_sliding(ratio: float, xi: Array, n: int = 200) -> Array:
     return force
 
 
-def node_row(ratio: float, i_theta: int) -> tuple[Array, int]:
+def node_row(ratio: float, i_theta: int) -> tuple[Floats, int]:
     """Force over t at the nodes of one ratio and theta, shape (N_PSI, N_T + 1, 3).
 
     Also counts the solutions that did not converge.
@@ -346,7 +345,7 @@ def table_of_nodes(nodes: CreepNodes, nu: float = POISSON) -> CreepTable:
     return CreepTable(coefficients.astype(np.float32).ravel(), along_ratio @ scale)
 
 
-def _free_spline(n: int) -> Array:
+def _free_spline(n: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n; third derivative continuous at 1 and n - 1."""
     matrix, values = np.zeros((n + 3, n + 3)), np.zeros((n + 3, n + 1))
     for i in range(n + 1):
@@ -356,7 +355,7 @@ def _free_spline(n: int) -> Array:
     return np.asarray(np.linalg.solve(matrix, values))
 
 
-def _parity_spline(n: int, first: int, last: int) -> Array:
+def _parity_spline(n: int, first: int, last: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n, even (1) or odd (-1) about the ends."""
 
     def folded(k: int) -> tuple[int, int]:
@@ -376,7 +375,7 @@ def _parity_spline(n: int, first: int, last: int) -> Array:
     return np.asarray(spread @ inverse)
 
 
-def _periodic_spline(n: int, sign: int) -> Array:
+def _periodic_spline(n: int, sign: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n-1 where f(k + n) = sign f(k)."""
     spread = np.zeros((n + 3, n))
     for k in range(-1, n + 2):

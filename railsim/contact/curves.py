@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
+from railsim.arrays import Floats
 from railsim.errors import Fault, InputError
 from railsim.profiles.profile import FLANGE_BACK, Profile
-
-Array = NDArray[np.float64]
 
 STEEPEST = 5.67
 """Steepest slope of a rail that is searched, the tangent of 80 degrees [1]."""
@@ -59,12 +57,12 @@ class WheelCurve:
         Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
     """
 
-    y: Array
-    u: Array
-    r: Array
-    t: Array
-    du: Array
-    curvature: Array
+    y: Floats
+    u: Floats
+    r: Floats
+    t: Floats
+    du: Floats
+    curvature: Floats
 
 
 @dataclass(frozen=True)
@@ -85,17 +83,17 @@ class RailCurve:
 
     Y0: float
     dY: float
-    z: Array
-    slope: Array
-    curvature: Array
+    z: Floats
+    slope: Floats
+    curvature: Floats
 
     @property
-    def Y(self) -> Array:
+    def Y(self) -> Floats:
         """Lateral positions of the nodes [m], shape (n,)."""
         return self.Y0 + self.dY * np.arange(self.z.size, dtype=np.float64)
 
 
-def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
+def averaged_curvature(y: Floats, slope: Floats, sign: float) -> Floats:
     """Curvature of a contour averaged over the patch, with the patch's parabolic weight.
 
     The weight is 3/(4 b) (1 - (s/b)^2) over the contour's length s within half a width b.
@@ -130,7 +128,7 @@ def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
     return result
 
 
-def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
+def single_valued_part(y: Floats, z: Floats, start: int, limit: float) -> slice:
     """Largest run of points around `start` that goes forward in y with slopes up to `limit`."""
     dy, dz = np.diff(y), np.diff(z)
     good = (dy > 0.0) & (np.abs(dz) <= limit * dy)
@@ -143,7 +141,7 @@ def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
     return slice(first, last + 1)
 
 
-def contour_spline(y: Array, z: Array) -> "CubicSpline":
+def contour_spline(y: Floats, z: Floats) -> "CubicSpline":
     """Cubic spline of a contour whose end slopes are those of its last pieces.
 
     Where the usable part ends at a kink, a free end would swing to the wrong side.
@@ -222,7 +220,7 @@ def tape_circle_position(back_to_back: float) -> float:
     return 0.5 * back_to_back - FLANGE_BACK
 
 
-def inclined(profile: Profile, inclination: float) -> tuple[Array, Array]:
+def inclined(profile: Profile, inclination: float) -> tuple[Floats, Floats]:
     """Points of a rail turned to the given inclination (total, as tangent), its top at z = 0."""
     angle = np.arctan(inclination) - np.arctan(profile.inclination)
     y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
@@ -235,13 +233,13 @@ def inclined(profile: Profile, inclination: float) -> tuple[Array, Array]:
     return y, z - top
 
 
-def top_slice(z: Array) -> slice:
+def top_slice(z: Floats) -> slice:
     """A few points around the highest one."""
     i = int(np.argmin(z))
     return slice(max(i - 3, 0), i + 4)
 
 
-def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
+def gauge_face(y: Floats, z: Floats, depth: float = GAUGE_DEPTH) -> float:
     """Innermost lateral position of a rail's gauge side within `depth` below its top [m].
 
     Raises
@@ -258,7 +256,7 @@ def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
     return float(min(crossing, y[below + 1 : top + 1].min()))
 
 
-def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Array, Array]:
+def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Floats, Floats]:
     """Points of a right rail in the track: lateral position and height below the rail tops [m].
 
     Parameters
@@ -300,7 +298,7 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     return contour_curve(*inclined_to_track(profile, gauge, inclination))
 
 
-def contour_curve(y: Array, z: Array) -> RailCurve:
+def contour_curve(y: Floats, z: Floats) -> RailCurve:
     """Rail of a contour: lateral positions in the track and heights below the rail tops [m]."""
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
     spline = contour_spline(y[part], z[part])

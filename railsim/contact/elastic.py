@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from railsim.arrays import Floats
 from railsim.contact.coupling import coupling
 from railsim.contact.table import PATCHES, ContactTable
 from railsim.errors import ModelError
@@ -33,19 +33,17 @@ from railsim.kernels.contact_table import (
     under_load,
 )
 
-Array = NDArray[np.float64]
-
 
 class TableArrays(NamedTuple):
     """A table as the look-up takes it: several tables along the first axis."""
 
-    values: Array
-    shear: Array
+    values: Floats
+    shear: Floats
     y0: float
     dy: float
     roll0: float
     droll: float
-    w: Array
+    w: Floats
 
 
 @dataclass(frozen=True)
@@ -159,14 +157,14 @@ def loaded_contact(
     compliance = coupling(table.values, table.G, table.nu)[None]
     stiffness = np.concatenate((fields[:, K], fields[:, K2]))
 
-    def approaches(z: float) -> Array:
+    def approaches(z: float) -> Floats:
         e = z - fields[:, G]
         coupled_approaches(compliance, 0, stiffness, e)
         return e
 
-    def vertical(z: float) -> Array:
+    def vertical(z: float) -> Floats:
         e = np.maximum(approaches(z), 0.0)
-        force: Array = e**1.5 * (fields[:, K] + fields[:, K2] * np.sqrt(e))
+        force: Floats = e**1.5 * (fields[:, K] + fields[:, K2] * np.sqrt(e))
         return force
 
     lowest = float(fields[:, 0].min())

@@ -21,12 +21,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.errors import ModelError
 from railsim.kernels.halfspace import CONVERGED, rolling_matrices, rolling_traction
-
-Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-6  # turn of the tractions at which Newton's method ends [rad]
 _ITERATIONS = 60
@@ -49,17 +47,17 @@ class RollingGrid(NamedTuple):
         Elastic slip per traction, see `railsim.kernels.halfspace.rolling_matrices`.
     """
 
-    x: Array
-    y: Array
-    half_x: Array
-    half_y: Array
-    bound: Array
-    x_middle: Array
-    middle: Array
-    centre: Array
+    x: Floats
+    y: Floats
+    half_x: Floats
+    half_y: Floats
+    bound: Floats
+    x_middle: Floats
+    middle: Floats
+    centre: Floats
 
     @property
-    def area(self) -> Array:
+    def area(self) -> Floats:
         """Area of the cells over a b."""
         return 4.0 * self.half_x * self.half_y
 
@@ -86,15 +84,15 @@ class ExactCreepForce(NamedTuple):
     T_x: float
     T_y: float
     M_z: float
-    x: Array
-    y: Array
-    area: Array
-    t_x: Array
-    t_y: Array
-    s_x: Array
-    s_y: Array
-    bound: Array
-    sticks: NDArray[np.bool_]
+    x: Floats
+    y: Floats
+    area: Floats
+    t_x: Floats
+    t_y: Floats
+    s_x: Floats
+    s_y: Floats
+    bound: Floats
+    sticks: Flags
 
 
 @lru_cache(maxsize=4)
@@ -202,7 +200,7 @@ def exact_creep_force(
 
 def normalised_traction(
     grid: RollingGrid, xi_x: float, xi_y: float, phi: float
-) -> tuple[Array, Array, NDArray[np.bool_], bool]:
+) -> tuple[Floats, Floats, Flags, bool]:
     """Traction and slip for creepages over mu N/(G a b) (spin: times sqrt(a b) before).
 
     Returns

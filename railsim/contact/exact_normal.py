@@ -10,16 +10,14 @@ surface and a half-space (it matters in the flange root, where the normal turns 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from railsim.arrays import Floats
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.errors import InputError, ModelError
 from railsim.kernels import normal_contact as kernel
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
 
 CANDIDATE_SPACING = 3e-5
 LARGEST_OVERLAP = 1.5e-3
@@ -80,10 +78,10 @@ class ExactContact:
     z: float
     penetration: float
     patches: tuple[ExactPatch, ...]
-    x: Array
-    s: Array
-    Y: Array
-    pressure: Array
+    x: Floats
+    s: Floats
+    Y: Floats
+    pressure: Floats
 
 
 def exact_contact(
@@ -182,7 +180,7 @@ class _Geometry:
         inside = (first < self.Y) & (last > self.Y)
         return float(np.min(self.z[inside] - self.wheel(self.Y[inside])))
 
-    def normal_gap(self, s: Array, z: float) -> tuple[Array, Array, Array, Array]:
+    def normal_gap(self, s: Floats, z: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Gap along the rail's normal, lateral position [m], contact angle, wheel radius [m]."""
         points = self.rail(s)
         tangent = self.rail(s, 1)
@@ -244,7 +242,7 @@ class _Geometry:
 
     @staticmethod
     def _patches(
-        field: Array, Y: Array, angle: Array, dx: float, ds: float
+        field: Floats, Y: Floats, angle: Floats, dx: float, ds: float
     ) -> tuple[ExactPatch, ...]:
         """Connected patches along s, with both halves."""
         touching = field.any(axis=0)
@@ -271,7 +269,7 @@ class _Geometry:
         return tuple(patches)
 
 
-def _reach(pressure: Array) -> float:
+def _reach(pressure: Floats) -> float:
     """Where a line of elements loses contact, in elements from its beginning.
 
     At an edge the square of the pressure falls linearly; it is continued from the last two loaded

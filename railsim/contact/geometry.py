@@ -15,8 +15,9 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.contact.conicity import equivalent_conicity
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.definitions.track.definition import Track
@@ -25,7 +26,6 @@ from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 SEARCH_SPACING = 3e-5
@@ -59,21 +59,21 @@ class ContactGeometry:
         Vertical displacement of the wheelset's centre, positive down [m].
     """
 
-    lateral: Array
-    roll: Array
-    rolling_radius: Array
-    contact_angle: Array
-    contact_y: Array
-    wheel_y: Array
-    centre_z: Array
+    lateral: Floats
+    roll: Floats
+    rolling_radius: Floats
+    contact_angle: Floats
+    contact_y: Floats
+    wheel_y: Floats
+    centre_z: Floats
 
     @property
-    def delta_r(self) -> Array:
+    def delta_r(self) -> Floats:
         """Rolling radius difference, right minus left [m], shape (n,)."""
-        difference: Array = self.rolling_radius[:, 1] - self.rolling_radius[:, 0]
+        difference: Floats = self.rolling_radius[:, 1] - self.rolling_radius[:, 0]
         return difference
 
-    def equivalent_conicity(self, amplitudes: ArrayLike, track: float = 1.5) -> Array:
+    def equivalent_conicity(self, amplitudes: ArrayLike, track: float = 1.5) -> Floats:
         """Equivalent conicity by EN 15302, see `railsim.contact.equivalent_conicity`."""
         known = np.isfinite(self.delta_r)
         return equivalent_conicity(self.lateral[known], self.delta_r[known], amplitudes, track)
@@ -163,7 +163,7 @@ def contact_geometry(
         for w, r in zip(wheels, rails, strict=True)
     ]
 
-    def sweep(at: Array) -> tuple[Array, Array]:
+    def sweep(at: Floats) -> tuple[Floats, Floats]:
         roll = np.empty(at.size)
         contacts = np.empty((at.size, 2, 6))
         kernel.rigid_sweep(

@@ -8,8 +8,9 @@ the flange root; the contact table says what it does there (`railsim.contact.tab
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.hertz import fill_ellipses
 
@@ -27,10 +28,10 @@ class HertzContact(NamedTuple):
         Greatest pressure, 3 N/(2 pi a b) [Pa].
     """
 
-    a: NDArray[np.float64]
-    b: NDArray[np.float64]
-    approach: NDArray[np.float64]
-    p_max: NDArray[np.float64]
+    a: Floats
+    b: Floats
+    approach: Floats
+    p_max: Floats
 
 
 def hertz(A: ArrayLike, B: ArrayLike, N: ArrayLike, E: float, nu: float) -> HertzContact:

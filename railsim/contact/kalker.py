@@ -19,8 +19,9 @@ appendix E, table E.3 (C11, C22, C23 also stored in the public program CONTACT).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.fastsim import KALKER_U_MAX
 
@@ -60,7 +61,7 @@ _G_MIN = 0.1  # least axis ratio of the printed table
 
 def kalker_coefficients(
     a_over_b: ArrayLike, nu: float = 0.28
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Kalker's creepage coefficients c11, c22, c23, c33 of an elliptic contact.
 
     Linear in g = min(a/b, b/a) between the printed rows; 1/C quadratic in nu through the printed
@@ -118,7 +119,7 @@ def kalker_coefficients(
     return values[0], values[1], values[2], values[3]
 
 
-def creep_tables(nu: float = 0.28, n: int = 257) -> NDArray[np.float64]:
+def creep_tables(nu: float = 0.28, n: int = 257) -> Floats:
     """Kalker's coefficients on a grid for the look-up inside the time loop.
 
     Parameters
@@ -140,9 +141,7 @@ def creep_tables(nu: float = 0.28, n: int = 257) -> NDArray[np.float64]:
     return np.ascontiguousarray(np.stack(kalker_coefficients((1.0 + u) / (1.0 - u), nu), axis=1))
 
 
-def _interpolated(
-    table: NDArray[np.float64], number: int, g: NDArray[np.float64], nu: float
-) -> NDArray[np.float64]:
+def _interpolated(table: Floats, number: int, g: Floats, nu: float) -> Floats:
     """Coefficient `number` of one half of the table at axis ratio g and Poisson's ratio nu."""
     at_nu = [np.interp(g, table[:, 0], table[:, 1 + 3 * number + k]) for k in range(3)]
     n0, n1, n2 = TABLE_POISSON
@@ -155,7 +154,7 @@ def _interpolated(
     return np.asarray(1.0 / inverse)
 
 
-def _asymptote_narrow(number: int, g: ArrayLike, nu: float) -> NDArray[np.float64]:
+def _asymptote_narrow(number: int, g: ArrayLike, nu: float) -> Floats:
     """Kalker's limit for a/b = g -> 0 (Kalker 1990, table E.3, upper asymptote)."""
     g = np.asarray(g, dtype=float)
     log_term = np.log(16.0 / g**2)
@@ -169,7 +168,7 @@ def _asymptote_narrow(number: int, g: ArrayLike, nu: float) -> NDArray[np.float6
     return np.asarray(np.pi**2 / (16.0 * (1.0 - nu) * g))
 
 
-def _asymptote_long(number: int, g: ArrayLike, nu: float) -> NDArray[np.float64]:
+def _asymptote_long(number: int, g: ArrayLike, nu: float) -> Floats:
     """Kalker's limit for b/a = g -> 0 (Kalker 1990, table E.3, lower asymptote)."""
     g = np.asarray(g, dtype=float)
     log_term = np.log(16.0 / g**2)

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import (
     RAIL_SPACING,
     STEEPEST,
@@ -35,8 +35,6 @@ from railsim.contact.curves import (
     contour_curve,
 )
 from railsim.definitions.section_files import SectionList
-
-Array = NDArray[np.float64]
 
 DEEP = 8e-3  # m, of a groove between two rails
 TOP = 5e-3  # m below its highest point in which a rail is recognised in the next section
@@ -65,12 +63,12 @@ class RailPart:
         y and z of the sections as they were given [m].
     """
 
-    positions: Array
-    contours: Array
-    given: tuple[Array, ...]
+    positions: Floats
+    contours: Floats
+    given: tuple[Floats, ...]
 
     @cached_property
-    def _slopes(self) -> Array:
+    def _slopes(self) -> Floats:
         h = np.diff(self.positions)[:, None, None]
         step = np.diff(self.contours, axis=0)
         secant = np.where(np.abs(step) > JUMP, 0.0, step) / h  # to where a section has ended
@@ -80,7 +78,7 @@ class RailPart:
         slopes[0] = secant[0]
         return np.asarray(slopes)
 
-    def contour(self, s: float) -> Array:
+    def contour(self, s: float) -> Floats:
         """Points y, z of its contour at an arc length within its ends [m]."""
         last = self.positions.size - 2
         i = int(np.clip(np.searchsorted(self.positions, s, "right") - 1, 0, last))
@@ -93,14 +91,14 @@ class RailPart:
             + h * u * rest * (rest * self._slopes[i] - u * self._slopes[i + 1])
         )
 
-    def height(self, s: float, Y: Array) -> Array:
+    def height(self, s: float, Y: Floats) -> Floats:
         """Height below the rail tops at lateral positions, inf where the rail is not [m]."""
         if not self.positions[0] <= s <= self.positions[-1]:
             return np.full(Y.shape, np.inf)
         y, z = self.contour(s)
         return np.interp(Y, *_upper(y, z), left=np.inf, right=np.inf)
 
-    def unchanged(self, s: float) -> Array | None:
+    def unchanged(self, s: float) -> Floats | None:
         """Points of its sections as given where they do not change around `s`, else None."""
         first = int(np.searchsorted(self.positions, s - WINDOW, "right")) - 1
         last = int(np.searchsorted(self.positions, s + WINDOW, "left"))
@@ -111,7 +109,7 @@ class RailPart:
         return around[0] if same else None
 
 
-def _upper(y: Array, z: Array) -> tuple[Array, Array]:
+def _upper(y: Floats, z: Floats) -> tuple[Floats, Floats]:
     """The part of a contour that is seen from above, to both sides of its top."""
     top = int(np.argmin(z))
     right = y >= np.maximum.accumulate(np.where(np.arange(y.size) >= top, y, -np.inf))
@@ -130,7 +128,7 @@ def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
     tuple of RailPart
         Rails of two sections at least, in the order of their begins.
     """
-    chains: list[tuple[list[float], list[Array]]] = []
+    chains: list[tuple[list[float], list[Floats]]] = []
     open_chains: list[int] = []
     for s, points in zip(sections.positions.tolist(), sections.points, strict=True):
         going_on = []
@@ -156,12 +154,12 @@ def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
     )
 
 
-def _top_range(part: Array) -> tuple[float, float]:
+def _top_range(part: Floats) -> tuple[float, float]:
     top = part[0][part[1] < part[1].min() + TOP]
     return float(top.min()), float(top.max())
 
 
-def _cut(points: Array) -> list[Array]:
+def _cut(points: Floats) -> list[Floats]:
     """Cut a contour where a groove lies between two rails."""
     z = points[1]
     left = np.minimum.accumulate(z)
@@ -173,7 +171,7 @@ def _cut(points: Array) -> list[Array]:
     return _cut(points[:, : deepest + 1]) + _cut(points[:, deepest:])
 
 
-def _shares(part: Array) -> Array:
+def _shares(part: Floats) -> Floats:
     """Points of a contour at equal shares before its running edge, and from there to `FAR`."""
     from scipy.interpolate import Akima1DInterpolator
 
@@ -201,17 +199,17 @@ class RolledRail:
         Lateral position, height below the rail tops, and how far ahead of the axle [m].
     """
 
-    Y: Array
-    z: Array
-    lead: Array
+    Y: Floats
+    z: Floats
+    lead: Floats
 
 
-def rolled_rail(part: RailPart, s: float, radius: float, Y: Array) -> RolledRail:
+def rolled_rail(part: RailPart, s: float, radius: float, Y: Floats) -> RolledRail:
     """Return the section of a rail on which a wheel of some radius stands at `s`."""
     return _rolled(np.array([part.height(s + ahead, Y) for ahead in AHEAD]), radius, Y)
 
 
-def _rolled(heights: Array, radius: float, Y: Array) -> RolledRail:
+def _rolled(heights: Floats, radius: float, Y: Floats) -> RolledRail:
     """As `rolled_rail`, of the heights at `AHEAD`."""
     heights = heights + (radius - np.sqrt(radius**2 - AHEAD**2))[:, None]
     best = np.argmin(heights, axis=0)
@@ -264,8 +262,8 @@ def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) ->
 
 
 def rigid_gaps(
-    part: RailPart, s: Array, radius: float, wheels: Sequence[tuple[Array, Array]], y: Array
-) -> Array:
+    part: RailPart, s: Floats, radius: float, wheels: Sequence[tuple[Floats, Floats]], y: Floats
+) -> Floats:
     """Heights at which parts of a wheel touch one rail, neither deforming.
 
     Parameters
@@ -303,7 +301,7 @@ def rigid_gaps(
 
 
 def kinematic_height(
-    parts: tuple[RailPart, ...], s: float, wheel: tuple[Array, Array], radius: float, y: float
+    parts: tuple[RailPart, ...], s: float, wheel: tuple[Floats, Floats], radius: float, y: float
 ) -> tuple[float, float, int]:
     """Height at which a wheel stands on rails without deforming them.
 

@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact import rail_sections
 from railsim.contact.curves import (
     RailCurve,
@@ -46,8 +46,6 @@ from railsim.contact.zones import zone_windows
 from railsim.definitions.section_files import SectionList
 from railsim.kernels.contact_table import N_PATCH, G
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
 
 INWARDS, OUTWARDS = 0.012, 0.012  # m, lateral positions that a table covers
 ROLLS, YAWS = 4, 2  # nodes of the plain table to each side of no roll, and from no yaw on
@@ -133,7 +131,7 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
     cut = _Cut.of(plain)
     wanted: list[tuple[RailPart, float]] = []
     known: dict[tuple[int, bytes], int] = {}
-    rows: list[list[tuple[float, int, Array]]] = []
+    rows: list[list[tuple[float, int, Floats]]] = []
     for number, part in enumerate(parts):
         along = []
         for s, near in nodes[number]:
@@ -151,7 +149,7 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
         rows.append(along)
     kept, described = _kept_zones(rows, given.begin)
 
-    def fill(task: tuple[int, list[int]]) -> Array:
+    def fill(task: tuple[int, list[int]]) -> Floats:
         table, zones = task
         if table == 0:
             return cut.plain[zones]
@@ -176,7 +174,7 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
 
 
 def _kept_zones(
-    rows: list[list[tuple[float, int, Array]]], begin: float
+    rows: list[list[tuple[float, int, Floats]]], begin: float
 ) -> tuple[list[tuple[int, list[int]]], list[list[list[float]]]]:
     """Tables with the zones that are kept of each, and where those of each node lie.
 
@@ -230,11 +228,11 @@ class _Cut:
         return cls(plain, slice(max(first, 1), last + 1), slice(middle - ROLLS, middle + ROLLS + 1))
 
     @property
-    def plain(self) -> Array:
+    def plain(self) -> Floats:
         """The plain rail's table."""
         return self.whole.values[:, :YAWS, self.roll, self.y]
 
-    def table(self, generator: Generator, rail: RailCurve) -> Array:
+    def table(self, generator: Generator, rail: RailCurve) -> Floats:
         """Table of another rail; coefficients at its ends need a node more."""
         plain = self.whole
         rolls = np.arange(self.roll.start - 1, self.roll.stop + 1)
@@ -247,7 +245,7 @@ class _Cut:
 
 def chosen_nodes(
     parts: tuple[RailPart, ...], wheel: WheelCurve, level: RailCurve, tape: float, given: Range
-) -> tuple[list[list[tuple[float, Array]]], tuple[int, int]]:
+) -> tuple[list[list[tuple[float, Floats]]], tuple[int, int]]:
     """Where along the track each rail has a table and of which zones, and which carry at the ends.
 
     `level`: the plain rail; `tape`: position of the nominal rolling circle from y = 0 [m].
@@ -280,7 +278,7 @@ def chosen_nodes(
     return nodes, running
 
 
-def _split(s: Array, gaps: Array, limit: Array, first: int, last: int) -> list[int]:
+def _split(s: Floats, gaps: Floats, limit: Floats, first: int, last: int) -> list[int]:
     """Indices from `first` to `last` between which cubics meet the gaps within a limit."""
     slope = np.gradient(gaps, s, axis=0)
 

@@ -61,8 +61,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import (
     HALF_WIDTHS,
     RailCurve,
@@ -78,8 +78,6 @@ from railsim.kernels import table_slice as kernel
 from railsim.kernels.contact_table import A1, B1, D_B1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
 
 FORMAT = "railsim-contact-table/2"
 PATCHES = ("tread", "flange root", "flange")
@@ -158,12 +156,12 @@ class ContactTable:
         What the table was built from, for results and messages.
     """
 
-    values: Array
+    values: Floats
     y0: float
     dy: float
     roll0: float
     droll: float
-    w: Array
+    w: Floats
     shear: float
     r0: float
     centre_height: float
@@ -367,8 +365,8 @@ class Generator:
         return cls(wheels, elastic, ellipse_functions(G, nu), strip_influence(), radius, height)
 
     def values(
-        self, rail: RailCurve, s: Array, roll: Array, w: Array, workers: int | None
-    ) -> Array:
+        self, rail: RailCurve, s: Floats, roll: Floats, w: Floats, workers: int | None
+    ) -> Floats:
         """Fields of the three patches on a rail, shape (3, w.size, roll.size, s.size, N_FIELD)."""
         values = np.empty((3, w.size, roll.size, s.size, N_FIELD))
         nodes = kernel.Rail(rail.Y0, rail.dY, rail.z, rail.slope, rail.curvature)
@@ -406,27 +404,27 @@ def _wheel_arrays(wheel: WheelCurve, rail: RailCurve) -> kernel.Wheel:
     return kernel.Wheel(wheel.u, wheel.r, wheel.t, wheel.curvature, window, first, last)
 
 
-def yaw_nodes(grid: TableGrid) -> Array:
+def yaw_nodes(grid: TableGrid) -> Floats:
     """Nodes of w = yaw^2 [rad^2]: half of the cells up to 28 of 60 mrad, a quarter up to 40.
 
     Vehicles yaw by less in the tightest curves; more is the tangent of a rail with a sharp kink.
     """
     share = np.linspace(0.0, 1.0, grid.n_w)
-    nodes: Array = grid.yaw_max**2 * np.interp(
+    nodes: Floats = grid.yaw_max**2 * np.interp(
         share, (0.0, 0.5, 0.75, 1.0), (0.0, 2 / 9, 4 / 9, 1.0)
     )
     return nodes
 
 
-def unstretched_roll(stretched: Array) -> Array:
+def unstretched_roll(stretched: Floats) -> Floats:
     """Roll of which `railsim.kernels.contact_table.stretched_roll` makes the given values [rad]."""
     # q = x^2/sqrt(1 + x^2) with x = roll/FINE_ROLL: x^4 - q^2 x^2 - q^2 = 0
     q = (stretched / FINE_ROLL) ** 2
-    roll: Array = np.sign(stretched) * FINE_ROLL * np.sqrt(0.5 * q * (q + np.sqrt(q * q + 4.0)))
+    roll: Floats = np.sign(stretched) * FINE_ROLL * np.sqrt(0.5 * q * (q + np.sqrt(q * q + 4.0)))
     return roll
 
 
-def spline_coefficients(values: Array, stretched: Array) -> Array:
+def spline_coefficients(values: Floats, stretched: Floats) -> Floats:
     """Coefficients of the splines over s and roll that give back cubic functions of both.
 
     Over the roll only near the middle: farther out, where the nodes lie too far apart to follow the

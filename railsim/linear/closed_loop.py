@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import ModelError
 from railsim.kernels import actuators as acts
@@ -134,9 +133,7 @@ def _loop(
 class _Commands:
     """Commands that the controllers give for a state, by one call of the time loop."""
 
-    def __init__(
-        self, system: System, free: FreeVehicle, recorder: Any, where: NDArray[np.int64]
-    ) -> None:
+    def __init__(self, system: System, free: FreeVehicle, recorder: Any, where: Integers) -> None:
         self._system, self._work = system, work_arrays(system)
         self._free, self._where = free, where
         self._recorder = recorder

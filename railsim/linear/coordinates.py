@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
@@ -23,8 +22,6 @@ from railsim.linear.system import Linearisation, jacobian, without_forceless
 from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
-
-Indices = NDArray[np.int64]
 
 TRACK_PARTS = (
     "rail.left.y",
@@ -52,13 +49,13 @@ class Coordinates:
     """
 
     names: tuple[str, ...]
-    indices: Indices
-    bodies: Indices
-    components: Indices
+    indices: Integers
+    bodies: Integers
+    components: Integers
     n_positions: int
     n_velocities: int
     steps: Floats
-    forceless: Indices
+    forceless: Integers
 
     def index_of(self, body: int, component: int) -> int:
         """Index of a body's position among the coordinates."""
@@ -119,7 +116,7 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
 
 
 def track_indices(model: Model) -> tuple[list[int], list[str]]:
-    """Indices of the displacements of elastic rails and sleepers in the state, and their names."""
+    """Integers of the displacements of elastic rails and sleepers in the state, and their names."""
     support = model.system.support
     if not support.elastic:
         return [], []

@@ -13,14 +13,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq, linear_sum_assignment
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats, Indices
 from railsim.linear.system import Linearisation
 
-Complex = NDArray[np.complex128]
 At = Callable[[float], Linearisation]
 
 SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are looked for
@@ -40,9 +38,9 @@ class Eigenmodes:
     """
 
     linearisation: Linearisation
-    eigenvalues: Complex
-    shapes: Complex
-    left: Complex
+    eigenvalues: Complexes
+    shapes: Complexes
+    left: Complexes
 
     @property
     def frequencies(self) -> Floats:
@@ -60,7 +58,7 @@ class Eigenmodes:
         size = np.abs(self.eigenvalues)
         return np.asarray(-self.eigenvalues.real / np.where(size > 0.0, size, 1.0))
 
-    def taken(self, order: Sequence[int] | NDArray[np.intp]) -> "Eigenmodes":
+    def taken(self, order: Sequence[int] | Indices) -> "Eigenmodes":
         """Return some of the modes, in this order."""
         chosen = np.asarray(order, dtype=int)
         return Eigenmodes(
@@ -91,7 +89,7 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     return Eigenmodes(linearisation, values[order], shapes, dual)
 
 
-def _eig(matrix: Floats) -> tuple[Complex, Complex, Complex]:
+def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:
     found: Any = eig(matrix, left=True, right=True)
     values, left, right = (np.asarray(part, dtype=complex) for part in found)
     return values, left, right
@@ -160,7 +158,7 @@ def _partners(
     return {i: second[j] for i, j in first.items() if j in second}
 
 
-def _ordered(modes: Eigenmodes, indices: NDArray[np.intp]) -> Eigenmodes:
+def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     """Modes of given indices, NaN where there is none (-1)."""
     there = indices >= 0
     size, n = len(indices), modes.shapes.shape[1]

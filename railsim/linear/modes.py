@@ -8,8 +8,8 @@ from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
 from railsim.errors import argument_error
@@ -20,8 +20,6 @@ from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.table import Column, Table
 from railsim.units import speed_in_si
-
-Complex = NDArray[np.complex128]
 
 SPEED_RANGE = (0.5, 150.0)  # m/s
 LEAST_SHARE = 0.005  # of the kinetic energy that is listed
@@ -186,7 +184,7 @@ class RootLocus(Plottable):
     sets: tuple[Modes, ...]
 
     @property
-    def eigenvalues(self) -> Complex:
+    def eigenvalues(self) -> Complexes:
         """Eigenvalues, complex128[value, mode], NaN where a mode does not exist [1/s]."""
         return np.array([[mode.eigenvalue for mode in modes.modes] for modes in self.sets])
 
@@ -430,7 +428,7 @@ def _named(
     )
 
 
-def _participation(parts: Parts, shape: Complex) -> dict[str, float]:
+def _participation(parts: Parts, shape: Complexes) -> dict[str, float]:
     c, shares = parts.coordinates, parts.energy_shares(shape)
     names = [name.rstrip("'") for name in c.names[c.velocities]]
     values = shares[c.bodies[c.velocities], c.components[c.velocities]]

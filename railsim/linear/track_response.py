@@ -23,10 +23,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import schur
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats, Integers
 from railsim.constants import CANT_BASE, GRAVITY
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import System
@@ -35,9 +34,6 @@ from railsim.linear.coordinates import Coordinates, FreeVehicle
 from railsim.linear.system import without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.result.sensors import Sensor
-
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
 """Irregularities [m]; the cross level as height of the left rail over the right one."""
@@ -76,11 +72,11 @@ class TrackResponse:
     C: Floats
     D: Floats
     R: Floats
-    rows: Indices
+    rows: Integers
     own: Floats
     steady: Floats
 
-    def over(self, wave_numbers: Floats, chosen: Sequence[int] | None = None) -> Complex:
+    def over(self, wave_numbers: Floats, chosen: Sequence[int] | None = None) -> Complexes:
         """Frequency response H over the angular wave number, complex128[k, output, input].
 
         Inputs are the quantities, then the unknown accelerations of the wheelsets.

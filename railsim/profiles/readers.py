@@ -15,9 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import InputError, input_error
 from railsim.files.access import read_bytes
 from railsim.profiles.profile import Kind
@@ -42,7 +41,7 @@ class RawProfile:
 
     y: Floats
     z: Floats
-    line: NDArray[np.int64]
+    line: Integers
     unit: float | None = None
     kind: Kind | None = None
     name: str = ""

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
-from railsim.arrays import Floats
+from railsim.arrays import Flags, Floats, Integers
 from railsim.errors import InputError, input_error
 from railsim.profiles.profile import Kind
 
@@ -30,7 +29,7 @@ class Points:
     file: str
     y: Floats
     z: Floats
-    line: NDArray[np.int64]
+    line: Integers
     notes: list[str]
 
     def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:
@@ -38,12 +37,12 @@ class Points:
         key = "" if at is None else f"line {int(self.line[at])}"
         return input_error(self.file, found, remedy, key=key)
 
-    def keep(self, which: Floats | NDArray[np.bool_] | NDArray[np.int64]) -> None:
+    def keep(self, which: Floats | Flags | Integers) -> None:
         """Keep some of the points, or bring them into another order."""
         self.y, self.z, self.line = self.y[which], self.z[which], self.line[which]
 
 
-def used_part(y: Floats, z: Floats, kind: Kind) -> NDArray[np.bool_]:
+def used_part(y: Floats, z: Floats, kind: Kind) -> Flags:
     """Intervals between points on which wheel and rail may touch."""
     middle_y, middle_z = 0.5 * (y[1:] + y[:-1]), 0.5 * (z[1:] + z[:-1])
     if kind == "rail":

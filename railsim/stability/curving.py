@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.cant import curve_speed
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
@@ -92,7 +91,7 @@ class Curving(Plottable):
     friction: Floats
     cant: float
     speed: Floats
-    converged: NDArray[np.int64]
+    converged: Integers
     Q: Floats
     Y: Floats
     Y_over_Q: Floats

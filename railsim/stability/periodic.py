@@ -20,10 +20,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats
 from railsim.errors import ModelError
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
@@ -69,7 +68,7 @@ class PeriodicMotion:
     period: float
     speed: float
     amplitude: float
-    multipliers: NDArray[np.complex128]
+    multipliers: Complexes
     tangent: Floats
     along: Floats
     matrix: Floats | None = None
@@ -99,7 +98,7 @@ class Shooting:
         self._back = None if flow.mirror is None else np.linalg.inv(flow.mirror)
 
     def beginning(
-        self, state: Floats, shape: NDArray[np.complex128], frequency: float, speed: float
+        self, state: Floats, shape: Complexes, frequency: float, speed: float
     ) -> PeriodicMotion:
         """Return the motion of no amplitude at the bifurcation.
 
