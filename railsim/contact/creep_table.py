@@ -49,8 +49,6 @@ SPIN_ARM = 0.8
 # the solver's error falls with about the power 1.5 of the cell: from two grids, one twice as fine
 _EXTRAPOLATION = 1.0 / (math.sqrt(8.0) - 1.0)
 _NO_SLIP = 1e9  # bound for linear theory
-_TOLERANCE = 1e-6
-_ITERATIONS = 60
 
 
 class CreepNodes(NamedTuple):
@@ -115,43 +113,6 @@ def grid_size(ratio: float) -> tuple[int, int]:
     return 2 * round(12.0 * float(ratio**0.12)), 2 * round(12.0 * float(ratio**-0.15))
 
 
-class _Path:
-    """Solutions along increasing t in one direction, each started from the one before."""
-
-    def __init__(self, grid: "RollingGrid", bound: Floats | None = None) -> None:
-        self.grid = grid
-        self.bound = grid.bound.ravel() if bound is None else bound
-        self.traction = np.zeros((2, grid.x.size))
-        self.sticks = np.ones(grid.x.size, dtype=np.int64)
-        self.slip = np.zeros((2, grid.x.size))
-
-    def force(self, xi_x: float, xi_y: float, phi: float) -> tuple[Floats, bool]:
-        """(T_x, T_y, M_z) of normalised creepages, and whether the solver converged."""
-        from railsim.kernels.halfspace import CONVERGED, rolling_traction
-
-        grid = self.grid
-        across = (xi_x - phi * grid.y).ravel()
-        status, _ = rolling_traction(
-            grid.middle,
-            grid.centre,
-            np.stack([across, (xi_y + phi * grid.x_middle).ravel()]),
-            np.stack([across, (xi_y + phi * grid.x).ravel()]),
-            self.bound,
-            self.traction,
-            self.sticks,
-            self.slip,
-            _TOLERANCE,
-            _ITERATIONS,
-        )
-        return _resultant(grid, self.traction), bool(status == CONVERGED)
-
-
-def _resultant(grid: "RollingGrid", traction: Floats) -> Floats:
-    area, x, y = grid.area.ravel(), grid.x.ravel(), grid.y.ravel()
-    t_x, t_y = traction
-    return np.array([area @ t_x, area @ t_y, area @ (x * t_y - y * t_x)])
-
-
 @lru_cache(maxsize=2)
 def _grids(ratio: float) -> tuple["RollingGrid", "RollingGrid"]:
     from railsim.contact.exact_creep import rolling_grid
@@ -168,12 +129,16 @@ def _extrapolated(fine: Floats, coarse: Floats) -> Floats:
 @lru_cache(maxsize=2)
 def linear_coefficients(ratio: float) -> tuple[float, float, float, float]:
     """Kalker's c11, c22, c23, c33 by our own solver without slip."""
+    from railsim.contact.exact_creep import Rolling
+
     results = []
     for grid in _grids(ratio):
-        bound = np.full(grid.x.size, _NO_SLIP)
-        along, _ = _Path(grid, bound).force(1.0, 0.0, 0.0)
-        across, _ = _Path(grid, bound).force(0.0, 1.0, 0.0)
-        spin, _ = _Path(grid, bound).force(0.0, 0.0, 1.0)
+        unit_forces = []
+        for creepages in np.eye(3):
+            rolling = Rolling(grid, np.full(grid.x.size, _NO_SLIP))
+            rolling.solve(*creepages)
+            unit_forces.append(rolling.force())
+        along, across, spin = unit_forces
         results.append(np.array([along[0], across[1], 0.5 * (spin[1] - across[2]), spin[2]]))
     c11, c22, c23, c33 = _extrapolated(*results)
     return float(c11), float(c22), float(c23), float(c33)
@@ -208,6 +173,8 @@ def node_row(ratio: float, i_theta: int) -> tuple[Floats, int]:
 
     Also counts the solutions that did not converge.
     """
+    from railsim.contact.exact_creep import Rolling
+
     c11, c22, c23, c33 = linear_coefficients(ratio)
     per_q = np.array([c11, c22, float(spin_scale(np.asarray(ratio), *map(np.asarray, (c11, c22))))])
     theta = np.asarray(0.5 * np.pi * i_theta / N_THETA)
@@ -218,13 +185,12 @@ def node_row(ratio: float, i_theta: int) -> tuple[Floats, int]:
         row[i_psi, 0] = T_HALF * np.array(
             [c11 * xi[0], c22 * xi[1] + c23 * xi[2], c33 * xi[2] - c23 * xi[1]]
         )
-        paths = [_Path(grid) for grid in _grids(ratio)]
+        rollings = [Rolling(grid) for grid in _grids(ratio)]
         for k in range(1, N_T):
             t = k / N_T
             q = T_HALF * t / (1.0 - t)
-            (fine, fine_ok), (coarse, coarse_ok) = (path.force(*(q * xi)) for path in paths)
-            row[i_psi, k] = _extrapolated(fine, coarse) / t
-            failures += (not fine_ok) + (not coarse_ok)
+            failures += sum(not rolling.solve(*(q * xi)) for rolling in rollings)
+            row[i_psi, k] = _extrapolated(*(rolling.force() for rolling in rollings)) / t
         row[i_psi, N_T] = full_sliding(ratio, xi)
     if i_theta == 0:
         row[1:] = row[0]

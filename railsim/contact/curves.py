@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, input_error
 from railsim.profiles.profile import FLANGE_BACK, Profile
 
 STEEPEST = 5.67
@@ -51,8 +51,6 @@ class WheelCurve:
         Radius [m].
     t : ndarray, shape (n,)
         Slope dr/du [1].
-    du : ndarray, shape (n,)
-        Quadrature weight: half the distance of the neighbours [m].
     curvature : ndarray, shape (n_width, n)
         Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
     """
@@ -61,7 +59,6 @@ class WheelCurve:
     u: Floats
     r: Floats
     t: Floats
-    du: Floats
     curvature: Floats
 
 
@@ -180,15 +177,10 @@ def wheel_curve(
     part = single_valued_part(y, z, on_tread, 3.0 * STEEPEST)
     # scans from both sides often do not meet exactly on the tip itself
     if z[part.start] < z[tip] - 3e-3 and part.start > tip:
-        raise InputError(
-            [
-                Fault(
-                    profile.name,
-                    "",
-                    "the contour is not continuous from tread to flange tip",
-                    "a wheel profile must run in one piece from the flange's tip to the field side",
-                )
-            ]
+        raise input_error(
+            profile.name,
+            "the contour is not continuous from tread to flange tip",
+            "a wheel profile must run in one piece from the flange's tip to the field side",
         )
     spline = contour_spline(y[part], z[part])
     fine = np.linspace(y[part.start], y[part.stop - 1], 40_001)
@@ -206,7 +198,6 @@ def wheel_curve(
         u=nodes + tape_circle,
         r=radius + spline(nodes),
         t=t,
-        du=np.gradient(nodes),
         curvature=averaged_curvature(nodes, t, -1.0),
     )
 
@@ -227,16 +218,12 @@ def inclined(profile: Profile, inclination: float) -> tuple[Floats, Floats]:
     z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
     from scipy.interpolate import CubicSpline
 
-    crown = CubicSpline(y[top_slice(z)], z[top_slice(z)])
+    highest = int(np.argmin(z))
+    around = slice(max(highest - 3, 0), highest + 4)
+    crown = CubicSpline(y[around], z[around])
     roots = crown.derivative().roots(extrapolate=False)
     top = float(np.min(crown(roots))) if roots.size else float(z.min())
     return y, z - top
-
-
-def top_slice(z: Floats) -> slice:
-    """A few points around the highest one."""
-    i = int(np.argmin(z))
-    return slice(max(i - 3, 0), i + 4)
 
 
 def gauge_face(y: Floats, z: Floats, depth: float = GAUGE_DEPTH) -> float:
@@ -274,7 +261,7 @@ def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tup
         face = gauge_face(y, z)
     except ValueError as error:
         remedy = f"the gauge is measured {1e3 * GAUGE_DEPTH:.0f} mm below the top"
-        raise InputError([Fault(profile.name, "", str(error), remedy)]) from None
+        raise input_error(profile.name, str(error), remedy) from None
     return y - face + 0.5 * gauge, z
 
 
@@ -334,30 +321,27 @@ def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float, pair: str) -> list
         Empty if it can: in the middle of the track the tread stands on the rail, and pushed to one
         side until the flange touches, the other wheel still has the rail under it.
     """
-    found = _misfit(wheel, rail, gauge)
-    remedy = "check gauge, back-to-back distance and both profiles"
-    return [Fault(f"gauge {1e3 * gauge:.1f} mm", pair, found, remedy)] if found else []
-
-
-def _misfit(wheel: WheelCurve, rail: RailCurve, gauge: float) -> str:
     steepest = float(wheel.t.min())
     # a wheel without flange has none to be in the way
     flank = int(np.flatnonzero(wheel.t < 0.9 * steepest)[-1]) if steepest < -0.5 else 0
     flank_u = wheel.u[flank]
     corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
     slack = 0.5 * gauge - flank_u
+    height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
     if corner - flank_u < 0.0:
-        return (
+        found = (
             f"the flange stands on the rail, {1e3 * (flank_u - corner):.1f} mm beyond the "
             "gauge corner, when the wheelset is central"
         )
-    if wheel.u[-1] - slack < corner:
+    elif wheel.u[-1] - slack < corner:
         short = 1e3 * (corner + slack - wheel.u[-1])
-        return (
+        found = (
             "the wheelset falls between the rails: with one flange at its rail, the outer end of "
             f"the other wheel is {short:.1f} mm short of the rail"
         )
-    height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
-    if int(np.argmin(height)) <= flank:
-        return "the flange touches the rail when the wheelset is central"
-    return ""
+    elif int(np.argmin(height)) <= flank:
+        found = "the flange touches the rail when the wheelset is central"
+    else:
+        return []
+    remedy = "check gauge, back-to-back distance and both profiles"
+    return [Fault(f"gauge {1e3 * gauge:.1f} mm", pair, found, remedy)]

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, stretches
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.errors import InputError, ModelError
 from railsim.kernels import normal_contact as kernel
@@ -202,13 +202,13 @@ class _Geometry:
         if not overlap.any():
             nothing = np.zeros(0)
             return ExactContact(z, z - first, (), nothing, nothing, nothing, np.zeros((0, 0)))
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], overlap, [False])).astype(int)))
-        widths = 2.5e-5 * (edges[1::2] - edges[::2])
-        whole = 2.5e-5 * (edges[-1] - edges[0])
+        parts = stretches(overlap)
+        first_point, last_point = parts[0][0], parts[-1][1]
+        widths = [2.5e-5 * (end - begin) for begin, end in parts]
         # a contact that has only just formed must not set the size of all elements
-        ds = max(float(widths.min()) / elements, float(widths.max()) / (3 * elements), 2e-5)
-        n_s = int(np.ceil(whole / ds)) + 2
-        centre = s[edges[0]] - ds + ds * np.arange(n_s)
+        ds = max(min(widths) / elements, max(widths) / (3 * elements), 2e-5)
+        n_s = int(np.ceil(2.5e-5 * (last_point - first_point) / ds)) + 2
+        centre = s[first_point] - ds + ds * np.arange(n_s)
         gap, Y, angle, radius = self.normal_gap(centre, z)
         deepest = float(np.max(-gap * radius / np.cos(angle)))
         half_length = np.sqrt(2.0 * deepest)
@@ -245,14 +245,13 @@ class _Geometry:
         field: Floats, Y: Floats, angle: Floats, dx: float, ds: float
     ) -> tuple[ExactPatch, ...]:
         """Connected patches along s, with both halves."""
-        touching = field.any(axis=0)
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], touching, [False])).astype(int)))
         patches = []
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
+        for start, end in stretches(field.any(axis=0)):
             part = field[:, start:end]
             line = 2.0 * part.sum(axis=0) * dx * ds
             N_y = float(np.sum(line * np.sin(angle[start:end])))
             N_z = float(np.sum(line * np.cos(angle[start:end])))
+            reaches = [_reach(column) for column in part.T]
             patches.append(
                 ExactPatch(
                     N=float(line.sum()),
@@ -260,9 +259,9 @@ class _Geometry:
                     N_y=N_y,
                     y=float(np.sum(line * Y[start:end]) / line.sum()),
                     angle=float(np.arctan2(N_y, N_z)),
-                    area=2.0 * ds * sum(_reach(part[:, k]) for k in range(end - start)) * dx,
+                    area=2.0 * ds * sum(reaches) * dx,
                     p_max=float(part.max()),
-                    length=2.0 * dx * max(_reach(part[:, k]) for k in range(end - start)),
+                    length=2.0 * dx * max(reaches),
                     width=ds * (_reach(part[0]) + _reach(part[0, ::-1]) - (end - start)),
                 )
             )

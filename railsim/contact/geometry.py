@@ -162,27 +162,14 @@ def contact_geometry(
         kernel.RigidPair(np.ascontiguousarray((w.u, w.r, w.t)), r.Y0, r.z, r.slope)
         for w, r in zip(wheels, rails, strict=True)
     ]
-
-    def sweep(at: Floats) -> tuple[Floats, Floats]:
-        roll = np.empty(at.size)
-        contacts = np.empty((at.size, 2, 6))
-        kernel.rigid_sweep(
-            np.ascontiguousarray(at),
-            pairs[1],
-            pairs[0],
-            rails[0].dY,
-            mean_radius,
-            LARGEST_ROLL,
-            roll,
-            contacts,
-        )
-        return roll, contacts
-
+    roll, contacts = np.empty(displacements.size), np.empty((displacements.size, 2, 6))
     # from the middle outwards, so that the roll is followed from a good start
     order = np.argsort(np.abs(displacements), kind="stable")
-    roll, contacts = np.empty(displacements.size), np.empty((displacements.size, 2, 6))
     for part in (order[displacements[order] >= 0.0], order[displacements[order] < 0.0]):
-        roll[part], contacts[part] = sweep(displacements[part])
+        given = pairs[1], pairs[0], rails[0].dY, mean_radius, LARGEST_ROLL
+        found = np.empty(part.size), np.empty((part.size, 2, 6))
+        kernel.rigid_sweep(displacements[part], *given, *found)
+        roll[part], contacts[part] = found
     gap = contacts[..., kernel.R_GAP]
     tape = np.array([wheels[0].u[0] - wheels[0].y[0], wheels[1].u[0] - wheels[1].y[0]])
     return ContactGeometry(

@@ -33,6 +33,7 @@ from railsim.contact.curves import (
     RailCurve,
     averaged_curvature,
     contour_curve,
+    single_valued_part,
 )
 from railsim.definitions.section_files import SectionList
 
@@ -84,12 +85,7 @@ class RailPart:
         i = int(np.clip(np.searchsorted(self.positions, s, "right") - 1, 0, last))
         h = self.positions[i + 1] - self.positions[i]
         u = (s - self.positions[i]) / h
-        rest = 1.0 - u
-        return np.asarray(
-            (1.0 + 2.0 * u) * rest**2 * self.contours[i]
-            + u**2 * (3.0 - 2.0 * u) * self.contours[i + 1]
-            + h * u * rest * (rest * self._slopes[i] - u * self._slopes[i + 1])
-        )
+        return cubic(u, h, self.contours[i : i + 2], self._slopes[i : i + 2])
 
     def height(self, s: float, Y: Floats) -> Floats:
         """Height below the rail tops at lateral positions, inf where the rail is not [m]."""
@@ -97,6 +93,10 @@ class RailPart:
             return np.full(Y.shape, np.inf)
         y, z = self.contour(s)
         return np.interp(Y, *_upper(y, z), left=np.inf, right=np.inf)
+
+    def heights_ahead(self, s: float, Y: Floats) -> Floats:
+        """Heights before and behind an arc length, at `AHEAD` of it, float64[ahead, Y] [m]."""
+        return np.array([self.height(s + ahead, Y) for ahead in AHEAD])
 
     def unchanged(self, s: float) -> Floats | None:
         """Points of its sections as given where they do not change around `s`, else None."""
@@ -107,6 +107,18 @@ class RailPart:
         around = self.given[max(first - 1, 0) : last + 2]
         same = all(np.array_equal(points, around[0]) for points in around)
         return around[0] if same else None
+
+
+def cubic(
+    u: Floats | float, h: float, values: Sequence[Floats], slopes: Sequence[Floats]
+) -> Floats:
+    """Hermite's cubic at the shares `u` of a distance h, by values and slopes at both ends."""
+    rest = 1.0 - u
+    return np.asarray(
+        (1.0 + 2.0 * u) * rest**2 * values[0]
+        + u**2 * (3.0 - 2.0 * u) * values[1]
+        + h * u * rest * (rest * slopes[0] - u * slopes[1])
+    )
 
 
 def _upper(y: Floats, z: Floats) -> tuple[Floats, Floats]:
@@ -189,31 +201,14 @@ def _shares(part: Floats) -> Floats:
     return np.concatenate([flank, [places, behind]], axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class RolledRail:
-    """The section on which a wheel stands at one position, see the module's text.
+def _rolled(heights: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Section on which a wheel of some radius stands on a rail, of the rail's heights at `AHEAD`.
 
-    Attributes
-    ----------
-    Y, z, lead : ndarray, shape (n,)
-        Lateral position, height below the rail tops, and how far ahead of the axle [m].
+    Its heights below the rail tops, and how far ahead of the axle they are [m].
     """
-
-    Y: Floats
-    z: Floats
-    lead: Floats
-
-
-def rolled_rail(part: RailPart, s: float, radius: float, Y: Floats) -> RolledRail:
-    """Return the section of a rail on which a wheel of some radius stands at `s`."""
-    return _rolled(np.array([part.height(s + ahead, Y) for ahead in AHEAD]), radius, Y)
-
-
-def _rolled(heights: Floats, radius: float, Y: Floats) -> RolledRail:
-    """As `rolled_rail`, of the heights at `AHEAD`."""
     heights = heights + (radius - np.sqrt(radius**2 - AHEAD**2))[:, None]
     best = np.argmin(heights, axis=0)
-    columns = np.arange(Y.size)
+    columns = np.arange(heights.shape[1])
     inner = np.clip(best, 1, AHEAD.size - 2)
     a, b, c = (heights[inner + k, columns] for k in (-1, 0, 1))
     known = np.isfinite(a) & np.isfinite(b) & np.isfinite(c) & (best == inner)
@@ -222,7 +217,7 @@ def _rolled(heights: Floats, radius: float, Y: Floats) -> RolledRail:
     offset = np.where(bend > 0.0, 0.5 * (a - c) / np.where(bend > 0.0, bend, 1.0), 0.0)
     offset = np.clip(offset, -0.5, 0.5)
     z = heights[best, columns] - 0.25 * (a - c) * offset
-    return RolledRail(Y, z, AHEAD[best] + STEP * offset)
+    return z, AHEAD[best] + STEP * offset
 
 
 def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> RailCurve:
@@ -236,20 +231,15 @@ def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) ->
         return contour_curve(given[0] + zero, given[1])
     y, _ = part.contour(float(np.clip(s, part.positions[0], part.positions[-1])))
     Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * RAIL_SPACING)
-    rolled = rolled_rail(part, s, radius, Y)
-    known = np.isfinite(rolled.z)
-    Y, z = Y[known], rolled.z[known]
-    top = int(np.argmin(z))
-    step = np.abs(np.diff(z)) <= STEEPEST * np.diff(Y)
-    first, last = top, top
-    while first > 0 and step[first - 1]:
-        first -= 1
-    while last < Y.size - 1 and step[last]:
-        last += 1
+    z, _ = _rolled(part.heights_ahead(s, Y), radius)
+    known = np.isfinite(z)
+    Y, z = Y[known], z[known]
+    usable = single_valued_part(Y, z, int(np.argmin(z)), STEEPEST)
+    Y, z = Y[usable][:-1], z[usable][:-1]
     from scipy.interpolate import make_smoothing_spline
 
-    spline = make_smoothing_spline(1e3 * Y[first:last], 1e3 * z[first:last], lam=1e-4)
-    nodes = np.arange(Y[first], Y[last - 1], RAIL_SPACING)
+    spline = make_smoothing_spline(1e3 * Y, 1e3 * z, lam=1e-4)
+    nodes = np.arange(Y[0], Y[-1], RAIL_SPACING)
     slope = spline.derivative()(1e3 * nodes)
     slope[0], slope[-1] = -STEEPEST, STEEPEST  # walls, or where the section ends
     return RailCurve(
@@ -293,7 +283,7 @@ def rigid_gaps(
     gaps = np.full((s.size, len(wheels), y.size), NOWHERE)
     for i in range(s.size):
         around = heights[every * i : every * i + AHEAD.size]
-        z = np.minimum(_rolled(around, radius, Y).z, NOWHERE)
+        z = np.minimum(_rolled(around, radius)[0], NOWHERE)
         for k, u, r in present:
             for j, aside in enumerate(y):
                 gaps[i, k, j] = (np.interp(u + aside, Y, z) - r).min() + radius
@@ -324,9 +314,9 @@ def kinematic_height(
     """
     best = (np.inf, 0.0, -1)
     for number, part in enumerate(parts):
-        rolled = rolled_rail(part, s, radius, wheel[0] + y)
-        gap = rolled.z - (wheel[1] - radius)
+        z, ahead = _rolled(part.heights_ahead(s, wheel[0] + y), radius)
+        gap = z - (wheel[1] - radius)
         k = int(np.argmin(gap))
         if gap[k] < best[0]:
-            best = float(gap[k]), float(rolled.lead[k]), number
+            best = float(gap[k]), float(ahead[k]), number
     return best

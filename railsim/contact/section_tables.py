@@ -32,7 +32,14 @@ from railsim.contact.curves import (
     tape_circle_position,
     wheel_curve,
 )
-from railsim.contact.rail_sections import WINDOW, RailPart, rail_parts, rigid_gaps, rolled_curve
+from railsim.contact.rail_sections import (
+    WINDOW,
+    RailPart,
+    cubic,
+    rail_parts,
+    rigid_gaps,
+    rolled_curve,
+)
 from railsim.contact.stored_table import generator_hash, kept_table
 from railsim.contact.table import (
     ContactTable,
@@ -122,7 +129,7 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
     grid = chosen_grid(None, given.normal)
     wheel = wheel_curve(given.wheel, radius, tape, min(grid.spacing, grid.ds))
     level = rail_curve(given.rail, gauge, inclination)
-    generator = Generator.of(wheel, level, radius, plain.centre_height, plain.G, plain.nu, grid)
+    generator = Generator(wheel, level, radius, plain.centre_height, plain.G, plain.nu, grid)
     parts = rail_parts(given.sections)
     nodes, running = chosen_nodes(parts, wheel, level, tape - given.zero, given)
     rise = _height(generator, level) - _height(
@@ -285,12 +292,8 @@ def _split(s: Floats, gaps: Floats, limit: Floats, first: int, last: int) -> lis
     def between(a: int, b: int) -> list[int]:
         h = s[b] - s[a]
         u = ((s[a + 1 : b] - s[a]) / h)[:, None, None]
-        cubic = (
-            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * gaps[a]
-            + u**2 * (3.0 - 2.0 * u) * gaps[b]
-            + h * u * (1.0 - u) * ((1.0 - u) * slope[a] - u * slope[b])
-        )
-        met = (np.abs(cubic - gaps[a + 1 : b]) <= limit[a + 1 : b]).all()
+        found = cubic(u, h, (gaps[a], gaps[b]), (slope[a], slope[b]))
+        met = (np.abs(found - gaps[a + 1 : b]) <= limit[a + 1 : b]).all()
         if b - a < 2 or (met and h <= FARTHEST):
             return [a]
         middle = (a + b) // 2

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +12,9 @@ from railsim.contact.elastic import LoadedContact, loaded_contact
 from railsim.contact.exact_normal import ExactContact, exact_contact
 from railsim.contact.geometry import ContactGeometry, contact_geometry
 from railsim.contact.stored_table import cached_contact_table
-from railsim.contact.table import ContactTable, TableGrid
+from railsim.contact.table import ContactTable, Normal, TableGrid
 from railsim.errors import InputError, ModelError
 from railsim.profiles.profile import Profile
-
-Normal = Literal["hertz", "kik-piotrowski"]
 
 STEP = 5e-5
 """Step of the lateral displacement [m]."""

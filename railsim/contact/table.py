@@ -287,7 +287,7 @@ def build_contact_table(
     roll_nodes = unstretched_roll(stretched_nodes)
     s_nodes = s_min + grid.ds * np.arange(n_y, dtype=np.float64)
     w_nodes = yaw_nodes(grid)
-    generator = Generator.of(wheel_points, rail_nodes, radius, height, G, nu, grid)
+    generator = Generator(wheel_points, rail_nodes, radius, height, G, nu, grid)
     values = generator.values(rail_nodes, s_nodes, roll_nodes, w_nodes, workers or os.cpu_count())
     values = spline_coefficients(values, stretched_nodes)
     # as from the cache: the time loop is compiled once, not for both kinds of arrays
@@ -324,27 +324,15 @@ def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
     return replace(grid, normal=normal) if normal else grid
 
 
-@dataclass(frozen=True, eq=False)
 class Generator:
     """A wheel with its zones, and what its contact with any rail is computed with.
 
-    Attributes
-    ----------
-    wheel, elastic, hertz, strips : see `railsim.kernels.table_slice`
-    radius, height : float
-        Rolling radius; height of the wheelset's centre above the rail tops at z = 0 [m].
+    `wheel`, `rail`: the wheel, and the rail that decides about its zones; `radius`, `height`:
+    rolling radius; height of the wheelset's centre above the rail tops at z = 0 [m].
     """
 
-    wheel: kernel.Wheel
-    elastic: kernel.Elastic
-    hertz: kernel.Hertz
-    strips: kernel.Strips
-    radius: float
-    height: float
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         wheel: WheelCurve,
         rail: RailCurve,
         radius: float,
@@ -352,17 +340,17 @@ class Generator:
         G: float,
         nu: float,
         grid: TableGrid,
-    ) -> "Generator":
-        """Generator of a wheel whose zones are those on a rail."""
-        elastic = kernel.Elastic(
-            G / (1.0 - nu),
-            HALF_WIDTHS,
-            grid.reference,
-            grid.floor_ratio,
-            grid.normal == "kik-piotrowski",
+    ) -> None:
+        self._radius, self._height = radius, height
+        self._wheel = _wheel_arrays(wheel, rail)
+        elliptic = grid.normal == "hertz"
+        self._laws = (
+            kernel.Elastic(
+                G / (1.0 - nu), HALF_WIDTHS, grid.reference, grid.floor_ratio, not elliptic
+            ),
+            ellipse_functions(G, nu),
+            strip_influence(),
         )
-        wheels = _wheel_arrays(wheel, rail)
-        return cls(wheels, elastic, ellipse_functions(G, nu), strip_influence(), radius, height)
 
     def values(
         self, rail: RailCurve, s: Floats, roll: Floats, w: Floats, workers: int | None
@@ -374,9 +362,9 @@ class Generator:
         def fill(task: tuple[int, int]) -> None:
             i_w, i_roll = task
             part = np.empty((3, s.size, N_FIELD))
-            y, yaw = s + self.radius * roll[i_roll], float(np.sqrt(w[i_w]))
-            arguments = self.wheel, nodes, self.elastic, self.hertz, self.strips
-            kernel.fill_table_slice(part, y, roll[i_roll], yaw, self.height, *arguments)
+            y, yaw = s + self._radius * roll[i_roll], float(np.sqrt(w[i_w]))
+            pose = y, roll[i_roll], yaw, self._height
+            kernel.fill_table_slice(part, *pose, self._wheel, nodes, *self._laws)
             values[:, i_w, i_roll] = part
 
         tasks = [(i_w, i_roll) for i_w in range(w.size) for i_roll in range(roll.size)]
