@@ -12,20 +12,10 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.profiles.profile import Profile
 
+Height = Callable[[Floats], Floats]
+
 SPACING = 0.05
 """Distance of the points along the contour [mm]."""
-
-S1002_SECTIONS = (
-    # lower end [mm], upper end [mm], name of the section in EN 13715
-    (-70.0, -62.764705882, "H"),
-    (-62.764705882, -49.662510381, "G"),
-    (-49.662510381, -39.764473993, "F"),
-    (-39.764473993, -38.426669071, "E"),
-    (-38.426669071, -35.0, "D"),
-    (-35.0, -26.0, "C"),
-    (-26.0, 32.15796, "B"),
-    (32.15796, 60.0, "A"),
-)
 
 S1002_OUTER = (1.364323640, -0.066666667)
 S1002_FLANK_END = -39.764473993
@@ -53,38 +43,42 @@ S1002_ROOT = (
 )
 
 
+def _circle(centre_y: float, centre_z: float, radius: float) -> Height:
+    """Arc above its centre, of a negative radius below it."""
+
+    def height(y: Floats) -> Floats:
+        half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
+        return np.asarray(centre_z + np.copysign(half, radius))
+
+    return height
+
+
+def _polynomial(coefficients: tuple[float, ...]) -> Height:
+    return lambda y: np.asarray(np.polynomial.polynomial.polyval(y, coefficients))
+
+
+S1002_SECTIONS: dict[str, tuple[float, Height]] = {
+    # name of the section in EN 13715: upper end [mm], height
+    "H": (-62.764705882, _circle(-49.5, 9.519259302, 20.5)),
+    "G": (-49.662510381, _circle(-55.0, 16.0, 12.0)),
+    "F": (S1002_FLANK_END, _circle(-58.558326413, 8.834924130, 20.0)),
+    "E": (-38.426669071, _polynomial(S1002_FLANK)),
+    "D": (-35.0, _circle(-26.210665, 16.446, -13.0)),
+    "C": (-26.0, _polynomial(S1002_ROOT)),
+    "B": (32.15796, _polynomial(S1002_TREAD)),
+    "A": (60.0, _polynomial(S1002_OUTER)),
+}
+
+
 def s1002_height(y: Floats) -> Floats:
     """Height of the S1002 contour [mm] at the lateral position y [mm], flange at negative y.
 
-    Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H.  The standard's
-    polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
+    Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H, from -70 mm on.  The
+    standard's polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
     """
-
-    def circle(y: Floats, centre_y: float, centre_z: float, radius: float) -> Floats:
-        half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
-        z: Floats = centre_z + np.copysign(half, radius)
-        return z
-
-    def polynomial(y: Floats, coefficients: tuple[float, ...]) -> Floats:
-        return np.asarray(np.polynomial.polynomial.polyval(y, coefficients), dtype=np.float64)
-
-    section: dict[str, Callable[[Floats], Floats]] = {
-        "A": lambda y: polynomial(y, S1002_OUTER),
-        "B": lambda y: polynomial(y, S1002_TREAD),
-        "C": lambda y: polynomial(y, S1002_ROOT),
-        "D": lambda y: circle(y, -26.210665, 16.446, -13.0),
-        "E": lambda y: polynomial(y, S1002_FLANK),
-        "F": lambda y: circle(y, -58.558326413, 8.834924130, 20.0),
-        "G": lambda y: circle(y, -55.0, 16.0, 12.0),
-        "H": lambda y: circle(y, -49.5, 9.519259302, 20.5),
-    }
-    upper = [end for _, end, _ in S1002_SECTIONS[:-1]]
-    index = np.searchsorted(upper, y, side="right")
-    z = np.empty_like(y)
-    for i, (_, _, name) in enumerate(S1002_SECTIONS):
-        inside = index == i
-        z[inside] = section[name](y[inside])
-    return z
+    ends, heights = zip(*S1002_SECTIONS.values(), strict=True)
+    index = np.searchsorted(ends[:-1], y, side="right")
+    return np.piecewise(y, [index == k for k in range(len(heights))], heights)
 
 
 def even_points(y: Floats, z: Floats, spacing: float) -> Floats:
