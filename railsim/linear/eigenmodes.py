@@ -76,7 +76,8 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     >>> modes.natural_frequencies.round(4), modes.damping_ratios.round(4)
     (array([0.3183]), array([0.1]))
     """
-    values, left, right = _eig(linearisation.matrix)
+    solved: Any = eig(linearisation.matrix, left=True, right=True)
+    values, left, right = (np.asarray(part, dtype=complex) for part in solved)
     upper = np.flatnonzero(values.imag >= 0.0)
     order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
     shapes = right[:, order].T
@@ -87,12 +88,6 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     # a defective pair, such as two zero eigenvalues of a free vehicle, has no product to divide by
     dual = dual / np.where(np.abs(product) > 1e-30, product, 1.0)[:, None]
     return Eigenmodes(linearisation, values[order], shapes, dual)
-
-
-def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    found: Any = eig(matrix, left=True, right=True)
-    values, left, right = (np.asarray(part, dtype=complex) for part in found)
-    return values, left, right
 
 
 def pairing(before: Eigenmodes, after: Eigenmodes) -> Floats:

@@ -27,6 +27,7 @@ import numpy as np
 from railsim.arrays import Complexes, Floats
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
+from railsim.linear.eigenmodes import Eigenmodes
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
 
@@ -69,15 +70,9 @@ class Parts:
         total = float(energy.sum())
         return energy / total if total > 0.0 else energy
 
-    @cached_property
-    def _indices(self) -> dict[tuple[int, int], int]:
-        """Index of each position component among the coordinates."""
-        c = self.coordinates
-        return {(int(c.bodies[k]), int(c.components[k])): k for k in range(c.n_positions)}
-
     def component(self, shape: Complexes, body: int, component: int) -> complex:
         """Position component of a shape, 0 where the body is held or has none."""
-        index = self._indices.get((body, component))
+        index = self.coordinates.position_of.get((body, component))
         return 0j if index is None else complex(shape[index])
 
     def bogie_of(self, body: int) -> str:
@@ -107,11 +102,10 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
     )
 
 
-def mode_name(parts: Parts, shape: Complexes, eigenvalue: complex, speed: float) -> str:
-    """Name one mode.
-
-    `shape`: right eigenvector; `eigenvalue`: [1/s]; `speed`: [m/s].
-    """
+def mode_name(parts: Parts, modes: Eigenmodes, k: int = 0) -> str:
+    """Name one of the modes of a vehicle at a speed."""
+    shape, eigenvalue = modes.shapes[k], complex(modes.eigenvalues[k])
+    speed = modes.linearisation.parameter
     shares = parts.energy_shares(shape)
     if abs(eigenvalue) < NEAR_ZERO and shares[:, 0].sum() + shares[:, 4].sum() > 0.9:
         return "rolling"

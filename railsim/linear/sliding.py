@@ -112,7 +112,7 @@ class SlidingPath:
             system, guess = self._placed(ahead, self.state)
             solver = Sliding(self._model, system, self._grip, held=self._held)
             try:
-                state = solver.solve(guess, self._speed).state
+                state = solver.solve(guess, self._speed)
             except NotConverged as error:
                 step *= 0.5
                 if abs(step) < SMALLEST:

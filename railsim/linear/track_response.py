@@ -30,8 +30,8 @@ from railsim.constants import CANT_BASE, GRAVITY
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import System
 from railsim.linear.circle import POSITION
-from railsim.linear.coordinates import Coordinates, FreeVehicle
-from railsim.linear.system import without_forceless
+from railsim.linear.coordinates import FreeVehicle
+from railsim.linear.system import jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.result.sensors import Sensor
 
@@ -120,7 +120,7 @@ def track_response(
     track = vehicle.system.track
     rail = track.rail.copy()
     system = vehicle.system._replace(track=track._replace(rail=rail, has_irregularity=1))
-    free = FreeVehicle(vehicle.model, system, vehicle.steady(speed).state)
+    free = FreeVehicle(vehicle.model, system, vehicle.steady(speed))
     offsets = system.frame_offset[system.bodies.frame[system.contact.body]]
     x, c = free.x, free.coordinates
 
@@ -129,11 +129,8 @@ def track_response(
         forces = [free.work.wheel[:, :, column].ravel() for column in (W_Q, W_Y)]
         return np.concatenate([rates, *forces])
 
-    columns = []
-    for k, step in enumerate(c.steps):
-        moved = np.zeros(len(x))
-        moved[k] = step
-        columns.append((evaluated(x + moved) - evaluated(x - moved)) / (2.0 * step))
+    of_states = jacobian(lambda rows: np.array([evaluated(row) for row in rows]), x, c.steps)
+    columns = [*of_states.T]
     for offset in offsets:
         cell, u = divmod(POSITION + float(offset) - track.s_start, track.ds)
         cell = int(cell)
@@ -160,7 +157,7 @@ def track_response(
     lateral = np.zeros((len(offsets), *inputs.shape[1:]))
     lateral[range(len(offsets)), range(len(offsets)), 0, 0] = -1.0
     bodies = system.contact.body
-    places = np.array([c.index_of(int(b), 1) for b in bodies])
+    places = np.array([c.position_of[int(b), 1] for b in bodies])
     return TrackResponse(
         speed,
         (*names, *_of_wheelsets(len(offsets))),
@@ -170,7 +167,7 @@ def track_response(
         np.concatenate([C, whole[n:, :n], np.eye(n)[places]]),
         np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:], lateral]),
         np.concatenate([R, np.zeros((6 * count, n))]),
-        np.array([[_velocity(c, int(b), k) for k in COMPONENTS] for b in bodies]),
+        np.array([[c.velocity_of[int(b), k] for k in COMPONENTS] for b in bodies]),
         _forces_of(system, len(C)),
         np.concatenate([np.zeros(len(C)), steady, np.zeros(count)]),
     )
@@ -206,12 +203,6 @@ def _forces_of(system: System, before: int) -> Floats:
     return own
 
 
-def _velocity(c: Coordinates, body: int, component: int) -> int:
-    """Index of a body's velocity."""
-    there = (c.bodies == body) & (c.components == component)
-    return int(np.flatnonzero(there & (np.arange(len(there)) >= c.n_positions))[0])
-
-
 def _power(order: int, u: float) -> Floats:
     """Coefficients of (v - u)^order / order! over v, by rising powers."""
     return np.array(([1.0], [-u, 1.0], [0.5 * u * u, -u, 0.5])[order])
@@ -222,26 +213,21 @@ def _readings(
 ) -> tuple[Floats, Floats, list[str]]:
     """C and R of what sensors read along x, y, z and of their roll rate, and their names."""
     bodies, c = free.model.index.bodies, free.coordinates
-    known = {
-        (int(b), int(k), i >= c.n_positions): i
-        for i, (b, k) in enumerate(zip(c.bodies, c.components, strict=True))
-        if b >= 0
-    }
     C, R, names = [], [], []
     for name, sensor in sensors.items():
         b = bodies.index(sensor.body)
 
-        def row(component: int, velocity: bool, b: int = b) -> Floats:
+        def row(component: int, known: Mapping[tuple[int, int], int], b: int = b) -> Floats:
             """Unit row of a displacement or velocity; zero where the body does not move so."""
-            found = known.get((b, component, velocity))
+            found = known.get((b, component))
             return np.zeros(n) if found is None else np.eye(1, n, found)[0]
 
-        turn = np.array([row(k, True) for k in (3, 4, 5)])
-        pitch = np.zeros(n) if sensor.axlebox else row(4, False)
+        turn = np.array([row(k, c.velocity_of) for k in (3, 4, 5)])
+        pitch = np.zeros(n) if sensor.axlebox else row(4, c.position_of)
         turn[1] *= not sensor.axlebox
-        point = np.array([row(k, True) for k in (0, 1, 2)])
+        point = np.array([row(k, c.velocity_of) for k in (0, 1, 2)])
         point += np.cross(turn, np.array(sensor.arm)[:, None], axis=0)
         R += [*point, np.zeros(n)]
-        C += [GRAVITY * pitch, -GRAVITY * row(3, False), np.zeros(n), row(3, True)]
+        C += [GRAVITY * pitch, -GRAVITY * row(3, c.position_of), np.zeros(n), row(3, c.velocity_of)]
         names += [f"{name}.{axis}" for axis in ("x", "y", "z", "roll_rate")]
     return np.reshape(C, (-1, n)), np.reshape(R, (-1, n)), names

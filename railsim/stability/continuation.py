@@ -203,7 +203,7 @@ def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, Peri
     period = 1.0 / frequency
     # the scheme's memory settles
     state = motion.stretch(motion.rest(speed, FIRST), speed, speed, 2.0 * period).state
-    rest = flow.reduced(motion.prepared.steady(speed).state)
+    rest = flow.reduced(motion.prepared.steady(speed))
     begin = flow.reduced(state) - rest
     quarter = flow.after((rest + begin)[None], np.array([0.25 * period]), np.array([speed]))[0]
     scale = flow.scale(rest + begin, period, speed, FIRST)

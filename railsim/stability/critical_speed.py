@@ -179,12 +179,7 @@ def _checked(
 
 def _hunts(parts: Parts) -> Callable[[Eigenmodes], bool]:
     """Whether a mode is hunting."""
-
-    def answer(mode: Eigenmodes) -> bool:
-        speed, value = mode.linearisation.parameter, complex(mode.eigenvalues[0])
-        return mode_name(parts, mode.shapes[0], value, speed).endswith("hunting")
-
-    return answer
+    return lambda mode: mode_name(parts, mode).endswith("hunting")
 
 
 def _loss_of_hunting(
@@ -205,13 +200,9 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
     """The linear critical speed; a remark where there is none, or where friction sticks."""
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
-    def name(mode: Eigenmodes) -> str:
-        value = complex(mode.eigenvalues[0])
-        return mode_name(parts, mode.shapes[0], value, mode.linearisation.parameter)
-
     def words(mode: Eigenmodes) -> str:
         return (
-            f"{name(mode)}, {mode.frequencies[0]:.3g} Hz, damping "
+            f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, damping "
             f"{100.0 * mode.damping_ratios[0]:.3g} % at {mode.linearisation.parameter:g} m/s"
         )
 
@@ -221,13 +212,13 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
         if (other.parameter is not None and other.parameter != lost.parameter) or other.already:
             mode = other.modes[0]
             found.remarks.append(
-                f"{name(mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
+                f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
                 f"{mode.linearisation.parameter:.4g} m/s or less as long as all friction elements "
                 "stick; sliding damps it, so that it is not counted"
             )
     if lost.parameter is not None:
         mode = lost.modes[0]
-        return LinearLoss(lost.parameter, float(mode.frequencies[0]), name(mode))
+        return LinearLoss(lost.parameter, float(mode.frequencies[0]), mode_name(parts, mode))
     if lost.already:
         found.remarks.append(f"unstable at the lower end of the range: {words(lost.modes[0])}")
     else:

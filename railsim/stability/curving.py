@@ -24,7 +24,7 @@ from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import ARC_LENGTH, System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.linear.circle import POSITION, circle, left_out
+from railsim.linear.circle import POSITION, circle, left_out, placed
 from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
@@ -315,9 +315,8 @@ class _Search:
         omitted = left_out(track, settings, assembled.wheels)
         self.remarks = (*balance.remarks, *_remarks(balance.model), *omitted)
         self.parts = parts_of(self.model, coordinates(self.model))
-        rest = balance.state.copy()
-        rest[-2] = POSITION
-        self._rest = _Known(np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)]), rest)
+        values = np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)])
+        self._rest = _Known(values, placed(balance.state))
         self._last: _Known = self._rest
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:
@@ -340,8 +339,8 @@ class _Search:
                 found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
             except NotConverged:
                 continue
-            self._last = _Known(goal, found.state)
-            return solver, found.state, NEWTON
+            self._last = _Known(goal, found)
+            return solver, found, NEWTON
         system = self._system(goal[0], goal[1], friction)
         return self._in_time(system, speed, self._system(0.0, 0.0, friction))
 

@@ -34,7 +34,7 @@ class VehicleFlow:
         self._motion = motion
         self._system = motion.system._replace(drive=CONSTANT_SPEED)
         self._step = motion.step_at(speed)
-        self._rest = motion.prepared.steady(speed).state.copy()
+        self._rest = motion.prepared.steady(speed).copy()
         self._indices, self._floors = self._moving()
         spins = 6 * motion.model.index.n_bodies + 6 * self._system.contact.body + 4
         self._spins, self._per_speed = spins, self._rest[spins] / speed
