@@ -246,7 +246,7 @@ class _Geometry:
     ) -> tuple[ExactPatch, ...]:
         """Connected patches along s, with both halves."""
         patches = []
-        for start, end in stretches(field.any(axis=0)):
+        for start, end in stretches(np.any(field, axis=0)):
             part = field[:, start:end]
             line = 2.0 * part.sum(axis=0) * dx * ds
             N_y = float(np.sum(line * np.sin(angle[start:end])))

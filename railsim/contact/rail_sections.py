@@ -85,7 +85,7 @@ class RailPart:
         i = int(np.clip(np.searchsorted(self.positions, s, "right") - 1, 0, last))
         h = self.positions[i + 1] - self.positions[i]
         u = (s - self.positions[i]) / h
-        return cubic(u, h, self.contours[i : i + 2], self._slopes[i : i + 2])
+        return cubic(u, h, [*self.contours[i : i + 2]], [*self._slopes[i : i + 2]])
 
     def height(self, s: float, Y: Floats) -> Floats:
         """Height below the rail tops at lateral positions, inf where the rail is not [m]."""

@@ -77,7 +77,8 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     (array([0.3183]), array([0.1]))
     """
     solved: Any = eig(linearisation.matrix, left=True, right=True)
-    values, left, right = (np.asarray(part, dtype=complex) for part in solved)
+    parts: list[Complexes] = [np.asarray(part, dtype=complex) for part in solved]
+    values, left, right = parts
     upper = np.flatnonzero(values.imag >= 0.0)
     order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
     shapes = right[:, order].T

@@ -9,6 +9,7 @@ such points are marked, and those where it does not come to rest or leaves the t
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -249,8 +250,7 @@ def curving(
 
 
 def _friction(track: Track) -> float:
-    mean: float = sum(track.friction) / 2.0
-    return mean
+    return float(sum(track.friction) / 2.0)
 
 
 def _check(
@@ -284,14 +284,6 @@ def _speed(radius: float, cant: float, deficiency: float) -> float:
     return curve_speed(radius, cant + deficiency) or math.nan
 
 
-@dataclass(frozen=True)
-class _Known:
-    """A steady state; curvature, cant, square of the speed and friction at which it holds."""
-
-    values: Floats
-    state: Floats
-
-
 Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
 
 
@@ -310,14 +302,13 @@ class _Search:
         assembled = assemble(vehicle, circle(track), settings.in_steady_rolling(), profiles)
         check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
         balance = equilibrium(assembled, WALKING_PACE)
-        self.model: Model = balance.model
+        self.model = balance.model
         self.Q0 = balance.Q0
         omitted = left_out(track, settings, assembled.wheels)
         self.remarks = (*balance.remarks, *_remarks(balance.model), *omitted)
         self.parts = parts_of(self.model, coordinates(self.model))
         values = np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)])
-        self._rest = _Known(values, placed(balance.state))
-        self._last: _Known = self._rest
+        self._rest = self._last = values, placed(balance.state)
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:
         there = circle(self.track, curvature=curvature, cant=cant, friction=friction)
@@ -327,31 +318,29 @@ class _Search:
         """Steady state at one point of the grid."""
         speed = _speed(radius, self.cant, deficiency)
         goal = np.array([1.0 / radius, math.copysign(self.cant, radius), speed**2, friction])
-        for start in (self._last, self._rest):
-            if start.values[0] * radius < 0.0:
+        for values, start in (self._last, self._rest):
+            if values[0] * radius < 0.0:
                 continue
 
-            def along(share: float, start: _Known = start) -> tuple[System, float]:
-                curvature, cant, square, mu = start.values + share * (goal - start.values)
+            def along(share: float, values: Floats = values) -> tuple[System, float]:
+                curvature, cant, square, mu = values + share * (goal - values)
                 return self._system(curvature, cant, mu), math.sqrt(square)
 
-            try:
-                found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
-            except NotConverged:
-                continue
-            self._last = _Known(goal, found)
-            return solver, found, NEWTON
+            with suppress(NotConverged):
+                found, solver = led(self.model, along, start, smallest=1.0 / 16.0)
+                self._last = goal, found
+                return solver, found, NEWTON
         system = self._system(goal[0], goal[1], friction)
         return self._in_time(system, speed, self._system(0.0, 0.0, friction))
 
     def _in_time(self, system: System, speed: float, straight: System) -> Point:
         """Run on the circle until nothing changes; failed where it does not come to that."""
         solver = SteadyRolling(self.model, system)
-        state = self._last.state.copy()
+        state = self._last[1].copy()
         state[-3:] = 0.0, POSITION, speed
         try:
             state = solver.prepared(state, speed)
-            rolling = solver.prepared(self._rest.state, speed)
+            rolling = solver.prepared(self._rest[1], speed)
             # the curve itself is where the run settles: judged with the state that Newton left
             step = Stability(
                 self.model, straight, rolling, "fast", lambda _: (system, state)

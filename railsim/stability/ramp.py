@@ -63,7 +63,7 @@ def ramp(
     motion: Motion,
     low: float,
     high: float,
-    progress: Progress | None = None,
+    tell: Progress = lambda _: None,
     excitations: Sequence[float] = EXCITATIONS,
 ) -> tuple[Point | None, Branch]:
     """Let the speed fall from `high` until hunting dies, then bisect with runs at constant speed.
@@ -74,7 +74,6 @@ def ramp(
     `high`, a lower one is taken; `excitations`: sizes of the disturbances at the highest speed [m].
     Returns: the slowest motion that sustains itself, and the amplitude on the ramp.
     """
-    tell = progress or (lambda _: None)
     speed = high
     while True:
         hard: list[Point] = []

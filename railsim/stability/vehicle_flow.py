@@ -28,8 +28,6 @@ class VehicleFlow:
     [m/s].
     """
 
-    mirror = None
-
     def __init__(self, motion: VehicleMotion, speed: float) -> None:
         self._motion = motion
         self._system = motion.system._replace(drive=CONSTANT_SPEED)
