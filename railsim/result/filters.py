@@ -117,6 +117,14 @@ def _continued(x: Floats, begin: int, end: int) -> Floats:
     return found
 
 
+def even_step(time: Floats) -> float | None:
+    """Step of a record [s], None where steps are not equal; the last one may be shorter."""
+    steps = np.diff(time[:-1])
+    if not len(steps) or np.ptp(steps) > 1e-6 * np.mean(steps):
+        return None
+    return float(np.mean(steps))
+
+
 def low_passed(x: Floats, rate: float, corner: float, *, causal: bool = False) -> Floats:
     """Butterworth low pass of order 4 without phase, or causal."""
     return band_passed(x, rate, 0.0, corner, causal=causal)
@@ -137,9 +145,15 @@ def band_passed(x: Floats, rate: float, low: float, high: float, *, causal: bool
     else:
         sections = signal.butter(4, high, "lowpass", fs=rate, output="sos")
     x = np.asarray(x, dtype=np.float64)
+    return np.asarray(signal.sosfilt(sections, x, axis=0, zi=steady_start(sections, x[0]))[0])
+
+
+def steady_start(sections: Floats, first: Floats) -> Floats:
+    """State of a causal filter, given as second-order sections, that has always seen `first`."""
+    from scipy import signal
+
     start = signal.sosfilt_zi(sections)
-    start = start.reshape(*start.shape, *(1 for _ in x.shape[1:])) * x[0]
-    return np.asarray(signal.sosfilt(sections, x, axis=0, zi=start)[0])
+    return np.asarray(start.reshape(*start.shape, *(1 for _ in first.shape)) * first)
 
 
 def integral(s: Floats, x: Floats) -> Floats:
