@@ -196,18 +196,10 @@ def creep_law(
 ) -> CreepLaw:
     """Creep law as the kernels take it, with its table or curve.
 
-    Parameters
-    ----------
-    name : str
-        One of `railsim.definitions.creep_law.CREEP_LAWS`.
-    grid : (int, int)
-        Cells of a patch along and across.
-    G, nu : float
-        Shear modulus [Pa], Poisson's ratio [1].
-    third_body : (float, float)
-        Reduction of Kalker's coefficients, and Polach's further factor for the area of slip [1].
-    adhesion_curve : array_like, shape (k, 2), optional
-        Creepage and T/(mu N) [1].
+    `name`: one of `railsim.definitions.creep_law.CREEP_LAWS`; `grid`: cells of a patch along and
+    across; `G`, `nu`: shear modulus [Pa], Poisson's ratio [1]; `third_body`: reduction of Kalker's
+    coefficients, and Polach's further factor for the area of slip [1]; `adhesion_curve`, shape (k,
+    2): creepage and T/(mu N) [1].
     """
     table = creep_table(nu) if name == "table" else NO_TABLE
     curve = np.zeros((0, 2)) if adhesion_curve is None else np.array(adhesion_curve, dtype=float)

@@ -27,14 +27,8 @@ SIZES = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0)
 class Patch(NamedTuple):
     """A loaded contact ellipse.
 
-    Attributes
-    ----------
-    a, b : float
-        Semi-axes along and across the rail [m].
-    N, mu : float
-        Normal force [N], friction coefficient [1].
-    G, nu : float
-        Shear modulus [Pa], Poisson's ratio [1].
+    `a`, `b`: semi-axes along and across the rail [m]; `N`, `mu`: normal force [N], friction
+    coefficient [1]; `G`, `nu`: shear modulus [Pa], Poisson's ratio [1].
     """
 
     a: float

@@ -54,12 +54,9 @@ _NO_SLIP = 1e9  # bound for linear theory
 class CreepNodes(NamedTuple):
     """What the generator makes and the package ships.
 
-    Attributes
-    ----------
-    force : ndarray of float32, shape (N_RATIO + 1, N_THETA + 1, N_PSI, N_T + 1, 3)
-        T_x/(mu N), T_y/(mu N), M_z/(mu N sqrt(a b)), all over t.
-    kalker : ndarray, shape (N_RATIO + 1, 4)
-        c11, c22, c23, c33 of the same solver without slip.
+    `force`, shape (N_RATIO + 1, N_THETA + 1, N_PSI, N_T + 1, 3): T_x/(mu N), T_y/(mu N), M_z/(mu N
+    sqrt(a b)), all over t; `kalker`, shape (N_RATIO + 1, 4): c11, c22, c23, c33 of the same solver
+    without slip.
     """
 
     force: NDArray[np.float32]
@@ -69,15 +66,11 @@ class CreepNodes(NamedTuple):
 class CreepTable(NamedTuple):
     """What the time loop looks up.
 
-    Attributes
-    ----------
-    coefficients : ndarray of float32, one dimension
-        B-spline coefficients of the force over t, from shape (N_RATIO + 3, N_THETA + 3, N_PSI + 3,
-        N_T + 3, 4); last axis T_x, T_y, M_z and 0.  Half the size of float64: the look-up waits
-        for the memory, and 1e-7 of mu N is far below what the table is good for.
-    scale : ndarray, shape (N_RATIO + 3, 4)
-        B-spline coefficients over log(a/b) of the factors of q: c11, c22, and that of
-        ``phi sqrt(a b)``; last column zero.
+    `coefficients`: B-spline coefficients of the force over t, from shape (N_RATIO + 3, N_THETA + 3,
+    N_PSI + 3, N_T + 3, 4); last axis T_x, T_y, M_z and 0.  Half the size of float64: the look-up
+    waits for the memory, and 1e-7 of mu N is far below what the table is good for; `scale`, shape
+    (N_RATIO + 3, 4): B-spline coefficients over log(a/b) of the factors of q: c11, c22, and that of
+    ``phi sqrt(a b)``; last column zero.
     """
 
     coefficients: NDArray[np.float32]
@@ -269,16 +262,9 @@ def shipped_nodes() -> CreepNodes:
 def creep_table(nu: float = POISSON) -> CreepTable:
     """Table of the full theory for the look-up in the time loop.
 
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio.  The table was computed for 0.28; for others the creepages are scaled by
-        the ratios of Kalker's printed coefficients, which is exact for small creepage.
-
-    Returns
-    -------
-    CreepTable
-        B-spline coefficients; not to be changed.
+    `nu`: Poisson's ratio.  The table was computed for 0.28; for others the creepages are scaled by
+    the ratios of Kalker's printed coefficients, which is exact for small creepage. Returns B-spline
+    coefficients; not to be changed.
     """
     return table_of_nodes(shipped_nodes(), nu)
 

@@ -41,18 +41,10 @@ ARC_SPACING = 5e-5
 class WheelCurve:
     """Candidate points of a right wheel.
 
-    Attributes
-    ----------
-    y : ndarray, shape (n,)
-        Lateral position from the nominal rolling circle, field side positive [m].
-    u : ndarray, shape (n,)
-        Position along the axle from the wheelset's centre [m].
-    r : ndarray, shape (n,)
-        Radius [m].
-    t : ndarray, shape (n,)
-        Slope dr/du [1].
-    curvature : ndarray, shape (n_width, n)
-        Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
+    `y`, shape (n,): lateral position from the nominal rolling circle, field side positive [m]; `u`,
+    shape (n,): position along the axle from the wheelset's centre [m]; `r`, shape (n,): radius [m];
+    `t`, shape (n,): slope dr/du [1]; `curvature`, shape (n_width, n): curvature, convex positive,
+    averaged over `HALF_WIDTHS` [1/m].
     """
 
     y: Floats
@@ -66,16 +58,9 @@ class WheelCurve:
 class RailCurve:
     """A right rail in the track, as a function of the lateral position.
 
-    Attributes
-    ----------
-    Y0, dY : float
-        First node and spacing [m].
-    z : ndarray, shape (n,)
-        Height below the rail-top plane [m].
-    slope : ndarray, shape (n,)
-        dz/dY [1].
-    curvature : ndarray, shape (n_width, n)
-        Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
+    `Y0`, `dY`: first node and spacing [m]; `z`, shape (n,): height below the rail-top plane [m];
+    `slope`, shape (n,): dz/dY [1]; `curvature`, shape (n_width, n): curvature, convex positive,
+    averaged over `HALF_WIDTHS` [1/m].
     """
 
     Y0: float
@@ -95,17 +80,9 @@ def averaged_curvature(y: Floats, slope: Floats, sign: float) -> Floats:
 
     The weight is 3/(4 b) (1 - (s/b)^2) over the contour's length s within half a width b.
 
-    Parameters
-    ----------
-    y, slope : ndarray, shape (n,)
-        Lateral position, increasing [m], and dz/dy [1].
-    sign : float
-        1 for a rail (z down, convex upwards), -1 for a wheel.
-
-    Returns
-    -------
-    ndarray, shape (n_width, n)
-        Averages at the given points, for each of `HALF_WIDTHS` [1/m].
+    `y`, `slope`, shape (n,): lateral position, increasing [m], and dz/dy [1]; `sign`: 1 for a rail
+    (z down, convex upwards), -1 for a wheel. Returns shape (n_width, n), averages at the given
+    points, for each of `HALF_WIDTHS` [1/m].
     """
     length = np.concatenate(
         ([0.0], np.cumsum(np.diff(y) * np.sqrt(1.0 + (0.5 * (slope[1:] + slope[:-1])) ** 2)))
@@ -155,21 +132,10 @@ def wheel_curve(
 ) -> WheelCurve:
     """Candidate points of a wheel.
 
-    Parameters
-    ----------
-    profile : Profile
-        Wheel profile.
-    radius : float
-        Rolling radius at the nominal rolling circle [m].
-    tape_circle : float
-        Position of the nominal rolling circle from the wheelset's centre [m].
-    spacing : float
-        Distance of the candidates on level parts [m]; it shrinks with the slope t by the factor
-        (1 + t^2)^(-3/4), as the width of a contact in lateral projection does.
-
-    Returns
-    -------
-    WheelCurve
+    `profile`: wheel profile; `radius`: rolling radius at the nominal rolling circle [m];
+    `tape_circle`: position of the nominal rolling circle from the wheelset's centre [m]; `spacing`:
+    distance of the candidates on level parts [m]; it shrinks with the slope t by the factor (1 +
+    t^2)^(-3/4), as the width of a contact in lateral projection does.
     """
     y, z = profile.y, profile.z
     tip = int(np.argmax(z))
@@ -211,28 +177,10 @@ def tape_circle_position(back_to_back: float) -> float:
     return 0.5 * back_to_back - FLANGE_BACK
 
 
-def inclined(profile: Profile, inclination: float) -> tuple[Floats, Floats]:
-    """Points of a rail turned to the given inclination (total, as tangent), its top at z = 0."""
-    angle = np.arctan(inclination) - np.arctan(profile.inclination)
-    y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
-    z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
-    from scipy.interpolate import CubicSpline
-
-    highest = int(np.argmin(z))
-    around = slice(max(highest - 3, 0), highest + 4)
-    crown = CubicSpline(y[around], z[around])
-    roots = crown.derivative().roots(extrapolate=False)
-    top = float(np.min(crown(roots))) if roots.size else float(z.min())
-    return y, z - top
-
-
 def gauge_face(y: Floats, z: Floats, depth: float = GAUGE_DEPTH) -> float:
     """Innermost lateral position of a rail's gauge side within `depth` below its top [m].
 
-    Raises
-    ------
-    ValueError
-        If the contour does not reach that deep on the gauge side.
+    Raises ValueError: if the contour does not reach that deep on the gauge side.
     """
     top = int(np.argmin(z))
     if z[: top + 1].max() < depth:
@@ -246,17 +194,19 @@ def gauge_face(y: Floats, z: Floats, depth: float = GAUGE_DEPTH) -> float:
 def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Floats, Floats]:
     """Points of a right rail in the track: lateral position and height below the rail tops [m].
 
-    Parameters
-    ----------
-    profile, gauge, inclination
-        As `rail_curve`.
-
-    Raises
-    ------
-    InputError
-        If the profile does not reach down to where gauge is measured.
+    `profile`, `gauge`, `inclination`: as `rail_curve`. Raises InputError: if the profile does not
+    reach down to where gauge is measured.
     """
-    y, z = inclined(profile, inclination)
+    from scipy.interpolate import CubicSpline
+
+    angle = np.arctan(inclination) - np.arctan(profile.inclination)
+    y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
+    z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
+    highest = int(np.argmin(z))
+    around = slice(max(highest - 3, 0), highest + 4)
+    crown = CubicSpline(y[around], z[around])
+    roots = crown.derivative().roots(extrapolate=False)
+    z -= float(np.min(crown(roots))) if roots.size else float(z.min())
     try:
         face = gauge_face(y, z)
     except ValueError as error:
@@ -268,19 +218,9 @@ def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tup
 def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     """Place a right rail in the track.
 
-    Parameters
-    ----------
-    profile : Profile
-        Rail profile.
-    gauge : float
-        Distance of the gauge faces within 14 mm below the rail tops [m].
-    inclination : float
-        Inclination towards the track's centre, as tangent [1]; what the profile already carries
-        counts.
-
-    Returns
-    -------
-    RailCurve
+    `profile`: rail profile; `gauge`: distance of the gauge faces within 14 mm below the rail tops
+    [m]; `inclination`: inclination towards the track's centre, as tangent [1]; what the profile
+    already carries counts.
     """
     return contour_curve(*inclined_to_track(profile, gauge, inclination))
 
@@ -306,20 +246,9 @@ def contour_curve(y: Floats, z: Floats) -> RailCurve:
 def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float, pair: str) -> list[Fault]:
     """Why a wheelset of this wheel cannot run in this track, on both sides the same.
 
-    Parameters
-    ----------
-    wheel : WheelCurve
-    rail : RailCurve
-    gauge : float
-        For the message [m].
-    pair : str
-        What the message calls them.
-
-    Returns
-    -------
-    list of Fault
-        Empty if it can: in the middle of the track the tread stands on the rail, and pushed to one
-        side until the flange touches, the other wheel still has the rail under it.
+    `gauge`: for the message [m]; `pair`: what the message calls them. Returns nothing if it can: in
+    the middle of the track the tread stands on the rail, and pushed to one side until the flange
+    touches, the other wheel still has the rail under it.
     """
     steepest = float(wheel.t.min())
     # a wheel without flange has none to be in the way

@@ -35,16 +35,11 @@ _WAYS = ((1.0,), (0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0))
 class RollingGrid(NamedTuple):
     """Cells and matrices of one ellipse ratio, lengths over sqrt(a b).
 
-    Attributes
-    ----------
-    x, y, half_x, half_y : ndarray, shape (n_strip, n_cell)
-        Cell centres and half sides; cell 0 of a strip at the leading edge.
-    bound : ndarray, shape (n_strip, n_cell)
-        Traction bound over mu N/(a b), from the Hertz pressure; sums up to 1 with the cells' areas.
-    x_middle : ndarray, shape (n_strip, n_cell)
-        Where sticking is to be evaluated.
-    middle, centre : ndarray, shape (3, n, n)
-        Elastic slip per traction, see `railsim.kernels.halfspace.rolling_matrices`.
+    `x`, `y`, `half_x`, `half_y`, shape (n_strip, n_cell): cell centres and half sides; cell 0 of a
+    strip at the leading edge; `bound`, shape (n_strip, n_cell): traction bound over mu N/(a b),
+    from the Hertz pressure; sums up to 1 with the cells' areas; `x_middle`, shape (n_strip,
+    n_cell): where sticking is to be evaluated; `middle`, `centre`, shape (3, n, n): elastic slip
+    per traction, see `railsim.kernels.halfspace.rolling_matrices`.
     """
 
     x: Floats

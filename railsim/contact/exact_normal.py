@@ -14,7 +14,15 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from railsim.arrays import Floats, stretches
-from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
+from railsim.contact.curves import (
+    RailCurve,
+    WheelCurve,
+    misfits,
+    rail_curve,
+    tape_circle_position,
+    wheel_curve,
+)
+from railsim.contact.elastic import Patch
 from railsim.errors import InputError, ModelError
 from railsim.kernels import normal_contact as kernel
 from railsim.profiles.profile import Profile
@@ -25,59 +33,19 @@ LARGEST_OVERLAP = 1.5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class ExactPatch:
-    """One connected patch.
-
-    Attributes
-    ----------
-    N, N_z, N_y : float
-        Normal force (sum of pressures), its vertical and lateral components on the rail [N].
-    y : float
-        Lateral position of the pressure's centre, track axes [m].
-    angle : float
-        Contact angle of the resulting force, positive towards the flange [rad].
-    area : float
-        Area [m2].
-    p_max : float
-        Greatest pressure [Pa].
-    length, width : float
-        Extent along the track and along the rail's contour [m].
-    """
-
-    N: float
-    N_z: float
-    N_y: float
-    y: float
-    angle: float
-    area: float
-    p_max: float
-    length: float
-    width: float
-
-
-@dataclass(frozen=True, eq=False)
 class ExactContact:
     """Contact of a right wheel on a right rail.
 
-    Attributes
-    ----------
-    z : float
-        Vertical displacement of the wheelset's centre [m].
-    penetration : float
-        How far the wheel is below its first touch, vertically [m].
-    patches : tuple of ExactPatch
-        From the flange to the tread.
-    x, s : ndarray, shape (n_x,), (n_s,)
-        Element centres along the track and along the rail's contour (0 at its top) [m].
-    Y : ndarray, shape (n_s,)
-        Lateral position on the rail at `s`, track axes [m].
-    pressure : ndarray, shape (n_x, n_s)
-        Pressure [Pa].
+    `z`: vertical displacement of the wheelset's centre [m]; `penetration`: how far the wheel is
+    below its first touch, vertically [m]; `patches`: from the flange to the tread; `x`, `s`, shapes
+    (n_x,), (n_s,): element centres along the track and along the rail's contour (0 at its top) [m];
+    `Y`, shape (n_s,): lateral position on the rail at `s`, track axes [m]; `pressure`, shape (n_x,
+    n_s): pressure [Pa].
     """
 
     z: float
     penetration: float
-    patches: tuple[ExactPatch, ...]
+    patches: tuple[Patch, ...]
     x: Floats
     s: Floats
     Y: Floats
@@ -101,31 +69,18 @@ def exact_contact(
 ) -> ExactContact:
     """Normal contact of a right wheel on its rail under a given vertical force.
 
-    Parameters
-    ----------
-    wheel, rail : Profile
-        Profiles.
-    y, roll : float
-        Lateral displacement [m] and roll [rad] of the wheelset.
-    load : float
-        Vertical force of the wheel on the rail [N].
-    radius, gauge, inclination, back_to_back, G, nu
-        As `railsim.contact.build_contact_table`.
-    elements : int
-        Elements across the narrowest patch and half as many along its half length.
-
-    Returns
-    -------
-    ExactContact
-
-    Raises
-    ------
-    InputError
-        If the wheelset does not fit into the track.
-    ModelError
-        If the load is not reached or the solver does not converge.
+    `wheel`, `rail`: profiles; `y`, `roll`: lateral displacement [m] and roll [rad] of the wheelset;
+    `load`: vertical force of the wheel on the rail [N]; `radius`, `gauge`, `inclination`,
+    `back_to_back`, `G`, `nu`: as `railsim.contact.build_contact_table`; `elements`: elements across
+    the narrowest patch and half as many along its half length. Raises InputError: if the wheelset
+    does not fit into the track. Raises ModelError: if the load is not reached or the solver does
+    not converge.
     """
-    geometry = _Geometry(wheel, rail, y, roll, radius, gauge, inclination, back_to_back)
+    points = wheel_curve(wheel, radius, tape_circle_position(back_to_back), CANDIDATE_SPACING)
+    nodes = rail_curve(rail, gauge, inclination)
+    if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
+        raise InputError(faults)
+    geometry = _Geometry(points, nodes, y, roll, radius)
     E_star = G / (1.0 - nu)
     first = geometry.first_touch()
 
@@ -148,20 +103,8 @@ class _Geometry:
     """Wheel and rail in the track's cross-section."""
 
     def __init__(
-        self,
-        wheel: Profile,
-        rail: Profile,
-        y: float,
-        roll: float,
-        radius: float,
-        gauge: float,
-        inclination: float,
-        back_to_back: float,
+        self, points: WheelCurve, nodes: RailCurve, y: float, roll: float, radius: float
     ) -> None:
-        points = wheel_curve(wheel, radius, tape_circle_position(back_to_back), CANDIDATE_SPACING)
-        nodes = rail_curve(rail, gauge, inclination)
-        if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
-            raise InputError(faults)
         cosine, sine = np.cos(roll), np.sin(roll)
         lateral = y + points.u * cosine - points.r * sine
         depth = points.u * sine + points.r * cosine - radius
@@ -243,7 +186,7 @@ class _Geometry:
     @staticmethod
     def _patches(
         field: Floats, Y: Floats, angle: Floats, dx: float, ds: float
-    ) -> tuple[ExactPatch, ...]:
+    ) -> tuple[Patch, ...]:
         """Connected patches along s, with both halves."""
         patches = []
         for start, end in stretches(np.any(field, axis=0)):
@@ -253,7 +196,7 @@ class _Geometry:
             N_z = float(np.sum(line * np.cos(angle[start:end])))
             reaches = [_reach(column) for column in part.T]
             patches.append(
-                ExactPatch(
+                Patch(
                     N=float(line.sum()),
                     N_z=N_z,
                     N_y=N_y,

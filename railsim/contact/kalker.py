@@ -68,22 +68,9 @@ def kalker_coefficients(
     values at 0, 1/4 and 1/2 (Kalker's own rule, also that of CONTACT).  For g < 0.1 Kalker's
     asymptotic expressions times the factor that makes them meet the table at g = 0.1.
 
-    Parameters
-    ----------
-    a_over_b : array_like
-        Ratio of the semi-axes, along over across, > 0 [1].
-    nu : float
-        Poisson's ratio (of both bodies), 0 <= nu <= 0.5 [1].
-
-    Returns
-    -------
-    c11, c22, c23, c33 : ndarray, shape of a_over_b
-        Coefficients [1].
-
-    Raises
-    ------
-    ModelError
-        If a_over_b is not positive and finite or nu lies outside 0..0.5.
+    `a_over_b`: ratio of the semi-axes, along over across, > 0 [1]; `nu`: Poisson's ratio (of both
+    bodies), 0 <= nu <= 0.5 [1]. Returns `c11, c22, c23, c33`: coefficients [1]. Raises ModelError:
+    if a_over_b is not positive and finite or nu lies outside 0..0.5.
 
     Notes
     -----
@@ -103,39 +90,27 @@ def kalker_coefficients(
         raise ModelError(f"Kalker's coefficients need Poisson's ratio in 0..0.5, not {nu}")
     g = np.minimum(ratio, 1.0 / ratio)
     narrow = ratio <= 1.0
-    values = []
-    for number in range(4):
-        inside = np.where(
-            narrow,
-            _interpolated(_TABLE_NARROW, number, np.maximum(g, _G_MIN), nu),
-            _interpolated(_TABLE_LONG, number, np.maximum(g, _G_MIN), nu),
-        )
-        beyond = np.minimum(g, _G_MIN)
-        growth_narrow = _asymptote_narrow(number, beyond, nu) / _asymptote_narrow(
-            number, _G_MIN, nu
-        )
-        growth_long = _asymptote_long(number, beyond, nu) / _asymptote_long(number, _G_MIN, nu)
-        values.append(inside * np.where(narrow, growth_narrow, growth_long))
-    return values[0], values[1], values[2], values[3]
+    inside, beyond = np.maximum(g, _G_MIN), np.minimum(g, _G_MIN)
+
+    def coefficient(number: int) -> Floats:
+        found = [
+            _interpolated(table, number, inside, nu)
+            * (asymptote(number, beyond, nu) / asymptote(number, _G_MIN, nu))
+            for table, asymptote in _HALVES
+        ]
+        return np.where(narrow, *found)
+
+    return coefficient(0), coefficient(1), coefficient(2), coefficient(3)
 
 
 def creep_tables(nu: float = 0.28, n: int = 257) -> Floats:
     """Kalker's coefficients on a grid for the look-up inside the time loop.
 
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio [1].
-    n : int
-        Number of nodes, >= 2.
-
-    Returns
-    -------
-    table : ndarray, shape (n, 4)
-        c11, c22, c23, c33 at uniform nodes of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX
-        (1/24 <= a/b <= 24) [1].  Linear interpolation on 257 nodes follows `kalker_coefficients`
-        within 0.02 % but for the corners that it rounds (0.9 % at a/b = 0.2, 5 and 10); the
-        look-up keeps the end values outside.
+    `nu`: Poisson's ratio [1]; `n`: number of nodes, >= 2. Returns `table`, shape (n, 4): c11, c22,
+    c23, c33 at uniform nodes of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX (1/24 <= a/b
+    <= 24) [1].  Linear interpolation on 257 nodes follows `kalker_coefficients` within 0.02 % but
+    for the corners that it rounds (0.9 % at a/b = 0.2, 5 and 10); the look-up keeps the end values
+    outside.
     """
     u = np.linspace(-KALKER_U_MAX, KALKER_U_MAX, n)
     return np.ascontiguousarray(np.stack(kalker_coefficients((1.0 + u) / (1.0 - u), nu), axis=1))
@@ -182,3 +157,7 @@ def _asymptote_long(number: int, g: ArrayLike, nu: float) -> Floats:
     if number == 2:
         return np.asarray(2.0 * np.pi / (3.0 * g * np.sqrt(g) * d))
     return np.asarray(np.pi / 4.0 * (1.0 - nu * (log_term - 2.0) / d))
+
+
+# of the table and its limits: a/b up to 1, and beyond
+_HALVES = ((_TABLE_NARROW, _asymptote_narrow), (_TABLE_LONG, _asymptote_long))

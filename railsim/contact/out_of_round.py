@@ -39,16 +39,9 @@ SMALL_WAVE = 0.02  # share of the largest amplitude of a table's waves that is n
 class Surface:
     """One wheel's height over its angle, see `railsim.kernels.wheel_surface`.
 
-    Attributes
-    ----------
-    values : ndarray, shape (n_phi, n_y, 4)
-        e [m], e_phi [m], e_y [1], e_phi_y [1].
-    y : ndarray, shape (n_y,)
-        Lateral positions [m].
-    ahead : ndarray, shape (n_phi,)
-        Angle to the next flat [rad].
-    flat, wave : float
-        Lengths of the shortest flat and of the shortest wave all around [m], infinite without.
+    `values`, shape (n_phi, n_y, 4): e [m], e_phi [m], e_y [1], e_phi_y [1]; `y`, shape (n_y,):
+    lateral positions [m]; `ahead`, shape (n_phi,): angle to the next flat [rad]; `flat`, `wave`:
+    lengths of the shortest flat and of the shortest wave all around [m], infinite without.
     """
 
     values: Floats
@@ -61,16 +54,8 @@ class Surface:
 def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape: float) -> Surface:
     """Return the surface of a wheel with some deviations, which add up.
 
-    Parameters
-    ----------
-    parts : iterable of Uneven
-        Definitions.
-    radius : float
-        Nominal rolling radius [m].
-    rail : RailCurve
-        Its rail; only sections look at it.
-    tape : float
-        Position of the nominal rolling circle from the wheelset's centre [m].
+    `parts`: definitions; `radius`: nominal rolling radius [m]; `rail`: its rail; only sections look
+    at it; `tape`: position of the nominal rolling circle from the wheelset's centre [m].
     """
     parts = tuple(parts)
     resolved = [_lengths(part, radius) for part in parts]
@@ -196,14 +181,8 @@ def rolled_out(
 
     Around the wheel the sections are smoothed as across (`SMOOTHING_AROUND`).
 
-    Returns
-    -------
-    heights : ndarray, shape (n, y.size)
-        Over the angle, from 0 on, and the lateral position [m].
-    level : ndarray, shape (y.size,)
-        The same of the round wheel [m].
-    extent : (float, float)
-        Angles of the flat [rad].
+    Returns `heights`, shape (n, y.size): over the angle, from 0 on, and the lateral position [m];
+    `level`, shape (y.size,): the same of the round wheel [m]; `extent`: angles of the flat [rad].
     """
     from scipy.interpolate import CubicSpline, make_smoothing_spline
 

@@ -54,14 +54,8 @@ AHEAD = STEP * np.arange(-round(WINDOW / STEP), round(WINDOW / STEP) + 1)
 class RailPart:
     """One rail of the sections, as points of equal share over s.
 
-    Attributes
-    ----------
-    positions : ndarray, shape (n,)
-        Arc lengths of its sections [m].
-    contours : ndarray, shape (n, 2, k)
-        y and z of the points [m].
-    given : tuple of ndarray, shape (2, k)
-        y and z of the sections as they were given [m].
+    `positions`, shape (n,): arc lengths of its sections [m]; `contours`, shape (n, 2, k): y and z
+    of the points [m]; `given`, shape (2, k): y and z of the sections as they were given [m].
     """
 
     positions: Floats
@@ -135,10 +129,7 @@ def _upper(y: Floats, z: Floats) -> tuple[Floats, Floats]:
 def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
     """Cut sections into rails and join those that belong together.
 
-    Returns
-    -------
-    tuple of RailPart
-        Rails of two sections at least, in the order of their begins.
+    Returns rails of two sections at least, in the order of their begins.
     """
     chains: list[tuple[list[float], list[Floats]]] = []
     open_chains: list[int] = []
@@ -256,23 +247,11 @@ def rigid_gaps(
 ) -> Floats:
     """Heights at which parts of a wheel touch one rail, neither deforming.
 
-    Parameters
-    ----------
-    part : RailPart
-        Rail.
-    s : ndarray, shape (n_s,)
-        Positions of the axle, a whole number of `STEP` apart [m].
-    radius : float
-        Nominal rolling radius [m].
-    wheels : sequence of (ndarray, ndarray), shape (n,)
-        Lateral position from the nominal rolling circle, and radius, of each part of the wheel [m].
-    y : ndarray, shape (n_y,)
-        Lateral positions of the nominal rolling circle from y = 0 of the rails [m].
-
-    Returns
-    -------
-    ndarray, shape (n_s, n_wheels, n_y)
-        Height of the wheel below that on a level rail at the tops [m]; `NOWHERE` without contact.
+    `part`: rail; `s`, shape (n_s,): positions of the axle, a whole number of `STEP` apart [m];
+    `radius`: nominal rolling radius [m]; `wheels`, shape (n,): lateral position from the nominal
+    rolling circle, and radius, of each part of the wheel [m]; `y`, shape (n_y,): lateral positions
+    of the nominal rolling circle from y = 0 of the rails [m]. Returns shape (n_s, n_wheels, n_y),
+    height of the wheel below that on a level rail at the tops [m]; `NOWHERE` without contact.
     """
     present = [(k, u, r) for k, (u, r) in enumerate(wheels) if u.size]
     low, high = min(u[0] for _, u, _ in present), max(u[-1] for _, u, _ in present)
@@ -295,22 +274,10 @@ def kinematic_height(
 ) -> tuple[float, float, int]:
     """Height at which a wheel stands on rails without deforming them.
 
-    Parameters
-    ----------
-    parts : tuple of RailPart
-        Rails.
-    s, y : float
-        Position of the axle, and of the wheel's nominal rolling circle from y = 0 [m].
-    wheel : (ndarray, ndarray)
-        Lateral position from the nominal rolling circle, and radius [m].
-    radius : float
-        Nominal rolling radius [m].
-
-    Returns
-    -------
-    float, float, int
-        Height of the wheel below that on a level rail at the tops [m], contact ahead of the axle
-        [m], and which rail carries it.
+    `parts`: rails; `s`, `y`: position of the axle, and of the wheel's nominal rolling circle from y
+    = 0 [m]; `wheel`: lateral position from the nominal rolling circle, and radius [m]; `radius`:
+    nominal rolling radius [m]. Returns height of the wheel below that on a level rail at the tops
+    [m], contact ahead of the axle [m], and which rail carries it.
     """
     best = (np.inf, 0.0, -1)
     for number, part in enumerate(parts):

@@ -69,20 +69,10 @@ USUAL = np.abs(TRIED) < 7e-3  # those at which nodes are chosen
 class Range:
     """Sections of a rail over a range of the track, as one kind of wheel meets them.
 
-    Attributes
-    ----------
-    sections : SectionList
-        Sections, in their own arc length.
-    begin, end : float
-        Range in that arc length [m].
-    zero : float
-        Where y = 0 of the sections lies beside the middle of the track [m].
-    wheel, rail : Profile
-        The wheel's, and that of the plain rail.
-    plain : ContactTable
-        Contact of the two.
-    normal : "hertz" or "kik-piotrowski"
-        Kind of normal contact.
+    `sections`: sections, in their own arc length; `begin`, `end`: range in that arc length [m];
+    `zero`: where y = 0 of the sections lies beside the middle of the track [m]; `wheel`, `rail`:
+    the wheel's, and that of the plain rail; `plain`: contact of the two; `normal`: kind of normal
+    contact.
     """
 
     sections: SectionList
@@ -98,13 +88,9 @@ class Range:
 def cached_section_table(given: Range) -> ContactTable:
     """Contact tables of the rails of a range, built once and kept on disk.
 
-    Returns
-    -------
-    ContactTable
-        Its `values` are those of zones one after the other, three to a table: shape (n, 3, n_w,
-        n_roll, n_y, n_field); `description` has under `parts` for each rail its nodes: position
-        from the begin of the range [m], and the zones of tread, flange root and flange, -1 where
-        nothing is near.
+    Its `values` are those of zones one after the other, three to a table: shape (n, 3, n_w, n_roll,
+    n_y, n_field); `description` has under `parts` for each rail its nodes: position from the begin
+    of the range [m], and the zones of tread, flange root and flange, -1 where nothing is near.
     """
     digest = hashlib.sha256(generator_hash().encode())
     for module in (rail_sections.__file__, __file__):
@@ -135,7 +121,12 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
     rise = _height(generator, level) - _height(
         generator, rolled_curve(parts[running[0]], given.begin, radius, given.zero)
     )
-    cut = _Cut.of(plain)
+    # the middle of the plain table: ranges of the lateral position and of the roll
+    middle = plain.values.shape[2] // 2
+    inner, outer = (round((end - plain.y0) / plain.dy) for end in (-INWARDS, OUTWARDS))
+    y = np.arange(max(inner, 1), min(outer, plain.values.shape[3] - 3) + 1)
+    rolls = np.arange(middle - ROLLS, middle + ROLLS + 1)
+    cut = plain.values[:, :YAWS, rolls[0] : rolls[-1] + 1, y[0] : y[-1] + 1]
     wanted: list[tuple[RailPart, float]] = []
     known: dict[tuple[int, bytes], int] = {}
     rows: list[list[tuple[float, int, Floats]]] = []
@@ -156,12 +147,19 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
         rows.append(along)
     kept, described = _kept_zones(rows, given.begin)
 
+    # coefficients at the ends of another rail's table need a node more
+    stretched = plain.roll0 + plain.droll * np.arange(rolls[0] - 1, rolls[-1] + 2)
+    lateral = plain.y0 + plain.dy * np.arange(y[0] - 1, y[-1] + 2)
+
     def fill(task: tuple[int, list[int]]) -> Floats:
         table, zones = task
         if table == 0:
-            return cut.plain[zones]
+            return cut[zones]
         rail = rolled_curve(*wanted[table - 1], radius, given.zero)
-        return cut.table(generator, replace(rail, z=rail.z + rise))[zones]
+        rail = replace(rail, z=rail.z + rise)
+        nodes = lateral, unstretched_roll(stretched), plain.w[:YAWS]
+        fields = spline_coefficients(generator.values(rail, *nodes, 1), stretched)
+        return fields[zones, :, 1:-1, 1:-1]
 
     first = fill(kept[-1])  # compile once, not in every thread
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
@@ -173,8 +171,8 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
     return replace(
         plain,
         values=values,
-        y0=plain.y0 + plain.dy * cut.y.start,
-        roll0=plain.roll0 + plain.droll * cut.roll.start,
+        y0=float(plain.y0 + plain.dy * y[0]),
+        roll0=float(plain.roll0 + plain.droll * rolls[0]),
         w=plain.w[:YAWS],
         description={**about, "parts": described, "tape": tape, "rise": rise},
     )
@@ -217,37 +215,6 @@ def _height(generator: Generator, rail: RailCurve) -> float:
     """Height at which a wheelset in the middle of the track touches a rail [m]."""
     zero = np.zeros(1)
     return float(generator.values(rail, zero, zero, zero, 1)[:, 0, 0, 0, G].min())
-
-
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """The middle of a plain table: ranges of the lateral position and of the roll."""
-
-    whole: ContactTable
-    y: slice
-    roll: slice
-
-    @classmethod
-    def of(cls, plain: ContactTable) -> "_Cut":
-        middle = plain.values.shape[2] // 2
-        first, last = (round((end - plain.y0) / plain.dy) for end in (-INWARDS, OUTWARDS))
-        last = min(last, plain.values.shape[3] - 3)
-        return cls(plain, slice(max(first, 1), last + 1), slice(middle - ROLLS, middle + ROLLS + 1))
-
-    @property
-    def plain(self) -> Floats:
-        """The plain rail's table."""
-        return self.whole.values[:, :YAWS, self.roll, self.y]
-
-    def table(self, generator: Generator, rail: RailCurve) -> Floats:
-        """Table of another rail; coefficients at its ends need a node more."""
-        plain = self.whole
-        rolls = np.arange(self.roll.start - 1, self.roll.stop + 1)
-        stretched = plain.roll0 + plain.droll * rolls
-        s = plain.y0 + plain.dy * np.arange(self.y.start - 1, self.y.stop + 1)
-        roll = unstretched_roll(stretched)
-        values = generator.values(rail, s, roll, plain.w[:YAWS], 1)
-        return spline_coefficients(values, stretched)[:, :, 1:-1, 1:-1]
 
 
 def chosen_nodes(

@@ -27,11 +27,7 @@ OTHER_NORMAL: dict[Normal, Normal] = {"hertz": "kik-piotrowski", "kik-piotrowski
 class Pair:
     """Wheel and rail of one side with what places them.
 
-    Attributes
-    ----------
-    wheel, rail : Profile
-    gauge, inclination, back_to_back : float
-        As `railsim.contact.contact_geometry` [m], [1], [m].
+    `gauge`, `inclination`, `back_to_back`: as `railsim.contact.contact_geometry` [m], [1], [m].
     """
 
     wheel: Profile
@@ -195,12 +191,8 @@ def contact_summary(
 def conicity_over_gauge(found: ContactSummary, gauges: Sequence[float]) -> Floats:
     """Equivalent conicity, float64[gauge, amplitude], at the amplitudes of a summary [1].
 
-    Parameters
-    ----------
-    found : ContactSummary
-        Profiles and their position.
-    gauges : sequence of float
-        Track gauges [m]; NaN for one at which the wheels do not stand on the rails.
+    `found`: profiles and their position; `gauges`: track gauges [m]; NaN for one at which the
+    wheels do not stand on the rails.
     """
     left, right = found.pairs
     rows = []

@@ -90,29 +90,18 @@ Normal = Literal["hertz", "kik-piotrowski"]
 class TableGrid:
     """Extent and fineness of a contact table.
 
-    Attributes
-    ----------
-    s_min, s_max : float, optional
-        Range of the sheared lateral displacement [m]; default `table_range`.
-    ds : float
-        Its spacing [m].
-    roll_max, droll : float
-        Largest roll, both ways, and the spacing of its stretched coordinate, which is the roll's
-        own near the middle and four times as much at 20 mrad [rad].
-    yaw_max : float
-        Largest yaw [rad]; beyond, the table is continued linearly in w = yaw^2.
-    n_w : int
-        Number of nodes of w, from 0 to yaw_max^2, see `yaw_nodes`.
-    spacing : float
-        Distance of the candidates on the wheel's tread, at most `ds`: with nodes that lie closer
-        than the candidates the sums over the patch ripple from node to node [m].
-    reference : float
-        Load of the ellipse over which curvatures are averaged [N].
-    floor_ratio : float
-        Half relative curvature across is kept above about this share of that along [1].
-    normal : "hertz" or "kik-piotrowski"
-        Patch as the ellipse of the foundation's patch, or the non-elliptic patch under each of
-        the three loads, replaced by an ellipse of its area and proportions.
+    - `s_min`, `s_max`: range of the sheared lateral displacement [m]; default `table_range`
+    - `ds`: its spacing [m]
+    - `roll_max`, `droll`: largest roll, both ways, and the spacing of its stretched coordinate,
+      which is the roll's own near the middle and four times as much at 20 mrad [rad]
+    - `yaw_max`: largest yaw [rad]; beyond, the table is continued linearly in w = yaw^2
+    - `n_w`: number of nodes of w, from 0 to yaw_max^2, see `yaw_nodes`
+    - `spacing`: distance of the candidates on the wheel's tread, at most `ds`: with nodes that lie
+      closer than the candidates the sums over the patch ripple from node to node [m]
+    - `reference`: load of the ellipse over which curvatures are averaged [N]
+    - `floor_ratio`: half relative curvature across is kept above about this share of that along [1]
+    - `normal`: patch as the ellipse of the foundation's patch, or the non-elliptic patch under each
+      of the three loads, replaced by an ellipse of its area and proportions
     """
 
     s_min: float | None = None
@@ -419,12 +408,8 @@ def spline_coefficients(values: Floats, stretched: Floats) -> Floats:
     contact from one to the next, a spline through the values would swing; there they are the
     coefficients themselves.  Stiffnesses and axes are kept from falling below nothing.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_patch, n_w, n_roll, n_y, n_field)
-        Values at the nodes; those at the ends of an axis are taken as they are.
-    stretched : ndarray, shape (n_roll,)
-        Stretched roll of the nodes [rad].
+    `values`, shape (n_patch, n_w, n_roll, n_y, n_field): values at the nodes; those at the ends of
+    an axis are taken as they are; `stretched`, shape (n_roll,): stretched roll of the nodes [rad].
     """
     result = values.copy()
     near = 1.0 / (1.0 + (stretched / FINE_ROLL) ** 4)

@@ -41,10 +41,7 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:
     the rim on the field side to the side of the flange; where these borders would leave both ends
     with parts of the tread, the border of tread and root lies in between (`hollow_between`).
 
-    Returns
-    -------
-    ndarray, shape (3, n)
-        Windows adding up to 1 [1].
+    Returns shape (3, n), windows adding up to 1 [1].
     """
     angle = np.degrees(np.arctan(-wheel.t))
     start = int(np.argmin(np.abs(wheel.y)))
@@ -82,17 +79,9 @@ def hollow_between(
     touches.  Jumps of up to 22 mm are those of unworn profiles: their ends nearly meet under load
     and are one patch of the zone.
 
-    Parameters
-    ----------
-    wheel, rail : WheelCurve, RailCurve
-        Profiles.
-    window : ndarray, shape (3, n)
-        Windows that are to separate the branches.
-
-    Returns
-    -------
-    (float, float) or None
-        Positions on the wheel, that on the field side first [m]; None where there is no such jump.
+    `wheel`, `rail`: profiles; `window`, shape (3, n): windows that are to separate the branches.
+    Returns positions on the wheel, that on the field side first [m]; None where there is no such
+    jump.
     """
     reach = table_range(wheel, rail)[1]
     lateral = np.arange(-reach, reach, JUMP_SEARCH)

@@ -89,12 +89,17 @@ def even_points(y: Floats, z: Floats, spacing: float) -> Floats:
     return positions
 
 
-def s1002() -> Profile:
-    """Wheel profile S1002 of EN 13715, flange 32.5 mm thick and 28 mm high."""
+def _wheel(name: str, height: Height, source: str) -> Profile:
+    """Wheel profile of a contour from -70 to 60 mm [mm]."""
     # finely pre-sampled so that the distances along the nearly vertical flange back are right
     fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
-    y = even_points(fine, s1002_height(fine), SPACING)
-    return Profile("S1002", "wheel", 1e-3 * y, 1e-3 * s1002_height(y), "EN 13715, profile S1002")
+    y = even_points(fine, height(fine), SPACING)
+    return Profile(name, "wheel", 1e-3 * y, 1e-3 * height(y), source)
+
+
+def s1002() -> Profile:
+    """Wheel profile S1002 of EN 13715, flange 32.5 mm thick and 28 mm high."""
+    return _wheel("S1002", s1002_height, "EN 13715, profile S1002")
 
 
 HOLLOW_DEPTH, HOLLOW_HALF = 0.9, 35.0
@@ -131,7 +136,6 @@ def cone(taper: float) -> Profile:
     centre_y, centre_z = np.linalg.solve(lines, right_side)
     start = centre_y - radius * taper / np.hypot(taper, 1.0)
     end = centre_y + radius * slope / np.hypot(slope, 1.0)
-    fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
 
     def height(y: Floats) -> Floats:
         fillet = centre_z - np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
@@ -139,14 +143,9 @@ def cone(taper: float) -> Profile:
         flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
         return np.where(y > start, -taper * y, np.where(y > end, fillet, flange))
 
-    y = even_points(fine, height(fine), SPACING)
-    return Profile(
-        f"cone 1:{1.0 / taper:.0f}",
-        "wheel",
-        1e-3 * y,
-        1e-3 * height(y),
-        f"cone of 1:{1.0 / taper:.0f}, flank, tip and back of S1002, fillet of 13 mm",
-    )
+    ratio = f"1:{1.0 / taper:.0f}"
+    source = f"cone of {ratio}, flank, tip and back of S1002, fillet of 13 mm"
+    return _wheel(f"cone {ratio}", height, source)
 
 
 def arc_chain_rail(
@@ -234,10 +233,7 @@ DEFINITIONS: dict[str, Callable[[], Profile]] = {
     "S1002_hollow": s1002_hollow,
     "cone_1in20": partial(cone, 1 / 20),
     "cone_1in40": partial(cone, 1 / 40),
-    "60E1": partial(en_rail, "60E1"),
-    "60E2": partial(en_rail, "60E2"),
-    "54E1": partial(en_rail, "54E1"),
-    "49E1": partial(en_rail, "49E1"),
+    **{name: partial(en_rail, name) for name in RAIL_HEADS},
     "benchmark": rail_benchmark,
 }
 

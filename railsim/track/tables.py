@@ -74,11 +74,15 @@ class _Line:
 
 def _coefficients(line: _Line) -> Floats:
     """Position, heading, grade and cant angle over the cells, float64[n_cells, 6, 4]."""
-    found = aligned_zeros((line.cells, 6, 4))
-    for row, (value, rate) in enumerate(_centre_line(line.alignment, line.s, line.before)):
+    found, alignment, s = aligned_zeros((line.cells, 6, 4)), line.alignment, line.s
+    rows = [
+        *_centre_line(alignment, s, line.before),
+        (alignment.heading(s), alignment.curvature(s)),
+        (alignment.grade_angle(s), alignment.grade_angle_rate(s)),
+        (alignment.cant_angle(s), alignment.cant_angle_rate(s)),
+    ]
+    for row, (value, rate) in enumerate(rows):
         found[:, row] = hermite(value, rate, line.ds)
-    for row, (value, rate) in enumerate(_angles(line.alignment, line.s)):
-        found[:, 3 + row] = hermite(value, rate, line.ds)
     return found
 
 
@@ -101,14 +105,6 @@ def hermite(value: Floats, rate: Floats, ds: float) -> Floats:
     c2 = (3.0 * step - 2.0 * rate[:-1] - rate[1:]) / ds
     c3 = (rate[:-1] + rate[1:] - 2.0 * step) / ds**2
     return np.stack((value[:-1], rate[:-1], c2, c3), axis=-1)
-
-
-def _angles(alignment: Alignment, s: Floats) -> list[tuple[Floats, Floats]]:
-    return [
-        (alignment.heading(s), alignment.curvature(s)),
-        (alignment.grade_angle(s), alignment.grade_angle_rate(s)),
-        (alignment.cant_angle(s), alignment.cant_angle_rate(s)),
-    ]
 
 
 def _direction(alignment: Alignment, s: Floats) -> Floats:
