@@ -27,10 +27,11 @@ from railsim.kernels.system import ARC_LENGTH, System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import POSITION, circle, left_out, placed
 from railsim.linear.coordinates import coordinates
+from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
-from railsim.model.assembly import Model, assemble, check_fixed
+from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
 from railsim.model.work import work_arrays
@@ -44,7 +45,6 @@ from railsim.track.tables import track_tables
 Progress = Callable[[float], None]
 
 SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m
-SPEED_RANGE = (0.5, 150.0)  # m/s
 FAILED, NEWTON, TIME = range(3)
 SETTLING = 60.0  # s, longest time integration of a point
 COLUMNS = (
@@ -304,8 +304,13 @@ class _Search:
         balance = equilibrium(assembled, WALKING_PACE)
         self.model = balance.model
         self.Q0 = balance.Q0
-        omitted = left_out(track, settings, assembled.wheels)
-        self.remarks = (*balance.remarks, *_remarks(balance.model), *omitted)
+        self.remarks = balance.remarks
+        if pads := int(np.count_nonzero(self.model.system.internal.kind == PAD)):
+            self.remarks += (
+                f"{pads} friction elements hold nothing: what the way into the curve leaves in "
+                "them, up to their limits, is left out",
+            )
+        self.remarks += left_out(track, settings, assembled.wheels)
         self.parts = parts_of(self.model, coordinates(self.model))
         values = np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)])
         self._rest = self._last = values, placed(balance.state)
@@ -422,17 +427,6 @@ class _Search:
         found.steering[index] = state[[6 * b + YAW for b in frames]]
         if self.parts.cars:
             found.car_roll[index] = state[6 * self.parts.cars[0] + ROLL]
-
-
-def _remarks(model: Model) -> tuple[str, ...]:
-    """What steady states leave out."""
-    pads = int(np.count_nonzero(model.system.internal.kind == PAD))
-    if not pads:
-        return ()
-    return (
-        f"{pads} friction elements hold nothing: what the way into the curve leaves in them, up to "
-        "their limits, is left out",
-    )
 
 
 def _contact_positions(solver: SteadyRolling, wheelsets: int) -> Floats:
