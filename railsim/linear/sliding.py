@@ -102,7 +102,7 @@ class SlidingPath:
     def to(self, goal: float) -> None:
         """Go to another share of the load in one step, or in halves of it.
 
-        Raises NotConverged Says at which share; state and share are those reached.
+        Raises NotConverged: says at which share; state and share are those reached.
         """
         step = goal - self.share
         while self.share != goal:

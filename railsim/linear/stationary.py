@@ -114,7 +114,7 @@ def twist_loop(
 
     Without dry friction both directions give the same, and only the two twists are computed.
 
-    `balance`, `track`, `heights`, `held`: as in `on_twist`. Raises NotConverged There is no steady
+    `balance`, `track`, `heights`, `held`: as in `on_twist`. Raises NotConverged: there is no steady
     state on the way, or the loop does not close.
     """
     raised = np.asarray(heights, dtype=float)

@@ -62,7 +62,7 @@ class SteadyRolling:
         """Return the steady state nearest to a guess.
 
         `guess`: positions and spin rates count; position and time are kept; `speed`: [m/s]. Raises
-        NotConverged Names the largest remaining accelerations.
+        NotConverged: names the largest remaining accelerations.
         """
         state = self.prepared(guess, speed)
         forces = self._forces(state)
@@ -78,7 +78,7 @@ class SteadyRolling:
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a state, forces into `work`.
 
-        Raises NotConverged The state lies outside the range of the model.
+        Raises NotConverged: the state lies outside the range of the model.
         """
         return np.asarray(self._evaluated(state[None])[0])
 
@@ -182,7 +182,7 @@ def led(
     `model`: with preloads; `along`: share of the way, above 0 to 1, to the system and the speed
     there; `start`: state at share 0; `smallest`: step at which the path ends for lack of
     convergence. Returns: at share 1, and the solver with the forces there in `work`. Raises
-    NotConverged Says how far it came.
+    NotConverged: says how far it came.
     """
     done, step = 0.0, 1.0
     before, now = start, start

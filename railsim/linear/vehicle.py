@@ -113,7 +113,7 @@ class LinearVehicle:
     - `remarks`: remarks for the reader of the results
     - `sticking`: number of friction elements, which a linearisation takes as sticking
 
-    Raises InputError: something is out of range. ModelError The vehicle has no equilibrium.
+    Raises InputError: something is out of range. ModelError: the vehicle has no equilibrium.
     """
 
     def __init__(

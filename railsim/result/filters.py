@@ -212,8 +212,8 @@ class StreamingPercentiles:
     Counts values in cells of equal width; where a value falls outside, the cells are made twice as
     wide, so that there are never more than `cells` of them.
 
-    `width`: Present width: no percentile is further than this from one of the whole record.
-    `width`: Width of the cells at the start. `cells`: Number of cells, even.
+    `width`: Width of the cells at the start, later their present one: no percentile is further than
+    this from one of the whole record. `cells`: Number of cells, even.
 
     Examples
     --------

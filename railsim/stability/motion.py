@@ -165,7 +165,7 @@ class VehicleMotion:
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
         """Move a state of the time loop by a chunk of steps; number of records.
 
-        Raises LeftRange The motion leaves the range of the model.
+        Raises LeftRange: the motion leaves the range of the model.
         """
         status, where, _, rows = time_loop(
             system,

@@ -31,7 +31,7 @@ STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailmen
 def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
     """Excite hunting at a speed by a disturbance [m] and let it settle; one that derails is halved.
 
-    Raises LeftRange Even a small disturbance ends in a derailment.
+    Raises LeftRange: even a small disturbance ends in a derailment.
     """
     while True:
         try:
