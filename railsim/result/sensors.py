@@ -6,7 +6,7 @@ its y axis so reads a_y - g sin(cant angle + roll): the uncompensated lateral ac
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def _placed(body: FlatBody, point: tuple[float, float, float], origin: float) ->
     """Return the sensor at a point in vehicle axes; `origin` is that of the distance [m]."""
     x, y, z = body.position
     arm = (point[0] - x, point[1] - y, point[2] - z)
-    return Sensor(body.name, x - origin, arm)
+    return Sensor(body.name, x - origin, arm, axlebox=body.kind == "wheelset")
 
 
 def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
@@ -89,8 +89,7 @@ def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
             arm = (0.0, sign * across, 0.0)
             found[f"axlebox_{number}_{side}"] = Sensor(wheelset.name, x - origin, arm, axlebox=True)
     for name, point in vehicle.sensors.items():
-        sensor = _placed(bodies[point.body], point.position, origin)
-        found[name] = replace(sensor, axlebox=bodies[point.body].kind == "wheelset")
+        found[name] = _placed(bodies[point.body], point.position, origin)
     return found
 
 
