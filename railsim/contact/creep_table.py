@@ -137,12 +137,13 @@ def linear_coefficients(ratio: float) -> tuple[float, float, float, float]:
     return float(c11), float(c22), float(c23), float(c33)
 
 
-def full_sliding(ratio: float, xi: Floats, n: int = 200) -> Floats:
+def full_sliding(ratio: float, xi: Floats) -> Floats:
     """Force where everything slides along the rigid slip, shape (..., 3) for xi of that shape.
 
-    Hertz pressure summed over n strips of n cells at Gauss-like points (cosine along the strip).
+    Hertz pressure summed over 200 strips of 200 cells at Gauss-like points (cosine along the
+    strip).
     """
-    a, b = np.sqrt(ratio), 1.0 / np.sqrt(ratio)
+    n, a, b = 200, np.sqrt(ratio), 1.0 / np.sqrt(ratio)
     angle = (np.arange(n) + 0.5) * np.pi / n
     y = np.cos(angle)  # both directions: weights of Gauss-Chebyshev type
     length = np.sin(angle)

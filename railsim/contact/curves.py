@@ -177,16 +177,16 @@ def tape_circle_position(back_to_back: float) -> float:
     return 0.5 * back_to_back - FLANGE_BACK
 
 
-def gauge_face(y: Floats, z: Floats, depth: float = GAUGE_DEPTH) -> float:
-    """Innermost lateral position of a rail's gauge side within `depth` below its top [m].
+def gauge_face(y: Floats, z: Floats) -> float:
+    """Innermost lateral position of a rail's gauge side within `GAUGE_DEPTH` below its top [m].
 
     Raises ValueError: if the contour does not reach that deep on the gauge side.
     """
     top = int(np.argmin(z))
-    if z[: top + 1].max() < depth:
+    if z[: top + 1].max() < GAUGE_DEPTH:
         raise ValueError(f"the gauge side ends {1e3 * z[: top + 1].max():.1f} mm below the top")
-    below = int(np.flatnonzero(z[: top + 1] >= depth)[-1])
-    share = (depth - z[below + 1]) / (z[below] - z[below + 1])
+    below = int(np.flatnonzero(z[: top + 1] >= GAUGE_DEPTH)[-1])
+    share = (GAUGE_DEPTH - z[below + 1]) / (z[below] - z[below + 1])
     crossing = y[below + 1] + share * (y[below] - y[below + 1])
     return float(min(crossing, y[below + 1 : top + 1].min()))
 

@@ -91,14 +91,12 @@ class LoadedContact:
     patches: tuple[Patch, ...]
 
 
-def loaded_contact(
-    table: ContactTable, y: float, roll: float, load: float, yaw: float = 0.0
-) -> LoadedContact:
-    """Patches of a right wheel under a vertical load.
+def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> LoadedContact:
+    """Patches of a right wheel under a vertical load, without yaw.
 
-    `table`: contact table; `y`, `roll`, `yaw`: lateral displacement [m], roll and yaw [rad] of the
-    wheelset; `load`: vertical force on the rail [N]. Raises ModelError: if the position lies
-    outside of the table or the load is not positive.
+    `table`: contact table; `y`, `roll`: lateral displacement [m] and roll [rad] of the wheelset;
+    `load`: vertical force on the rail [N]. Raises ModelError: if the position lies outside of the
+    table or the load is not positive.
     """
     if not load > 0.0:
         raise ModelError(f"a load of {load:g} N presses no wheel on a rail")
@@ -112,11 +110,10 @@ def loaded_contact(
         table.w,
     )
     stretched, roll_slope = stretched_roll(roll)
-    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, yaw * yaw)
-    if where != INSIDE or tw > 1.0:
+    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, 0.0)
+    if where != INSIDE:
         raise ModelError(
-            f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad and yaw {1e3 * yaw:.2f} mrad "
-            "lies outside of the contact table"
+            f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad lies outside of the table"
         )
     weights, flat = np.empty(N_WEIGHT), np.empty(N_PATCH * LOOK_UP_SIZE)
     cell_weights(arrays, ty, tr, roll_slope, weights)

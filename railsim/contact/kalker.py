@@ -103,16 +103,15 @@ def kalker_coefficients(
     return coefficient(0), coefficient(1), coefficient(2), coefficient(3)
 
 
-def creep_tables(nu: float = 0.28, n: int = 257) -> Floats:
+def creep_tables(nu: float = 0.28) -> Floats:
     """Kalker's coefficients on a grid for the look-up inside the time loop.
 
-    `nu`: Poisson's ratio [1]; `n`: number of nodes, >= 2. Returns `table`, shape (n, 4): c11, c22,
-    c23, c33 at uniform nodes of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX (1/24 <= a/b
-    <= 24) [1].  Linear interpolation on 257 nodes follows `kalker_coefficients` within 0.02 % but
-    for the corners that it rounds (0.9 % at a/b = 0.2, 5 and 10); the look-up keeps the end values
-    outside.
+    `nu`: Poisson's ratio [1]. Returns `table`, shape (257, 4): c11, c22, c23, c33 at uniform nodes
+    of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX (1/24 <= a/b <= 24) [1]. Linear
+    interpolation on 257 nodes follows `kalker_coefficients` within 0.02 % but for the corners that
+    it rounds (0.9 % at a/b = 0.2, 5 and 10); the look-up keeps the end values outside.
     """
-    u = np.linspace(-KALKER_U_MAX, KALKER_U_MAX, n)
+    u = np.linspace(-KALKER_U_MAX, KALKER_U_MAX, 257)
     return np.ascontiguousarray(np.stack(kalker_coefficients((1.0 + u) / (1.0 - u), nu), axis=1))
 
 

@@ -105,7 +105,7 @@ def cached_section_table(given: Range) -> ContactTable:
     return kept_table(digest.hexdigest(), lambda: section_table(given))
 
 
-def section_table(given: Range, workers: int | None = None) -> ContactTable:
+def section_table(given: Range) -> ContactTable:
     """As `cached_section_table`, built anew."""
     plain, about = given.plain, given.plain.description
     gauge, inclination, apart = (
@@ -162,7 +162,7 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
         return fields[zones, :, 1:-1, 1:-1]
 
     first = fill(kept[-1])  # compile once, not in every thread
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = [*pool.map(fill, kept[:-1]), first]
     missing = -sum(map(len, found)) % N_PATCH
     values = np.concatenate([*found, np.zeros((missing, *first.shape[1:]))])

@@ -19,7 +19,7 @@ What this model does not hold of the contact forces of a wheelset is an input to
 of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belong to.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,18 +76,17 @@ class TrackResponse:
     own: Floats
     steady: Floats
 
-    def over(self, wave_numbers: Floats, chosen: Sequence[int] | None = None) -> Complexes:
+    def over(self, wave_numbers: Floats) -> Complexes:
         """Frequency response H over the angular wave number, complex128[k, output, input].
 
         Inputs are the quantities, then the unknown accelerations of the wheelsets.
 
-        `wave_numbers`: 2 pi over the wavelength [rad/m]; `chosen`: outputs; all by default.
+        `wave_numbers`: 2 pi over the wavelength [rad/m].
         """
-        out = slice(None) if chosen is None else list(chosen)
-        C, D = (self.C + self.R @ self.A)[out], self.D[out]
-        D = D + np.einsum("mn,nwqo->mwqo", self.R[out], self.B)
+        C = self.C + self.R @ self.A
+        D = self.D + np.einsum("mn,nwqo->mwqo", self.R, self.B)
         unknown = self.rows.ravel()
-        direct = self.own.reshape(len(self.own), -1)[out] + self.R[out][:, unknown]
+        direct = self.own.reshape(len(self.own), -1) + self.R[:, unknown]
         found = np.empty((len(wave_numbers), len(C), len(QUANTITIES) + len(unknown)), complex)
         T, Z = schur(self.A, output="complex")
         B = np.einsum("nm,nwqo->mwqo", Z.conj(), self.B)

@@ -148,18 +148,19 @@ def cone(taper: float) -> Profile:
     return _wheel(f"cone {ratio}", height, source)
 
 
+FLANK_DEPTH = 38.0
+"""Depth below the crown to which the flank of a rail is drawn [mm]."""
+
+
 def arc_chain_rail(
-    half_widths: tuple[float, ...],
-    radii: tuple[float, ...],
-    flank_slope: float = 0.05,
-    depth: float = 38.0,
+    half_widths: tuple[float, ...], radii: tuple[float, ...], flank_slope: float = 0.05
 ) -> tuple[Floats, Floats]:
     """Rail head of tangent arcs and a straight flank, symmetric about its axis.
 
     `half_widths`: distances from the axis at which each arc but the last meets the next one [mm];
     `radii`: radii from the crown to the gauge corner [mm]; `flank_slope`: flank's inclination to
-    the vertical [1]; `depth`: depth below the crown to which the flank is drawn [mm]. Returns: `y,
-    z` (shape (n,)): contour from the left flank to the right one, z down from the crown [mm].
+    the vertical [1]. Returns: `y, z` (shape (n,)): contour from the left flank to the right one, z
+    down from the crown [mm].
     """
     angles, centre = [0.0], [(0.0, radii[0])]
     for i, half_width in enumerate(half_widths):
@@ -178,8 +179,8 @@ def arc_chain_rail(
         y_parts.append(centre[i][0] + radius * np.sin(angle_points))
         z_parts.append(centre[i][1] - radius * np.cos(angle_points))
     y_end, z_end = y_parts[-1][-1], z_parts[-1][-1]
-    n = int(np.ceil((depth - z_end) / SPACING))
-    z_flank = np.linspace(z_end, depth, n + 1)[1:]
+    n = int(np.ceil((FLANK_DEPTH - z_end) / SPACING))
+    z_flank = np.linspace(z_end, FLANK_DEPTH, n + 1)[1:]
     y_parts.append(y_end + flank_slope * (z_flank - z_end))
     z_parts.append(z_flank)
     y, z = np.concatenate(y_parts), np.concatenate(z_parts)

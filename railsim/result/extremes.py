@@ -334,7 +334,7 @@ def _settling(values: Floats) -> Floats:
 
 def _largest(result: Result, name: str, array: Floats, time: float, distance: float) -> Peak:
     """Largest magnitude over the dimensions of a quantity."""
-    index = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
+    index = _extreme(array, "abs")
     labels = _labels(result, name, index)
     return Peak(result.quantities[name], float(array[index]), labels, time, distance)
 

@@ -23,6 +23,7 @@ from railsim.arrays import Complexes, Floats
 Response = Callable[[Floats], Complexes | Floats]
 
 BLOCK = 2**16  # samples of a block at least
+CELLS = 2**14  # of percentiles, an even number
 REACH = 6.0
 """Periods of the lowest corner after which a Butterworth filter of order 4 has forgotten
 (its slowest part has fallen to exp(-2 pi 0.383 6) = 5e-7)."""
@@ -210,10 +211,10 @@ class StreamingPercentiles:
     """Percentiles of a stream of any length within a stated bound.
 
     Counts values in cells of equal width; where a value falls outside, the cells are made twice as
-    wide, so that there are never more than `cells` of them.
+    wide, so that there are never more than `CELLS` of them.
 
     `width`: Width of the cells at the start, later their present one: no percentile is further than
-    this from one of the whole record. `cells`: Number of cells, even.
+    this from one of the whole record.
 
     Examples
     --------
@@ -224,9 +225,9 @@ class StreamingPercentiles:
     True
     """
 
-    def __init__(self, width: float, cells: int = 2**14) -> None:
+    def __init__(self, width: float) -> None:
         self.width = width
-        self._counts = np.zeros(cells, dtype=np.int64)
+        self._counts = np.zeros(CELLS, dtype=np.int64)
         self.count = 0
 
     def add(self, values: Floats) -> None:
