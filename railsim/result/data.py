@@ -212,7 +212,10 @@ class Result:
     def _index(self, dim: str, label: str | int | None) -> int | slice:
         if label is None:
             return slice(None)
-        if dim == "time" and not isinstance(label, str):
+        if dim == "time":
+            instants = len(self["time"])
+            if isinstance(label, str) or not -instants <= label < instants:
+                raise KeyError(f"no instant {label!r}; 0 to {instants - 1}")
             return label
         return index_of(dim, self._coordinates[dim], label)
 
