@@ -14,8 +14,9 @@ from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import check_folder
 
 if TYPE_CHECKING:
+    from railsim.arrays import Floats
     from railsim.contact.creep_curves import Patch
-    from railsim.contact.summary import Array, ContactSummary
+    from railsim.contact.summary import ContactSummary
     from railsim.description import Description
 
 TABLES = ("functions.csv", "conicity.csv", "patches.csv")
@@ -273,7 +274,7 @@ def _write(output: Output, found: "ContactSummary") -> None:
 
 
 def _write_map(
-    output: Output, found: "ContactSummary", gauges: list[float], values: "Array"
+    output: Output, found: "ContactSummary", gauges: list[float], values: "Floats"
 ) -> None:
     from railsim.contact.tables import conicity_map_table
     from railsim.plot.contact import conicity_map_figure

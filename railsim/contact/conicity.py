@@ -18,16 +18,15 @@ Source: EN 15302:2008+A1, annex B and C; J. Klingel (1883).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 def equivalent_conicity(
     y: ArrayLike, delta_r: ArrayLike, amplitudes: ArrayLike, track: float = 1.5
-) -> Array:
+) -> Floats:
     """Equivalent conicity of a rolling radius difference function.
 
     Parameters
@@ -74,7 +73,7 @@ def equivalent_conicity(
     return np.array([_conicity(y, delta_r, potential, float(a)) for a in wanted])
 
 
-def _value(y: Array, delta_r: Array, potential: Array, position: float) -> tuple[float, float]:
+def _value(y: Floats, delta_r: Floats, potential: Floats, position: float) -> tuple[float, float]:
     """Radius difference and potential at a position within the range."""
     i = min(max(int(np.searchsorted(y, position, side="right")) - 1, 0), y.size - 2)
     d = position - y[i]
@@ -82,7 +81,7 @@ def _value(y: Array, delta_r: Array, potential: Array, position: float) -> tuple
     return float(delta_r[i] + slope * d), float(potential[i] + d * (delta_r[i] + 0.5 * slope * d))
 
 
-def _orbit_centre(y: Array, delta_r: Array, potential: Array, amplitude: float) -> float | None:
+def _orbit_centre(y: Floats, delta_r: Floats, potential: Floats, amplitude: float) -> float | None:
     """Middle of the oscillation with the given amplitude: the same potential at both ends."""
     lower, upper = y[0] + amplitude, y[-1] - amplitude
     if lower > upper + 1e-12:
@@ -111,7 +110,7 @@ def _orbit_centre(y: Array, delta_r: Array, potential: Array, amplitude: float) 
     return 0.5 * (a + b)
 
 
-def _conicity(y: Array, delta_r: Array, potential: Array, amplitude: float) -> float:
+def _conicity(y: Floats, delta_r: Floats, potential: Floats, amplitude: float) -> float:
     """Equivalent conicity for one amplitude [1]."""
     centre = _orbit_centre(y, delta_r, potential, amplitude)
     if centre is None:
@@ -134,7 +133,7 @@ def _conicity(y: Array, delta_r: Array, potential: Array, amplitude: float) -> f
     return float(0.5 * np.pi**2 / time**2)
 
 
-def _travel_time(y: Array, force: Array, speed: Array) -> float:
+def _travel_time(y: Floats, force: Floats, speed: Floats) -> float:
     """Sum of the exact times over pieces on which the force is linear in y."""
     dy = np.diff(y)
     f0, f1, v0, v1 = force[:-1], force[1:], speed[:-1], speed[1:]

@@ -16,12 +16,10 @@ outwards (docs/validation/contact_geometry.md compares with the boundary-element
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.kernels import contact_table as fields
 from railsim.kernels.contact_table import HALF_LOAD, N_PATCH
-
-Floats = NDArray[np.float64]
 
 REFERENCE_LOAD = 30e3  # N, half a wheel's load on each patch of a pair
 REFERENCE_ROOT = 8e-3  # sqrt(m), of the penetration there
@@ -34,17 +32,8 @@ def coupling(values: Floats, G: float, nu: float) -> Floats:
     For each pair the distance is taken where both touch at once, with the wheelset neither rolled
     nor yawed; it is kept constant, so that the forces stay the gradient of a potential.
 
-    Parameters
-    ----------
-    values : float64[patch, w, roll, s, field]
-        Contact table.
-    G, nu : float
-        Shear modulus [Pa] and Poisson's ratio [1].
-
-    Returns
-    -------
-    float64[patch - 1]
-        Loss of vertical penetration per vertical force on the neighbour [m/N].
+    `values`: contact table; `G`, `nu`: shear modulus [Pa] and Poisson's ratio [1]. Returns loss of
+    vertical penetration per vertical force on the neighbour [m/N].
     """
     line = values[:, 0, values.shape[2] // 2]
     stiffness = line[..., fields.K] + REFERENCE_ROOT * line[..., fields.K2]
@@ -79,10 +68,7 @@ def coupling(values: Floats, G: float, nu: float) -> Floats:
 def mean_inverse_distance(distance: float, semi_axis: float) -> float:
     """Mean of 1/sqrt(D^2 + x^2) over the line load 3/(4a) (1 - x^2/a^2), |x| < a [1/m].
 
-    Parameters
-    ----------
-    distance, semi_axis : float
-        D > 0 across the rail, a along it [m].
+    `distance`, `semi_axis`: D > 0 across the rail, a along it [m].
 
     Examples
     --------

@@ -16,8 +16,9 @@ import warnings
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
@@ -26,8 +27,6 @@ from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.patches import CreepLaw, CreepScratch, Patches
-
-Array = NDArray[np.float64]
 
 LAWS = tuple(name for name, law in CREEP_LAWS.items() if not law.measured)
 """Names of the creep laws that need no curve of the user's own."""
@@ -44,9 +43,9 @@ class CreepForce(NamedTuple):
         Moment about the contact normal at the patch's centre, on the rail [N m].
     """
 
-    T_x: Array
-    T_y: Array
-    M_z: Array
+    T_x: Floats
+    T_y: Floats
+    M_z: Floats
 
 
 def creep_force(
@@ -197,18 +196,10 @@ def creep_law(
 ) -> CreepLaw:
     """Creep law as the kernels take it, with its table or curve.
 
-    Parameters
-    ----------
-    name : str
-        One of `railsim.definitions.creep_law.CREEP_LAWS`.
-    grid : (int, int)
-        Cells of a patch along and across.
-    G, nu : float
-        Shear modulus [Pa], Poisson's ratio [1].
-    third_body : (float, float)
-        Reduction of Kalker's coefficients, and Polach's further factor for the area of slip [1].
-    adhesion_curve : array_like, shape (k, 2), optional
-        Creepage and T/(mu N) [1].
+    `name`: one of `railsim.definitions.creep_law.CREEP_LAWS`; `grid`: cells of a patch along and
+    across; `G`, `nu`: shear modulus [Pa], Poisson's ratio [1]; `third_body`: reduction of Kalker's
+    coefficients, and Polach's further factor for the area of slip [1]; `adhesion_curve`, shape (k,
+    2): creepage and T/(mu N) [1].
     """
     table = creep_table(nu) if name == "table" else NO_TABLE
     curve = np.zeros((0, 2)) if adhesion_curve is None else np.array(adhesion_curve, dtype=float)

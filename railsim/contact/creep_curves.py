@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.creep import LAWS, creep_force
 from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
 from railsim.contact.kalker import kalker_coefficients
-
-Array = NDArray[np.float64]
 
 CASES = {
     "longitudinal": (1.0, 0.0, 0.0),
@@ -29,14 +27,8 @@ SIZES = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0)
 class Patch(NamedTuple):
     """A loaded contact ellipse.
 
-    Attributes
-    ----------
-    a, b : float
-        Semi-axes along and across the rail [m].
-    N, mu : float
-        Normal force [N], friction coefficient [1].
-    G, nu : float
-        Shear modulus [Pa], Poisson's ratio [1].
+    `a`, `b`: semi-axes along and across the rail [m]; `N`, `mu`: normal force [N], friction
+    coefficient [1]; `G`, `nu`: shear modulus [Pa], Poisson's ratio [1].
     """
 
     a: float
@@ -46,14 +38,14 @@ class Patch(NamedTuple):
     G: float = 82e9
     nu: float = 0.28
 
-    def creepages(self, normalised: Sequence[float] | Array) -> tuple[float, float, float]:
+    def creepages(self, normalised: Sequence[float] | Floats) -> tuple[float, float, float]:
         """Creepages whose forces in linear theory are the given multiples of mu N."""
         c11, c22, c23, _ = (float(c) for c in kalker_coefficients(self.a / self.b, self.nu))
         unit = self.mu * self.N / (self.G * self.a * self.b)
         x, y, spin = (float(value) for value in normalised)
         return unit * x / c11, unit * y / c22, unit * spin / (c23 * float(np.sqrt(self.a * self.b)))
 
-    def unit_creepages(self, direction: Sequence[float]) -> Array:
+    def unit_creepages(self, direction: Sequence[float]) -> Floats:
         """Creepages of magnitude 1, normalised, in a direction such as those of `CASES`."""
         return np.array(self.creepages(direction)) / float(np.linalg.norm(direction))
 
@@ -87,7 +79,7 @@ def forces_by_law(patch: Patch) -> list[dict[str, Any]]:
     return rows
 
 
-def exact_force(patch: Patch, creepages: Sequence[float] | Array) -> ExactCreepForce:
+def exact_force(patch: Patch, creepages: Sequence[float] | Floats) -> ExactCreepForce:
     """Full theory for a patch and its creepages (x, y, spin) [1, 1, 1/m]."""
     x, y, spin = (float(value) for value in creepages)
     return exact_creep_force(patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu)

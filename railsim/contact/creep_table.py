@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, RATIO_MAX, T_HALF
 from railsim.processes import workers_begin
@@ -42,66 +43,55 @@ from railsim.processes import workers_begin
 if TYPE_CHECKING:
     from railsim.contact.exact_creep import RollingGrid
 
-Array = NDArray[np.float64]
-
 POISSON = 0.28
 """Poisson's ratio of the tabulated solutions; others scale Kalker's coefficients."""
 SPIN_ARM = 0.8
 # the solver's error falls with about the power 1.5 of the cell: from two grids, one twice as fine
 _EXTRAPOLATION = 1.0 / (math.sqrt(8.0) - 1.0)
 _NO_SLIP = 1e9  # bound for linear theory
-_TOLERANCE = 1e-6
-_ITERATIONS = 60
 
 
 class CreepNodes(NamedTuple):
     """What the generator makes and the package ships.
 
-    Attributes
-    ----------
-    force : ndarray of float32, shape (N_RATIO + 1, N_THETA + 1, N_PSI, N_T + 1, 3)
-        T_x/(mu N), T_y/(mu N), M_z/(mu N sqrt(a b)), all over t.
-    kalker : ndarray, shape (N_RATIO + 1, 4)
-        c11, c22, c23, c33 of the same solver without slip.
+    `force`, shape (N_RATIO + 1, N_THETA + 1, N_PSI, N_T + 1, 3): T_x/(mu N), T_y/(mu N), M_z/(mu N
+    sqrt(a b)), all over t; `kalker`, shape (N_RATIO + 1, 4): c11, c22, c23, c33 of the same solver
+    without slip.
     """
 
     force: NDArray[np.float32]
-    kalker: Array
+    kalker: Floats
 
 
 class CreepTable(NamedTuple):
     """What the time loop looks up.
 
-    Attributes
-    ----------
-    coefficients : ndarray of float32, one dimension
-        B-spline coefficients of the force over t, from shape (N_RATIO + 3, N_THETA + 3, N_PSI + 3,
-        N_T + 3, 4); last axis T_x, T_y, M_z and 0.  Half the size of float64: the look-up waits
-        for the memory, and 1e-7 of mu N is far below what the table is good for.
-    scale : ndarray, shape (N_RATIO + 3, 4)
-        B-spline coefficients over log(a/b) of the factors of q: c11, c22, and that of
-        ``phi sqrt(a b)``; last column zero.
+    `coefficients`: B-spline coefficients of the force over t, from shape (N_RATIO + 3, N_THETA + 3,
+    N_PSI + 3, N_T + 3, 4); last axis T_x, T_y, M_z and 0.  Half the size of float64: the look-up
+    waits for the memory, and 1e-7 of mu N is far below what the table is good for; `scale`, shape
+    (N_RATIO + 3, 4): B-spline coefficients over log(a/b) of the factors of q: c11, c22, and that of
+    ``phi sqrt(a b)``; last column zero.
     """
 
     coefficients: NDArray[np.float32]
-    scale: Array
+    scale: Floats
 
 
 NO_TABLE = CreepTable(np.zeros(0, dtype=np.float32), np.zeros((0, 4)))
 """Stands for the table where another law is used."""
 
 
-def node_ratios() -> Array:
+def node_ratios() -> Floats:
     """Ratios a/b of the table's nodes."""
     return np.exp(np.linspace(-np.log(RATIO_MAX), np.log(RATIO_MAX), N_RATIO + 1))
 
 
-def spin_scale(ratio: Array, c11: Array, c22: Array) -> Array:
+def spin_scale(ratio: Floats, c11: Floats, c22: Floats) -> Floats:
     """Factor of ``phi sqrt(a b)`` in q: sqrt(c11 c22) rho/sqrt(a b)."""
     return np.asarray(np.sqrt(c11 * c22) * SPIN_ARM * np.sqrt(0.5 * (ratio + 1.0 / ratio)))
 
 
-def direction(theta: ArrayLike, psi: ArrayLike) -> Array:
+def direction(theta: ArrayLike, psi: ArrayLike) -> Floats:
     """Unit vector of (q_x, q_y, q_spin), last axis."""
     sin = np.sin(theta)
     parts = np.broadcast_arrays(np.cos(theta), sin * np.cos(psi), sin * np.sin(psi))
@@ -116,43 +106,6 @@ def grid_size(ratio: float) -> tuple[int, int]:
     return 2 * round(12.0 * float(ratio**0.12)), 2 * round(12.0 * float(ratio**-0.15))
 
 
-class _Path:
-    """Solutions along increasing t in one direction, each started from the one before."""
-
-    def __init__(self, grid: "RollingGrid", bound: Array | None = None) -> None:
-        self.grid = grid
-        self.bound = grid.bound.ravel() if bound is None else bound
-        self.traction = np.zeros((2, grid.x.size))
-        self.sticks = np.ones(grid.x.size, dtype=np.int64)
-        self.slip = np.zeros((2, grid.x.size))
-
-    def force(self, xi_x: float, xi_y: float, phi: float) -> tuple[Array, bool]:
-        """(T_x, T_y, M_z) of normalised creepages, and whether the solver converged."""
-        from railsim.kernels.halfspace import CONVERGED, rolling_traction
-
-        grid = self.grid
-        across = (xi_x - phi * grid.y).ravel()
-        status, _ = rolling_traction(
-            grid.middle,
-            grid.centre,
-            np.stack([across, (xi_y + phi * grid.x_middle).ravel()]),
-            np.stack([across, (xi_y + phi * grid.x).ravel()]),
-            self.bound,
-            self.traction,
-            self.sticks,
-            self.slip,
-            _TOLERANCE,
-            _ITERATIONS,
-        )
-        return _resultant(grid, self.traction), bool(status == CONVERGED)
-
-
-def _resultant(grid: "RollingGrid", traction: Array) -> Array:
-    area, x, y = grid.area.ravel(), grid.x.ravel(), grid.y.ravel()
-    t_x, t_y = traction
-    return np.array([area @ t_x, area @ t_y, area @ (x * t_y - y * t_x)])
-
-
 @lru_cache(maxsize=2)
 def _grids(ratio: float) -> tuple["RollingGrid", "RollingGrid"]:
     from railsim.contact.exact_creep import rolling_grid
@@ -162,30 +115,35 @@ def _grids(ratio: float) -> tuple["RollingGrid", "RollingGrid"]:
     return fine, rolling_grid(ratio, POISSON, nx // 2, ny // 2)
 
 
-def _extrapolated(fine: Array, coarse: Array) -> Array:
+def _extrapolated(fine: Floats, coarse: Floats) -> Floats:
     return fine + (fine - coarse) * _EXTRAPOLATION
 
 
 @lru_cache(maxsize=2)
 def linear_coefficients(ratio: float) -> tuple[float, float, float, float]:
     """Kalker's c11, c22, c23, c33 by our own solver without slip."""
+    from railsim.contact.exact_creep import Rolling
+
     results = []
     for grid in _grids(ratio):
-        bound = np.full(grid.x.size, _NO_SLIP)
-        along, _ = _Path(grid, bound).force(1.0, 0.0, 0.0)
-        across, _ = _Path(grid, bound).force(0.0, 1.0, 0.0)
-        spin, _ = _Path(grid, bound).force(0.0, 0.0, 1.0)
+        unit_forces = []
+        for creepages in np.eye(3):
+            rolling = Rolling(grid, np.full(grid.x.size, _NO_SLIP))
+            rolling.solve(*creepages)
+            unit_forces.append(rolling.force())
+        along, across, spin = unit_forces
         results.append(np.array([along[0], across[1], 0.5 * (spin[1] - across[2]), spin[2]]))
     c11, c22, c23, c33 = _extrapolated(*results)
     return float(c11), float(c22), float(c23), float(c33)
 
 
-def full_sliding(ratio: float, xi: Array, n: int = 200) -> Array:
+def full_sliding(ratio: float, xi: Floats) -> Floats:
     """Force where everything slides along the rigid slip, shape (..., 3) for xi of that shape.
 
-    Hertz pressure summed over n strips of n cells at Gauss-like points (cosine along the strip).
+    Hertz pressure summed over 200 strips of 200 cells at Gauss-like points (cosine along the
+    strip).
     """
-    a, b = np.sqrt(ratio), 1.0 / np.sqrt(ratio)
+    n, a, b = 200, np.sqrt(ratio), 1.0 / np.sqrt(ratio)
     angle = (np.arange(n) + 0.5) * np.pi / n
     y = np.cos(angle)  # both directions: weights of Gauss-Chebyshev type
     length = np.sin(angle)
@@ -204,11 +162,13 @@ def full_sliding(ratio: float, xi: Array, n: int = 200) -> Array:
     return force
 
 
-def node_row(ratio: float, i_theta: int) -> tuple[Array, int]:
+def node_row(ratio: float, i_theta: int) -> tuple[Floats, int]:
     """Force over t at the nodes of one ratio and theta, shape (N_PSI, N_T + 1, 3).
 
     Also counts the solutions that did not converge.
     """
+    from railsim.contact.exact_creep import Rolling
+
     c11, c22, c23, c33 = linear_coefficients(ratio)
     per_q = np.array([c11, c22, float(spin_scale(np.asarray(ratio), *map(np.asarray, (c11, c22))))])
     theta = np.asarray(0.5 * np.pi * i_theta / N_THETA)
@@ -219,13 +179,12 @@ def node_row(ratio: float, i_theta: int) -> tuple[Array, int]:
         row[i_psi, 0] = T_HALF * np.array(
             [c11 * xi[0], c22 * xi[1] + c23 * xi[2], c33 * xi[2] - c23 * xi[1]]
         )
-        paths = [_Path(grid) for grid in _grids(ratio)]
+        rollings = [Rolling(grid) for grid in _grids(ratio)]
         for k in range(1, N_T):
             t = k / N_T
             q = T_HALF * t / (1.0 - t)
-            (fine, fine_ok), (coarse, coarse_ok) = (path.force(*(q * xi)) for path in paths)
-            row[i_psi, k] = _extrapolated(fine, coarse) / t
-            failures += (not fine_ok) + (not coarse_ok)
+            failures += sum(not rolling.solve(*(q * xi)) for rolling in rollings)
+            row[i_psi, k] = _extrapolated(*(rolling.force() for rolling in rollings)) / t
         row[i_psi, N_T] = full_sliding(ratio, xi)
     if i_theta == 0:
         row[1:] = row[0]
@@ -304,16 +263,9 @@ def shipped_nodes() -> CreepNodes:
 def creep_table(nu: float = POISSON) -> CreepTable:
     """Table of the full theory for the look-up in the time loop.
 
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio.  The table was computed for 0.28; for others the creepages are scaled by
-        the ratios of Kalker's printed coefficients, which is exact for small creepage.
-
-    Returns
-    -------
-    CreepTable
-        B-spline coefficients; not to be changed.
+    `nu`: Poisson's ratio.  The table was computed for 0.28; for others the creepages are scaled by
+    the ratios of Kalker's printed coefficients, which is exact for small creepage. Returns B-spline
+    coefficients; not to be changed.
     """
     return table_of_nodes(shipped_nodes(), nu)
 
@@ -346,7 +298,7 @@ def table_of_nodes(nodes: CreepNodes, nu: float = POISSON) -> CreepTable:
     return CreepTable(coefficients.astype(np.float32).ravel(), along_ratio @ scale)
 
 
-def _free_spline(n: int) -> Array:
+def _free_spline(n: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n; third derivative continuous at 1 and n - 1."""
     matrix, values = np.zeros((n + 3, n + 3)), np.zeros((n + 3, n + 1))
     for i in range(n + 1):
@@ -356,7 +308,7 @@ def _free_spline(n: int) -> Array:
     return np.asarray(np.linalg.solve(matrix, values))
 
 
-def _parity_spline(n: int, first: int, last: int) -> Array:
+def _parity_spline(n: int, first: int, last: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n, even (1) or odd (-1) about the ends."""
 
     def folded(k: int) -> tuple[int, int]:
@@ -376,7 +328,7 @@ def _parity_spline(n: int, first: int, last: int) -> Array:
     return np.asarray(spread @ inverse)
 
 
-def _periodic_spline(n: int, sign: int) -> Array:
+def _periodic_spline(n: int, sign: int) -> Floats:
     """Coefficients -1..n+1 from values at 0..n-1 where f(k + n) = sign f(k)."""
     spread = np.zeros((n + 3, n))
     for k in range(-1, n + 2):

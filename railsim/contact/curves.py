@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-from railsim.errors import Fault, InputError
+from railsim.arrays import Floats
+from railsim.errors import Fault, input_error
 from railsim.profiles.profile import FLANGE_BACK, Profile
-
-Array = NDArray[np.float64]
 
 STEEPEST = 5.67
 """Steepest slope of a rail that is searched, the tangent of 80 degrees [1]."""
@@ -43,74 +41,48 @@ ARC_SPACING = 5e-5
 class WheelCurve:
     """Candidate points of a right wheel.
 
-    Attributes
-    ----------
-    y : ndarray, shape (n,)
-        Lateral position from the nominal rolling circle, field side positive [m].
-    u : ndarray, shape (n,)
-        Position along the axle from the wheelset's centre [m].
-    r : ndarray, shape (n,)
-        Radius [m].
-    t : ndarray, shape (n,)
-        Slope dr/du [1].
-    du : ndarray, shape (n,)
-        Quadrature weight: half the distance of the neighbours [m].
-    curvature : ndarray, shape (n_width, n)
-        Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
+    `y`, shape (n,): lateral position from the nominal rolling circle, field side positive [m]; `u`,
+    shape (n,): position along the axle from the wheelset's centre [m]; `r`, shape (n,): radius [m];
+    `t`, shape (n,): slope dr/du [1]; `curvature`, shape (n_width, n): curvature, convex positive,
+    averaged over `HALF_WIDTHS` [1/m].
     """
 
-    y: Array
-    u: Array
-    r: Array
-    t: Array
-    du: Array
-    curvature: Array
+    y: Floats
+    u: Floats
+    r: Floats
+    t: Floats
+    curvature: Floats
 
 
 @dataclass(frozen=True)
 class RailCurve:
     """A right rail in the track, as a function of the lateral position.
 
-    Attributes
-    ----------
-    Y0, dY : float
-        First node and spacing [m].
-    z : ndarray, shape (n,)
-        Height below the rail-top plane [m].
-    slope : ndarray, shape (n,)
-        dz/dY [1].
-    curvature : ndarray, shape (n_width, n)
-        Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
+    `Y0`, `dY`: first node and spacing [m]; `z`, shape (n,): height below the rail-top plane [m];
+    `slope`, shape (n,): dz/dY [1]; `curvature`, shape (n_width, n): curvature, convex positive,
+    averaged over `HALF_WIDTHS` [1/m].
     """
 
     Y0: float
     dY: float
-    z: Array
-    slope: Array
-    curvature: Array
+    z: Floats
+    slope: Floats
+    curvature: Floats
 
     @property
-    def Y(self) -> Array:
+    def Y(self) -> Floats:
         """Lateral positions of the nodes [m], shape (n,)."""
         return self.Y0 + self.dY * np.arange(self.z.size, dtype=np.float64)
 
 
-def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
+def averaged_curvature(y: Floats, slope: Floats, sign: float) -> Floats:
     """Curvature of a contour averaged over the patch, with the patch's parabolic weight.
 
     The weight is 3/(4 b) (1 - (s/b)^2) over the contour's length s within half a width b.
 
-    Parameters
-    ----------
-    y, slope : ndarray, shape (n,)
-        Lateral position, increasing [m], and dz/dy [1].
-    sign : float
-        1 for a rail (z down, convex upwards), -1 for a wheel.
-
-    Returns
-    -------
-    ndarray, shape (n_width, n)
-        Averages at the given points, for each of `HALF_WIDTHS` [1/m].
+    `y`, `slope`, shape (n,): lateral position, increasing [m], and dz/dy [1]; `sign`: 1 for a rail
+    (z down, convex upwards), -1 for a wheel. Returns shape (n_width, n), averages at the given
+    points, for each of `HALF_WIDTHS` [1/m].
     """
     length = np.concatenate(
         ([0.0], np.cumsum(np.diff(y) * np.sqrt(1.0 + (0.5 * (slope[1:] + slope[:-1])) ** 2)))
@@ -130,7 +102,7 @@ def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
     return result
 
 
-def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
+def single_valued_part(y: Floats, z: Floats, start: int, limit: float) -> slice:
     """Largest run of points around `start` that goes forward in y with slopes up to `limit`."""
     dy, dz = np.diff(y), np.diff(z)
     good = (dy > 0.0) & (np.abs(dz) <= limit * dy)
@@ -143,7 +115,7 @@ def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
     return slice(first, last + 1)
 
 
-def contour_spline(y: Array, z: Array) -> "CubicSpline":
+def contour_spline(y: Floats, z: Floats) -> "CubicSpline":
     """Cubic spline of a contour whose end slopes are those of its last pieces.
 
     Where the usable part ends at a kink, a free end would swing to the wrong side.
@@ -160,21 +132,10 @@ def wheel_curve(
 ) -> WheelCurve:
     """Candidate points of a wheel.
 
-    Parameters
-    ----------
-    profile : Profile
-        Wheel profile.
-    radius : float
-        Rolling radius at the nominal rolling circle [m].
-    tape_circle : float
-        Position of the nominal rolling circle from the wheelset's centre [m].
-    spacing : float
-        Distance of the candidates on level parts [m]; it shrinks with the slope t by the factor
-        (1 + t^2)^(-3/4), as the width of a contact in lateral projection does.
-
-    Returns
-    -------
-    WheelCurve
+    `profile`: wheel profile; `radius`: rolling radius at the nominal rolling circle [m];
+    `tape_circle`: position of the nominal rolling circle from the wheelset's centre [m]; `spacing`:
+    distance of the candidates on level parts [m]; it shrinks with the slope t by the factor (1 +
+    t^2)^(-3/4), as the width of a contact in lateral projection does.
     """
     y, z = profile.y, profile.z
     tip = int(np.argmax(z))
@@ -182,15 +143,10 @@ def wheel_curve(
     part = single_valued_part(y, z, on_tread, 3.0 * STEEPEST)
     # scans from both sides often do not meet exactly on the tip itself
     if z[part.start] < z[tip] - 3e-3 and part.start > tip:
-        raise InputError(
-            [
-                Fault(
-                    profile.name,
-                    "",
-                    "the contour is not continuous from tread to flange tip",
-                    "a wheel profile must run in one piece from the flange's tip to the field side",
-                )
-            ]
+        raise input_error(
+            profile.name,
+            "the contour is not continuous from tread to flange tip",
+            "a wheel profile must run in one piece from the flange's tip to the field side",
         )
     spline = contour_spline(y[part], z[part])
     fine = np.linspace(y[part.start], y[part.stop - 1], 40_001)
@@ -208,7 +164,6 @@ def wheel_curve(
         u=nodes + tape_circle,
         r=radius + spline(nodes),
         t=t,
-        du=np.gradient(nodes),
         curvature=averaged_curvature(nodes, t, -1.0),
     )
 
@@ -222,85 +177,55 @@ def tape_circle_position(back_to_back: float) -> float:
     return 0.5 * back_to_back - FLANGE_BACK
 
 
-def inclined(profile: Profile, inclination: float) -> tuple[Array, Array]:
-    """Points of a rail turned to the given inclination (total, as tangent), its top at z = 0."""
-    angle = np.arctan(inclination) - np.arctan(profile.inclination)
-    y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
-    z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
-    from scipy.interpolate import CubicSpline
+def gauge_face(y: Floats, z: Floats) -> float:
+    """Innermost lateral position of a rail's gauge side within `GAUGE_DEPTH` below its top [m].
 
-    crown = CubicSpline(y[top_slice(z)], z[top_slice(z)])
-    roots = crown.derivative().roots(extrapolate=False)
-    top = float(np.min(crown(roots))) if roots.size else float(z.min())
-    return y, z - top
-
-
-def top_slice(z: Array) -> slice:
-    """A few points around the highest one."""
-    i = int(np.argmin(z))
-    return slice(max(i - 3, 0), i + 4)
-
-
-def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
-    """Innermost lateral position of a rail's gauge side within `depth` below its top [m].
-
-    Raises
-    ------
-    ValueError
-        If the contour does not reach that deep on the gauge side.
+    Raises ValueError: if the contour does not reach that deep on the gauge side.
     """
     top = int(np.argmin(z))
-    if z[: top + 1].max() < depth:
+    if z[: top + 1].max() < GAUGE_DEPTH:
         raise ValueError(f"the gauge side ends {1e3 * z[: top + 1].max():.1f} mm below the top")
-    below = int(np.flatnonzero(z[: top + 1] >= depth)[-1])
-    share = (depth - z[below + 1]) / (z[below] - z[below + 1])
+    below = int(np.flatnonzero(z[: top + 1] >= GAUGE_DEPTH)[-1])
+    share = (GAUGE_DEPTH - z[below + 1]) / (z[below] - z[below + 1])
     crossing = y[below + 1] + share * (y[below] - y[below + 1])
     return float(min(crossing, y[below + 1 : top + 1].min()))
 
 
-def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Array, Array]:
+def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Floats, Floats]:
     """Points of a right rail in the track: lateral position and height below the rail tops [m].
 
-    Parameters
-    ----------
-    profile, gauge, inclination
-        As `rail_curve`.
-
-    Raises
-    ------
-    InputError
-        If the profile does not reach down to where gauge is measured.
+    `profile`, `gauge`, `inclination`: as `rail_curve`. Raises InputError: if the profile does not
+    reach down to where gauge is measured.
     """
-    y, z = inclined(profile, inclination)
+    from scipy.interpolate import CubicSpline
+
+    angle = np.arctan(inclination) - np.arctan(profile.inclination)
+    y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
+    z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
+    highest = int(np.argmin(z))
+    around = slice(max(highest - 3, 0), highest + 4)
+    crown = CubicSpline(y[around], z[around])
+    roots = crown.derivative().roots(extrapolate=False)
+    z -= float(np.min(crown(roots))) if roots.size else float(z.min())
     try:
         face = gauge_face(y, z)
     except ValueError as error:
         remedy = f"the gauge is measured {1e3 * GAUGE_DEPTH:.0f} mm below the top"
-        raise InputError([Fault(profile.name, "", str(error), remedy)]) from None
+        raise input_error(profile.name, str(error), remedy) from None
     return y - face + 0.5 * gauge, z
 
 
 def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     """Place a right rail in the track.
 
-    Parameters
-    ----------
-    profile : Profile
-        Rail profile.
-    gauge : float
-        Distance of the gauge faces within 14 mm below the rail tops [m].
-    inclination : float
-        Inclination towards the track's centre, as tangent [1]; what the profile already carries
-        counts.
-
-    Returns
-    -------
-    RailCurve
+    `profile`: rail profile; `gauge`: distance of the gauge faces within 14 mm below the rail tops
+    [m]; `inclination`: inclination towards the track's centre, as tangent [1]; what the profile
+    already carries counts.
     """
     return contour_curve(*inclined_to_track(profile, gauge, inclination))
 
 
-def contour_curve(y: Array, z: Array) -> RailCurve:
+def contour_curve(y: Floats, z: Floats) -> RailCurve:
     """Rail of a contour: lateral positions in the track and heights below the rail tops [m]."""
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
     spline = contour_spline(y[part], z[part])
@@ -321,45 +246,31 @@ def contour_curve(y: Array, z: Array) -> RailCurve:
 def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float, pair: str) -> list[Fault]:
     """Why a wheelset of this wheel cannot run in this track, on both sides the same.
 
-    Parameters
-    ----------
-    wheel : WheelCurve
-    rail : RailCurve
-    gauge : float
-        For the message [m].
-    pair : str
-        What the message calls them.
-
-    Returns
-    -------
-    list of Fault
-        Empty if it can: in the middle of the track the tread stands on the rail, and pushed to one
-        side until the flange touches, the other wheel still has the rail under it.
+    `gauge`: for the message [m]; `pair`: what the message calls them. Returns nothing if it can: in
+    the middle of the track the tread stands on the rail, and pushed to one side until the flange
+    touches, the other wheel still has the rail under it.
     """
-    found = _misfit(wheel, rail, gauge)
-    remedy = "check gauge, back-to-back distance and both profiles"
-    return [Fault(f"gauge {1e3 * gauge:.1f} mm", pair, found, remedy)] if found else []
-
-
-def _misfit(wheel: WheelCurve, rail: RailCurve, gauge: float) -> str:
     steepest = float(wheel.t.min())
     # a wheel without flange has none to be in the way
     flank = int(np.flatnonzero(wheel.t < 0.9 * steepest)[-1]) if steepest < -0.5 else 0
     flank_u = wheel.u[flank]
     corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
     slack = 0.5 * gauge - flank_u
+    height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
     if corner - flank_u < 0.0:
-        return (
+        found = (
             f"the flange stands on the rail, {1e3 * (flank_u - corner):.1f} mm beyond the "
             "gauge corner, when the wheelset is central"
         )
-    if wheel.u[-1] - slack < corner:
+    elif wheel.u[-1] - slack < corner:
         short = 1e3 * (corner + slack - wheel.u[-1])
-        return (
+        found = (
             "the wheelset falls between the rails: with one flange at its rail, the outer end of "
             f"the other wheel is {short:.1f} mm short of the rail"
         )
-    height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
-    if int(np.argmin(height)) <= flank:
-        return "the flange touches the rail when the wheelset is central"
-    return ""
+    elif int(np.argmin(height)) <= flank:
+        found = "the flange touches the rail when the wheelset is central"
+    else:
+        return []
+    remedy = "check gauge, back-to-back distance and both profiles"
+    return [Fault(f"gauge {1e3 * gauge:.1f} mm", pair, found, remedy)]

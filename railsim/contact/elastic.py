@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from railsim.arrays import Floats
 from railsim.contact.coupling import coupling
 from railsim.contact.table import PATCHES, ContactTable
 from railsim.errors import ModelError
@@ -33,105 +33,70 @@ from railsim.kernels.contact_table import (
     under_load,
 )
 
-Array = NDArray[np.float64]
-
 
 class TableArrays(NamedTuple):
     """A table as the look-up takes it: several tables along the first axis."""
 
-    values: Array
-    shear: Array
+    values: Floats
+    shear: Floats
     y0: float
     dy: float
     roll0: float
     droll: float
-    w: Array
+    w: Floats
 
 
 @dataclass(frozen=True)
 class Patch:
     """One contact patch of a right wheel.
 
-    Attributes
-    ----------
-    zone : str
-        Part of the wheel: a name of `railsim.contact.table.PATCHES`.
-    N, N_z, N_y : float
-        Normal force, its vertical and lateral components on the rail [N].
-    y : float
-        Lateral position, track axes [m].
-    angle : float
-        Contact angle, positive towards the flange [rad].
-    a, b : float
-        Semi-axes along the rail and across [m].
-    p_max : float
-        Greatest pressure, 3 N/(2 pi a b) [Pa].
+    - `N`, `N_z`, `N_y`: normal force, its vertical and lateral components on the rail [N]
+    - `y`: lateral position, track axes [m]
+    - `angle`: contact angle, positive towards the flange [rad]
+    - `area`, `length`, `width`: area [m2], extent along the rail and across it [m]
+    - `p_max`: greatest pressure [Pa]
+    - `zone`: part of the wheel, a name of `railsim.contact.table.PATCHES`, where it is known
     """
 
-    zone: str
     N: float
     N_z: float
     N_y: float
     y: float
     angle: float
-    a: float
-    b: float
+    area: float
+    length: float
+    width: float
     p_max: float
+    zone: str = ""
 
     @property
-    def length(self) -> float:
-        """Extent along the rail [m]."""
-        return 2.0 * self.a
+    def a(self) -> float:
+        """Half the length: of an ellipse its semi-axis along the rail [m]."""
+        return 0.5 * self.length
 
     @property
-    def width(self) -> float:
-        """Extent across [m]."""
-        return 2.0 * self.b
-
-    @property
-    def area(self) -> float:
-        """Area [m2]."""
-        return np.pi * self.a * self.b
+    def b(self) -> float:
+        """Half the width: of an ellipse its semi-axis across the rail [m]."""
+        return 0.5 * self.width
 
 
 @dataclass(frozen=True)
 class LoadedContact:
     """Contact of a right wheel under a load.
 
-    Attributes
-    ----------
-    z : float
-        Vertical displacement of the wheelset's centre [m].
-    patches : tuple of Patch
-        Loaded patches, tread first.
+    `z`: vertical displacement of the wheelset's centre [m]; `patches`: loaded patches, tread first.
     """
 
     z: float
     patches: tuple[Patch, ...]
 
 
-def loaded_contact(
-    table: ContactTable, y: float, roll: float, load: float, yaw: float = 0.0
-) -> LoadedContact:
-    """Patches of a right wheel under a vertical load.
+def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> LoadedContact:
+    """Patches of a right wheel under a vertical load, without yaw.
 
-    Parameters
-    ----------
-    table : ContactTable
-        Contact table.
-    y, roll, yaw : float
-        Lateral displacement [m], roll and yaw [rad] of the wheelset.
-    load : float
-        Vertical force on the rail [N].
-
-    Returns
-    -------
-    LoadedContact
-
-    Raises
-    ------
-    ModelError
-        If the position lies outside of the table or the load is not positive.
+    `table`: contact table; `y`, `roll`: lateral displacement [m] and roll [rad] of the wheelset;
+    `load`: vertical force on the rail [N]. Raises ModelError: if the position lies outside of the
+    table or the load is not positive.
     """
     if not load > 0.0:
         raise ModelError(f"a load of {load:g} N presses no wheel on a rail")
@@ -145,11 +110,10 @@ def loaded_contact(
         table.w,
     )
     stretched, roll_slope = stretched_roll(roll)
-    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, yaw * yaw)
-    if where != INSIDE or tw > 1.0:
+    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, 0.0)
+    if where != INSIDE:
         raise ModelError(
-            f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad and yaw {1e3 * yaw:.2f} mrad "
-            "lies outside of the contact table"
+            f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad lies outside of the table"
         )
     weights, flat = np.empty(N_WEIGHT), np.empty(N_PATCH * LOOK_UP_SIZE)
     cell_weights(arrays, ty, tr, roll_slope, weights)
@@ -159,14 +123,14 @@ def loaded_contact(
     compliance = coupling(table.values, table.G, table.nu)[None]
     stiffness = np.concatenate((fields[:, K], fields[:, K2]))
 
-    def approaches(z: float) -> Array:
+    def approaches(z: float) -> Floats:
         e = z - fields[:, G]
         coupled_approaches(compliance, 0, stiffness, e)
         return e
 
-    def vertical(z: float) -> Array:
+    def vertical(z: float) -> Floats:
         e = np.maximum(approaches(z), 0.0)
-        force: Array = e**1.5 * (fields[:, K] + fields[:, K2] * np.sqrt(e))
+        force: Floats = e**1.5 * (fields[:, K] + fields[:, K2] * np.sqrt(e))
         return force
 
     lowest = float(fields[:, 0].min())
@@ -187,15 +151,16 @@ def loaded_contact(
         a, b = (float(axis) * N ** (1.0 / 3.0) for axis in (a1, b1))
         patches.append(
             Patch(
-                zone=PATCHES[patch],
                 N=N,
                 N_z=float(N_z),
                 N_y=float(by_K - N_z * field[G_Y]),
                 y=y + float(c_y),
                 angle=float(np.arctan(tangent)),
-                a=a,
-                b=b,
+                area=np.pi * a * b,
+                length=2.0 * a,
+                width=2.0 * b,
                 p_max=1.5 * N / (np.pi * a * b),
+                zone=PATCHES[patch],
             )
         )
     return LoadedContact(z, tuple(patches))

@@ -21,12 +21,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.errors import ModelError
 from railsim.kernels.halfspace import CONVERGED, rolling_matrices, rolling_traction
-
-Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-6  # turn of the tractions at which Newton's method ends [rad]
 _ITERATIONS = 60
@@ -37,29 +35,24 @@ _WAYS = ((1.0,), (0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0))
 class RollingGrid(NamedTuple):
     """Cells and matrices of one ellipse ratio, lengths over sqrt(a b).
 
-    Attributes
-    ----------
-    x, y, half_x, half_y : ndarray, shape (n_strip, n_cell)
-        Cell centres and half sides; cell 0 of a strip at the leading edge.
-    bound : ndarray, shape (n_strip, n_cell)
-        Traction bound over mu N/(a b), from the Hertz pressure; sums up to 1 with the cells' areas.
-    x_middle : ndarray, shape (n_strip, n_cell)
-        Where sticking is to be evaluated.
-    middle, centre : ndarray, shape (3, n, n)
-        Elastic slip per traction, see `railsim.kernels.halfspace.rolling_matrices`.
+    `x`, `y`, `half_x`, `half_y`, shape (n_strip, n_cell): cell centres and half sides; cell 0 of a
+    strip at the leading edge; `bound`, shape (n_strip, n_cell): traction bound over mu N/(a b),
+    from the Hertz pressure; sums up to 1 with the cells' areas; `x_middle`, shape (n_strip,
+    n_cell): where sticking is to be evaluated; `middle`, `centre`, shape (3, n, n): elastic slip
+    per traction, see `railsim.kernels.halfspace.rolling_matrices`.
     """
 
-    x: Array
-    y: Array
-    half_x: Array
-    half_y: Array
-    bound: Array
-    x_middle: Array
-    middle: Array
-    centre: Array
+    x: Floats
+    y: Floats
+    half_x: Floats
+    half_y: Floats
+    bound: Floats
+    x_middle: Floats
+    middle: Floats
+    centre: Floats
 
     @property
-    def area(self) -> Array:
+    def area(self) -> Floats:
         """Area of the cells over a b."""
         return 4.0 * self.half_x * self.half_y
 
@@ -86,15 +79,56 @@ class ExactCreepForce(NamedTuple):
     T_x: float
     T_y: float
     M_z: float
-    x: Array
-    y: Array
-    area: Array
-    t_x: Array
-    t_y: Array
-    s_x: Array
-    s_y: Array
-    bound: Array
-    sticks: NDArray[np.bool_]
+    x: Floats
+    y: Floats
+    area: Floats
+    t_x: Floats
+    t_y: Floats
+    s_x: Floats
+    s_y: Floats
+    bound: Floats
+    sticks: Flags
+
+
+class Rolling:
+    """Traction and slip on a grid, each solution started from the one before.
+
+    `bound`: of the traction, by default that of the grid. Over mu N/(a b) are `traction`,
+    float64[2, n], and over mu N/(G a b) `slip`; `sticks`, int64[n]: stick or slip.
+    """
+
+    def __init__(self, grid: RollingGrid, bound: Floats | None = None) -> None:
+        self.grid = grid
+        self._bound = grid.bound.ravel() if bound is None else bound
+        self.traction, self.slip = np.zeros((2, 2, grid.x.size))
+        self.sticks = np.ones(grid.x.size, dtype=np.int64)
+
+    def solve(self, xi_x: float, xi_y: float, phi: float, share: float = 1.0) -> bool:
+        """Solve for a share of creepages over mu N/(G a b) (spin: times sqrt(a b) before).
+
+        Returns whether the iteration ended by itself.
+        """
+        grid = self.grid
+        across = (xi_x - phi * grid.y).ravel()
+        status, _ = rolling_traction(
+            grid.middle,
+            grid.centre,
+            share * np.stack([across, (xi_y + phi * grid.x_middle).ravel()]),
+            share * np.stack([across, (xi_y + phi * grid.x).ravel()]),
+            self._bound,
+            self.traction,
+            self.sticks,
+            self.slip,
+            _TOLERANCE,
+            _ITERATIONS,
+        )
+        return bool(status == CONVERGED)
+
+    def force(self) -> Floats:
+        """T_x and T_y over mu N, M_z over mu N sqrt(a b)."""
+        area, x, y = self.grid.area.ravel(), self.grid.x.ravel(), self.grid.y.ravel()
+        t_x, t_y = self.traction
+        return np.array([area @ t_x, area @ t_y, area @ (x * t_y - y * t_x)])
 
 
 @lru_cache(maxsize=4)
@@ -176,12 +210,17 @@ def exact_creep_force(
     size = np.sqrt(a * b)
     unit = mu * N / (a * b)  # of traction
     grid = rolling_grid(float(a / b), float(nu), nx, ny)
-    traction, slip, sticks, converged = normalised_traction(
-        grid, xi_x * G / unit, xi_y * G / unit, phi * size * G / unit
-    )
-    if not converged:
+    creepages = xi_x * G / unit, xi_y * G / unit, phi * size * G / unit
+    for shares in _WAYS:
+        rolling = Rolling(grid)
+        converged = [rolling.solve(*creepages, share) for share in shares]
+        if converged[-1]:
+            break
+    else:
         raise ModelError("exact creep force: the iteration for stick and slip did not converge")
-    t_x, t_y = unit * traction
+    shape = (2, *grid.x.shape)
+    t_x, t_y = unit * rolling.traction.reshape(shape)
+    slip, sticks = rolling.slip.reshape(shape), rolling.sticks.reshape(shape[1:]).astype(bool)
     x, y, area = size * grid.x, size * grid.y, a * b * grid.area
     free = np.where(sticks, 0.0, unit / G)
     return ExactCreepForce(
@@ -197,49 +236,4 @@ def exact_creep_force(
         s_y=free * slip[1],
         bound=unit * grid.bound,
         sticks=sticks,
-    )
-
-
-def normalised_traction(
-    grid: RollingGrid, xi_x: float, xi_y: float, phi: float
-) -> tuple[Array, Array, NDArray[np.bool_], bool]:
-    """Traction and slip for creepages over mu N/(G a b) (spin: times sqrt(a b) before).
-
-    Returns
-    -------
-    traction, slip : ndarray, shape (2, n_strip, n_cell)
-        Over mu N/(a b); over mu N/(G a b).
-    sticks : ndarray of bool, shape (n_strip, n_cell)
-        Stick or slip.
-    converged : bool
-        Whether the iteration ended by itself.
-    """
-    shape = grid.x.shape
-    n = grid.x.size
-    across = (xi_x - phi * grid.y).ravel()
-    rigid_middle = np.stack([across, (xi_y + phi * grid.x_middle).ravel()])
-    rigid_centre = np.stack([across, (xi_y + phi * grid.x).ravel()])
-    for shares in _WAYS:
-        p, slip = np.zeros((2, n)), np.zeros((2, n))
-        sticks = np.ones(n, dtype=np.int64)
-        for share in shares:
-            status, _ = rolling_traction(
-                grid.middle,
-                grid.centre,
-                share * rigid_middle,
-                share * rigid_centre,
-                grid.bound.ravel(),
-                p,
-                sticks,
-                slip,
-                _TOLERANCE,
-                _ITERATIONS,
-            )
-        if status == CONVERGED:
-            break
-    return (
-        p.reshape(2, *shape),
-        slip.reshape(2, *shape),
-        sticks.reshape(shape).astype(bool),
-        bool(status == CONVERGED),
     )

@@ -10,16 +10,22 @@ surface and a half-space (it matters in the flange root, where the normal turns 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
+from railsim.arrays import Floats, stretches
+from railsim.contact.curves import (
+    RailCurve,
+    WheelCurve,
+    misfits,
+    rail_curve,
+    tape_circle_position,
+    wheel_curve,
+)
+from railsim.contact.elastic import Patch
 from railsim.errors import InputError, ModelError
 from railsim.kernels import normal_contact as kernel
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
 
 CANDIDATE_SPACING = 3e-5
 LARGEST_OVERLAP = 1.5e-3
@@ -27,63 +33,23 @@ LARGEST_OVERLAP = 1.5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class ExactPatch:
-    """One connected patch.
-
-    Attributes
-    ----------
-    N, N_z, N_y : float
-        Normal force (sum of pressures), its vertical and lateral components on the rail [N].
-    y : float
-        Lateral position of the pressure's centre, track axes [m].
-    angle : float
-        Contact angle of the resulting force, positive towards the flange [rad].
-    area : float
-        Area [m2].
-    p_max : float
-        Greatest pressure [Pa].
-    length, width : float
-        Extent along the track and along the rail's contour [m].
-    """
-
-    N: float
-    N_z: float
-    N_y: float
-    y: float
-    angle: float
-    area: float
-    p_max: float
-    length: float
-    width: float
-
-
-@dataclass(frozen=True, eq=False)
 class ExactContact:
     """Contact of a right wheel on a right rail.
 
-    Attributes
-    ----------
-    z : float
-        Vertical displacement of the wheelset's centre [m].
-    penetration : float
-        How far the wheel is below its first touch, vertically [m].
-    patches : tuple of ExactPatch
-        From the flange to the tread.
-    x, s : ndarray, shape (n_x,), (n_s,)
-        Element centres along the track and along the rail's contour (0 at its top) [m].
-    Y : ndarray, shape (n_s,)
-        Lateral position on the rail at `s`, track axes [m].
-    pressure : ndarray, shape (n_x, n_s)
-        Pressure [Pa].
+    `z`: vertical displacement of the wheelset's centre [m]; `penetration`: how far the wheel is
+    below its first touch, vertically [m]; `patches`: from the flange to the tread; `x`, `s`, shapes
+    (n_x,), (n_s,): element centres along the track and along the rail's contour (0 at its top) [m];
+    `Y`, shape (n_s,): lateral position on the rail at `s`, track axes [m]; `pressure`, shape (n_x,
+    n_s): pressure [Pa].
     """
 
     z: float
     penetration: float
-    patches: tuple[ExactPatch, ...]
-    x: Array
-    s: Array
-    Y: Array
-    pressure: Array
+    patches: tuple[Patch, ...]
+    x: Floats
+    s: Floats
+    Y: Floats
+    pressure: Floats
 
 
 def exact_contact(
@@ -103,31 +69,18 @@ def exact_contact(
 ) -> ExactContact:
     """Normal contact of a right wheel on its rail under a given vertical force.
 
-    Parameters
-    ----------
-    wheel, rail : Profile
-        Profiles.
-    y, roll : float
-        Lateral displacement [m] and roll [rad] of the wheelset.
-    load : float
-        Vertical force of the wheel on the rail [N].
-    radius, gauge, inclination, back_to_back, G, nu
-        As `railsim.contact.build_contact_table`.
-    elements : int
-        Elements across the narrowest patch and half as many along its half length.
-
-    Returns
-    -------
-    ExactContact
-
-    Raises
-    ------
-    InputError
-        If the wheelset does not fit into the track.
-    ModelError
-        If the load is not reached or the solver does not converge.
+    `wheel`, `rail`: profiles; `y`, `roll`: lateral displacement [m] and roll [rad] of the wheelset;
+    `load`: vertical force of the wheel on the rail [N]; `radius`, `gauge`, `inclination`,
+    `back_to_back`, `G`, `nu`: as `railsim.contact.build_contact_table`; `elements`: elements across
+    the narrowest patch and half as many along its half length. Raises InputError: if the wheelset
+    does not fit into the track. Raises ModelError: if the load is not reached or the solver does
+    not converge.
     """
-    geometry = _Geometry(wheel, rail, y, roll, radius, gauge, inclination, back_to_back)
+    points = wheel_curve(wheel, radius, tape_circle_position(back_to_back), CANDIDATE_SPACING)
+    nodes = rail_curve(rail, gauge, inclination)
+    if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
+        raise InputError(faults)
+    geometry = _Geometry(points, nodes, y, roll, radius)
     E_star = G / (1.0 - nu)
     first = geometry.first_touch()
 
@@ -150,20 +103,8 @@ class _Geometry:
     """Wheel and rail in the track's cross-section."""
 
     def __init__(
-        self,
-        wheel: Profile,
-        rail: Profile,
-        y: float,
-        roll: float,
-        radius: float,
-        gauge: float,
-        inclination: float,
-        back_to_back: float,
+        self, points: WheelCurve, nodes: RailCurve, y: float, roll: float, radius: float
     ) -> None:
-        points = wheel_curve(wheel, radius, tape_circle_position(back_to_back), CANDIDATE_SPACING)
-        nodes = rail_curve(rail, gauge, inclination)
-        if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
-            raise InputError(faults)
         cosine, sine = np.cos(roll), np.sin(roll)
         lateral = y + points.u * cosine - points.r * sine
         depth = points.u * sine + points.r * cosine - radius
@@ -182,7 +123,7 @@ class _Geometry:
         inside = (first < self.Y) & (last > self.Y)
         return float(np.min(self.z[inside] - self.wheel(self.Y[inside])))
 
-    def normal_gap(self, s: Array, z: float) -> tuple[Array, Array, Array, Array]:
+    def normal_gap(self, s: Floats, z: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Gap along the rail's normal, lateral position [m], contact angle, wheel radius [m]."""
         points = self.rail(s)
         tangent = self.rail(s, 1)
@@ -204,13 +145,13 @@ class _Geometry:
         if not overlap.any():
             nothing = np.zeros(0)
             return ExactContact(z, z - first, (), nothing, nothing, nothing, np.zeros((0, 0)))
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], overlap, [False])).astype(int)))
-        widths = 2.5e-5 * (edges[1::2] - edges[::2])
-        whole = 2.5e-5 * (edges[-1] - edges[0])
+        parts = stretches(overlap)
+        first_point, last_point = parts[0][0], parts[-1][1]
+        widths = [2.5e-5 * (end - begin) for begin, end in parts]
         # a contact that has only just formed must not set the size of all elements
-        ds = max(float(widths.min()) / elements, float(widths.max()) / (3 * elements), 2e-5)
-        n_s = int(np.ceil(whole / ds)) + 2
-        centre = s[edges[0]] - ds + ds * np.arange(n_s)
+        ds = max(min(widths) / elements, max(widths) / (3 * elements), 2e-5)
+        n_s = int(np.ceil(2.5e-5 * (last_point - first_point) / ds)) + 2
+        centre = s[first_point] - ds + ds * np.arange(n_s)
         gap, Y, angle, radius = self.normal_gap(centre, z)
         deepest = float(np.max(-gap * radius / np.cos(angle)))
         half_length = np.sqrt(2.0 * deepest)
@@ -244,34 +185,33 @@ class _Geometry:
 
     @staticmethod
     def _patches(
-        field: Array, Y: Array, angle: Array, dx: float, ds: float
-    ) -> tuple[ExactPatch, ...]:
+        field: Floats, Y: Floats, angle: Floats, dx: float, ds: float
+    ) -> tuple[Patch, ...]:
         """Connected patches along s, with both halves."""
-        touching = field.any(axis=0)
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], touching, [False])).astype(int)))
         patches = []
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
+        for start, end in stretches(np.any(field, axis=0)):
             part = field[:, start:end]
             line = 2.0 * part.sum(axis=0) * dx * ds
             N_y = float(np.sum(line * np.sin(angle[start:end])))
             N_z = float(np.sum(line * np.cos(angle[start:end])))
+            reaches = [_reach(column) for column in part.T]
             patches.append(
-                ExactPatch(
+                Patch(
                     N=float(line.sum()),
                     N_z=N_z,
                     N_y=N_y,
                     y=float(np.sum(line * Y[start:end]) / line.sum()),
                     angle=float(np.arctan2(N_y, N_z)),
-                    area=2.0 * ds * sum(_reach(part[:, k]) for k in range(end - start)) * dx,
+                    area=2.0 * ds * sum(reaches) * dx,
                     p_max=float(part.max()),
-                    length=2.0 * dx * max(_reach(part[:, k]) for k in range(end - start)),
+                    length=2.0 * dx * max(reaches),
                     width=ds * (_reach(part[0]) + _reach(part[0, ::-1]) - (end - start)),
                 )
             )
         return tuple(patches)
 
 
-def _reach(pressure: Array) -> float:
+def _reach(pressure: Floats) -> float:
     """Where a line of elements loses contact, in elements from its beginning.
 
     At an edge the square of the pressure falls linearly; it is continued from the last two loaded

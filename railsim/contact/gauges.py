@@ -11,11 +11,12 @@ play in the gauge, ``gauge - SR``.  Limits are those of the TSI Rolling stock (E
 of 4.2.3.5.2) for 1435 mm, of ``qR`` that of EN 15313; quoted from memory.
 """
 
-from dataclasses import dataclass
 from math import inf, nan
+from typing import Any
 
 import numpy as np
 
+from railsim.notation import SIDES
 from railsim.profiles.profile import FLANGE_BACK, Profile
 from railsim.table import Column, Table
 
@@ -32,29 +33,13 @@ _MOST = (0.033, 0.036, 1.426, 1.363)
 LEAST_QR = 0.0065
 
 
-@dataclass(frozen=True)
-class WheelGauge:
-    """Gauge values of a wheel profile [m]; NaN where its flange does not reach so far.
-
-    Attributes
-    ----------
-    Sh, Sd, qR : float
-        See the module.
-    """
-
-    Sh: float
-    Sd: float
-    qR: float
-
-
-def wheel_gauge(wheel: Profile) -> WheelGauge:
-    """Return the gauge values of a wheel profile.
+def wheel_gauge(wheel: Profile) -> tuple[float, float, float]:
+    """Return Sh, Sd and qR of a wheel profile [m], NaN where its flange does not reach so far.
 
     Examples
     --------
     >>> from railsim.profiles import load_profile
-    >>> found = wheel_gauge(load_profile("S1002"))
-    >>> [round(1e3 * value, 1) for value in (found.Sh, found.Sd, found.qR)]
+    >>> [round(1e3 * value, 1) for value in wheel_gauge(load_profile("S1002"))]
     [28.0, 32.5, 10.8]
     """
     order = np.argsort(wheel.y, kind="stable")
@@ -63,7 +48,7 @@ def wheel_gauge(wheel: Profile) -> WheelGauge:
     height = float(wheel.z[tip]) - tread
     flank = _flank(wheel, tip, tread + FLANK)
     below_tip = _flank(wheel, tip, float(wheel.z[tip]) - BELOW_TIP)
-    return WheelGauge(height, flank - FLANGE_BACK, flank - below_tip)
+    return height, flank - FLANGE_BACK, flank - below_tip
 
 
 def _flank(wheel: Profile, tip: int, height: float) -> float:
@@ -86,29 +71,25 @@ def gauge_table(
 ) -> Table:
     """Return the gauge values of a wheelset against their limits.
 
-    Parameters
-    ----------
-    wheels : tuple of two Profile
-        Left and right.
-    diameter : float
-        Of the wheels, on which limits depend [m].
-    back_to_back, gauge : float
-        Distance of the flange backs, track gauge [m].
+    `wheels`: left and right; `diameter`: of the wheels, on which limits depend [m]; `back_to_back`,
+    `gauge`: distance of the flange backs, track gauge [m].
     """
-    left, right = map(wheel_gauge, wheels)
+    heights, thicknesses, flanks = zip(*map(wheel_gauge, wheels), strict=True)
     thickness, height, faces, backs = next(v for most, v in _LEAST.items() if diameter <= most)
     most_thickness, most_height, most_faces, most_backs = _MOST
-    active = back_to_back + left.Sd + right.Sd
-    rows: list[tuple[str, str, float, float | None, float | None]] = [
-        ("Sh", "flange height, left", left.Sh, height, most_height),
-        ("Sh", "flange height, right", right.Sh, height, most_height),
-        ("Sd", "flange thickness, left", left.Sd, thickness, most_thickness),
-        ("Sd", "flange thickness, right", right.Sd, thickness, most_thickness),
-        ("qR", "flank, left", left.qR, LEAST_QR, None),
-        ("qR", "flank, right", right.qR, LEAST_QR, None),
-        ("AR", "flange backs", back_to_back, backs, most_backs),
-        ("SR", "active faces", active, faces, most_faces),
-        ("play", "gauge less active faces", gauge - active, None, None),
+    active = back_to_back + thicknesses[0] + thicknesses[1]
+    rows: list[list[Any]] = []
+    for name, words, values, *limits in (
+        ("Sh", "flange height", heights, height, most_height),
+        ("Sd", "flange thickness", thicknesses, thickness, most_thickness),
+        ("qR", "flank", flanks, LEAST_QR, None),
+    ):
+        for side, value in zip(SIDES, values, strict=True):
+            rows.append([name, f"{words}, {side}", value, *limits])
+    rows += [
+        ["AR", "flange backs", back_to_back, backs, most_backs],
+        ["SR", "active faces", active, faces, most_faces],
+        ["play", "gauge less active faces", gauge - active, None, None],
     ]
     lengths = [
         Column(name, words, "mm", ".1f")

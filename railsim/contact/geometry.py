@@ -15,8 +15,9 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.contact.conicity import equivalent_conicity
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.definitions.track.definition import Track
@@ -25,7 +26,6 @@ from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 SEARCH_SPACING = 3e-5
@@ -59,21 +59,21 @@ class ContactGeometry:
         Vertical displacement of the wheelset's centre, positive down [m].
     """
 
-    lateral: Array
-    roll: Array
-    rolling_radius: Array
-    contact_angle: Array
-    contact_y: Array
-    wheel_y: Array
-    centre_z: Array
+    lateral: Floats
+    roll: Floats
+    rolling_radius: Floats
+    contact_angle: Floats
+    contact_y: Floats
+    wheel_y: Floats
+    centre_z: Floats
 
     @property
-    def delta_r(self) -> Array:
+    def delta_r(self) -> Floats:
         """Rolling radius difference, right minus left [m], shape (n,)."""
-        difference: Array = self.rolling_radius[:, 1] - self.rolling_radius[:, 0]
+        difference: Floats = self.rolling_radius[:, 1] - self.rolling_radius[:, 0]
         return difference
 
-    def equivalent_conicity(self, amplitudes: ArrayLike, track: float = 1.5) -> Array:
+    def equivalent_conicity(self, amplitudes: ArrayLike, track: float = 1.5) -> Floats:
         """Equivalent conicity by EN 15302, see `railsim.contact.equivalent_conicity`."""
         known = np.isfinite(self.delta_r)
         return equivalent_conicity(self.lateral[known], self.delta_r[known], amplitudes, track)
@@ -162,27 +162,14 @@ def contact_geometry(
         kernel.RigidPair(np.ascontiguousarray((w.u, w.r, w.t)), r.Y0, r.z, r.slope)
         for w, r in zip(wheels, rails, strict=True)
     ]
-
-    def sweep(at: Array) -> tuple[Array, Array]:
-        roll = np.empty(at.size)
-        contacts = np.empty((at.size, 2, 6))
-        kernel.rigid_sweep(
-            np.ascontiguousarray(at),
-            pairs[1],
-            pairs[0],
-            rails[0].dY,
-            mean_radius,
-            LARGEST_ROLL,
-            roll,
-            contacts,
-        )
-        return roll, contacts
-
+    roll, contacts = np.empty(displacements.size), np.empty((displacements.size, 2, 6))
     # from the middle outwards, so that the roll is followed from a good start
     order = np.argsort(np.abs(displacements), kind="stable")
-    roll, contacts = np.empty(displacements.size), np.empty((displacements.size, 2, 6))
     for part in (order[displacements[order] >= 0.0], order[displacements[order] < 0.0]):
-        roll[part], contacts[part] = sweep(displacements[part])
+        given = pairs[1], pairs[0], rails[0].dY, mean_radius, LARGEST_ROLL
+        found = np.empty(part.size), np.empty((part.size, 2, 6))
+        kernel.rigid_sweep(displacements[part], *given, *found)
+        roll[part], contacts[part] = found
     gap = contacts[..., kernel.R_GAP]
     tape = np.array([wheels[0].u[0] - wheels[0].y[0], wheels[1].u[0] - wheels[1].y[0]])
     return ContactGeometry(

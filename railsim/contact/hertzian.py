@@ -8,8 +8,9 @@ the flange root; the contact table says what it does there (`railsim.contact.tab
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.hertz import fill_ellipses
 
@@ -27,10 +28,10 @@ class HertzContact(NamedTuple):
         Greatest pressure, 3 N/(2 pi a b) [Pa].
     """
 
-    a: NDArray[np.float64]
-    b: NDArray[np.float64]
-    approach: NDArray[np.float64]
-    p_max: NDArray[np.float64]
+    a: Floats
+    b: Floats
+    approach: Floats
+    p_max: Floats
 
 
 def hertz(A: ArrayLike, B: ArrayLike, N: ArrayLike, E: float, nu: float) -> HertzContact:
@@ -72,9 +73,7 @@ def hertz(A: ArrayLike, B: ArrayLike, N: ArrayLike, E: float, nu: float) -> Hert
     (6.0667, 4.5635)
     """
     shaped_A, shaped_B, shaped_N = np.broadcast_arrays(
-        np.asarray(A, dtype=np.float64),
-        np.asarray(B, dtype=np.float64),
-        np.asarray(N, dtype=np.float64),
+        *(np.asarray(value, dtype=np.float64) for value in (A, B, N))
     )
     if not (np.all(shaped_A > 0) and np.all(shaped_B > 0)):
         raise ModelError("Hertz contact needs A > 0 and B > 0; conformal contact has no ellipse")
@@ -85,20 +84,12 @@ def hertz(A: ArrayLike, B: ArrayLike, N: ArrayLike, E: float, nu: float) -> Hert
     if not (E > 0 and -1.0 < nu <= 0.5):
         raise ModelError(f"no elastic material: E = {E} Pa, nu = {nu}")
     E_star = E / (2.0 * (1.0 - nu * nu))
-    a1, b1, d1 = (np.empty(shaped_A.size) for _ in range(3))
-    fill_ellipses(
-        np.ascontiguousarray(shaped_A).ravel(),
-        np.ascontiguousarray(shaped_B).ravel(),
-        E_star,
-        a1,
-        b1,
-        d1,
-    )
     root = np.cbrt(shaped_N)
-    a = a1.reshape(root.shape) * root
-    b = b1.reshape(root.shape) * root
-    approach = d1.reshape(root.shape) * root**2
-    p_max = 1.5 * root / (np.pi * (a1 * b1).reshape(root.shape))
+    a1, b1, d1 = (np.empty(root.shape) for _ in range(3))
+    flat = (one.ravel() for one in (a1, b1, d1))
+    fill_ellipses(shaped_A.flatten(), shaped_B.flatten(), E_star, *flat)
+    a, b, approach = a1 * root, b1 * root, d1 * root**2
+    p_max = 1.5 * root / (np.pi * (a1 * b1))
     if root.ndim == 0:
         return HertzContact(*(float(x) for x in (a, b, approach, p_max)))  # type: ignore[arg-type]
     return HertzContact(a, b, approach, p_max)

@@ -19,8 +19,9 @@ appendix E, table E.3 (C11, C22, C23 also stored in the public program CONTACT).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.fastsim import KALKER_U_MAX
 
@@ -60,29 +61,16 @@ _G_MIN = 0.1  # least axis ratio of the printed table
 
 def kalker_coefficients(
     a_over_b: ArrayLike, nu: float = 0.28
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Kalker's creepage coefficients c11, c22, c23, c33 of an elliptic contact.
 
     Linear in g = min(a/b, b/a) between the printed rows; 1/C quadratic in nu through the printed
     values at 0, 1/4 and 1/2 (Kalker's own rule, also that of CONTACT).  For g < 0.1 Kalker's
     asymptotic expressions times the factor that makes them meet the table at g = 0.1.
 
-    Parameters
-    ----------
-    a_over_b : array_like
-        Ratio of the semi-axes, along over across, > 0 [1].
-    nu : float
-        Poisson's ratio (of both bodies), 0 <= nu <= 0.5 [1].
-
-    Returns
-    -------
-    c11, c22, c23, c33 : ndarray, shape of a_over_b
-        Coefficients [1].
-
-    Raises
-    ------
-    ModelError
-        If a_over_b is not positive and finite or nu lies outside 0..0.5.
+    `a_over_b`: ratio of the semi-axes, along over across, > 0 [1]; `nu`: Poisson's ratio (of both
+    bodies), 0 <= nu <= 0.5 [1]. Returns `c11, c22, c23, c33`: coefficients [1]. Raises ModelError:
+    if a_over_b is not positive and finite or nu lies outside 0..0.5.
 
     Notes
     -----
@@ -102,47 +90,32 @@ def kalker_coefficients(
         raise ModelError(f"Kalker's coefficients need Poisson's ratio in 0..0.5, not {nu}")
     g = np.minimum(ratio, 1.0 / ratio)
     narrow = ratio <= 1.0
-    values = []
-    for number in range(4):
-        inside = np.where(
-            narrow,
-            _interpolated(_TABLE_NARROW, number, np.maximum(g, _G_MIN), nu),
-            _interpolated(_TABLE_LONG, number, np.maximum(g, _G_MIN), nu),
-        )
-        beyond = np.minimum(g, _G_MIN)
-        growth_narrow = _asymptote_narrow(number, beyond, nu) / _asymptote_narrow(
-            number, _G_MIN, nu
-        )
-        growth_long = _asymptote_long(number, beyond, nu) / _asymptote_long(number, _G_MIN, nu)
-        values.append(inside * np.where(narrow, growth_narrow, growth_long))
-    return values[0], values[1], values[2], values[3]
+    inside, beyond = np.maximum(g, _G_MIN), np.minimum(g, _G_MIN)
+
+    def coefficient(number: int) -> Floats:
+        found = [
+            _interpolated(table, number, inside, nu)
+            * (asymptote(number, beyond, nu) / asymptote(number, _G_MIN, nu))
+            for table, asymptote in _HALVES
+        ]
+        return np.where(narrow, *found)
+
+    return coefficient(0), coefficient(1), coefficient(2), coefficient(3)
 
 
-def creep_tables(nu: float = 0.28, n: int = 257) -> NDArray[np.float64]:
+def creep_tables(nu: float = 0.28) -> Floats:
     """Kalker's coefficients on a grid for the look-up inside the time loop.
 
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio [1].
-    n : int
-        Number of nodes, >= 2.
-
-    Returns
-    -------
-    table : ndarray, shape (n, 4)
-        c11, c22, c23, c33 at uniform nodes of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX
-        (1/24 <= a/b <= 24) [1].  Linear interpolation on 257 nodes follows `kalker_coefficients`
-        within 0.02 % but for the corners that it rounds (0.9 % at a/b = 0.2, 5 and 10); the
-        look-up keeps the end values outside.
+    `nu`: Poisson's ratio [1]. Returns `table`, shape (257, 4): c11, c22, c23, c33 at uniform nodes
+    of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX (1/24 <= a/b <= 24) [1]. Linear
+    interpolation on 257 nodes follows `kalker_coefficients` within 0.02 % but for the corners that
+    it rounds (0.9 % at a/b = 0.2, 5 and 10); the look-up keeps the end values outside.
     """
-    u = np.linspace(-KALKER_U_MAX, KALKER_U_MAX, n)
+    u = np.linspace(-KALKER_U_MAX, KALKER_U_MAX, 257)
     return np.ascontiguousarray(np.stack(kalker_coefficients((1.0 + u) / (1.0 - u), nu), axis=1))
 
 
-def _interpolated(
-    table: NDArray[np.float64], number: int, g: NDArray[np.float64], nu: float
-) -> NDArray[np.float64]:
+def _interpolated(table: Floats, number: int, g: Floats, nu: float) -> Floats:
     """Coefficient `number` of one half of the table at axis ratio g and Poisson's ratio nu."""
     at_nu = [np.interp(g, table[:, 0], table[:, 1 + 3 * number + k]) for k in range(3)]
     n0, n1, n2 = TABLE_POISSON
@@ -155,7 +128,7 @@ def _interpolated(
     return np.asarray(1.0 / inverse)
 
 
-def _asymptote_narrow(number: int, g: ArrayLike, nu: float) -> NDArray[np.float64]:
+def _asymptote_narrow(number: int, g: ArrayLike, nu: float) -> Floats:
     """Kalker's limit for a/b = g -> 0 (Kalker 1990, table E.3, upper asymptote)."""
     g = np.asarray(g, dtype=float)
     log_term = np.log(16.0 / g**2)
@@ -169,7 +142,7 @@ def _asymptote_narrow(number: int, g: ArrayLike, nu: float) -> NDArray[np.float6
     return np.asarray(np.pi**2 / (16.0 * (1.0 - nu) * g))
 
 
-def _asymptote_long(number: int, g: ArrayLike, nu: float) -> NDArray[np.float64]:
+def _asymptote_long(number: int, g: ArrayLike, nu: float) -> Floats:
     """Kalker's limit for b/a = g -> 0 (Kalker 1990, table E.3, lower asymptote)."""
     g = np.asarray(g, dtype=float)
     log_term = np.log(16.0 / g**2)
@@ -183,3 +156,7 @@ def _asymptote_long(number: int, g: ArrayLike, nu: float) -> NDArray[np.float64]
     if number == 2:
         return np.asarray(2.0 * np.pi / (3.0 * g * np.sqrt(g) * d))
     return np.asarray(np.pi / 4.0 * (1.0 - nu * (log_term - 2.0) / d))
+
+
+# of the table and its limits: a/b up to 1, and beyond
+_HALVES = ((_TABLE_NARROW, _asymptote_narrow), (_TABLE_LONG, _asymptote_long))

@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import RailCurve
 from railsim.definitions.vehicle.out_of_round import Flat, Harmonics, RadiusTable, Sections, Uneven
 from railsim.kernels.wheel_surface import SURFACE_ROW
-
-Array = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
 NODES = 64  # over a flat or wave
@@ -41,21 +39,14 @@ SMALL_WAVE = 0.02  # share of the largest amplitude of a table's waves that is n
 class Surface:
     """One wheel's height over its angle, see `railsim.kernels.wheel_surface`.
 
-    Attributes
-    ----------
-    values : ndarray, shape (n_phi, n_y, 4)
-        e [m], e_phi [m], e_y [1], e_phi_y [1].
-    y : ndarray, shape (n_y,)
-        Lateral positions [m].
-    ahead : ndarray, shape (n_phi,)
-        Angle to the next flat [rad].
-    flat, wave : float
-        Lengths of the shortest flat and of the shortest wave all around [m], infinite without.
+    `values`, shape (n_phi, n_y, 4): e [m], e_phi [m], e_y [1], e_phi_y [1]; `y`, shape (n_y,):
+    lateral positions [m]; `ahead`, shape (n_phi,): angle to the next flat [rad]; `flat`, `wave`:
+    lengths of the shortest flat and of the shortest wave all around [m], infinite without.
     """
 
-    values: Array
-    y: Array
-    ahead: Array
+    values: Floats
+    y: Floats
+    ahead: Floats
     flat: float
     wave: float
 
@@ -63,16 +54,8 @@ class Surface:
 def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape: float) -> Surface:
     """Return the surface of a wheel with some deviations, which add up.
 
-    Parameters
-    ----------
-    parts : iterable of Uneven
-        Definitions.
-    radius : float
-        Nominal rolling radius [m].
-    rail : RailCurve
-        Its rail; only sections look at it.
-    tape : float
-        Position of the nominal rolling circle from the wheelset's centre [m].
+    `parts`: definitions; `radius`: nominal rolling radius [m]; `rail`: its rail; only sections look
+    at it; `tape`: position of the nominal rolling circle from the wheelset's centre [m].
     """
     parts = tuple(parts)
     resolved = [_lengths(part, radius) for part in parts]
@@ -103,7 +86,7 @@ def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape:
     return Surface(values, y, ahead, flats, waves)
 
 
-def surface_arrays(surfaces: Iterable[Surface]) -> tuple[Array, Array, Array]:
+def surface_arrays(surfaces: Iterable[Surface]) -> tuple[Floats, Floats, Floats]:
     """Return rows, values and angles to the next flat of several surfaces, see the kernel."""
     rows, values, aheads = [np.zeros((0, SURFACE_ROW))], [np.zeros((0, 4))], [np.zeros(0)]
     first = first_ahead = 0
@@ -117,7 +100,7 @@ def surface_arrays(surfaces: Iterable[Surface]) -> tuple[Array, Array, Array]:
     return np.concatenate(rows), np.concatenate(values), np.concatenate(aheads)
 
 
-def _wrapped(angle: Array) -> Array:
+def _wrapped(angle: Floats) -> Floats:
     return np.asarray((angle + np.pi) % TURN - np.pi)
 
 
@@ -137,7 +120,7 @@ def _lengths(part: Uneven, radius: float) -> tuple[float, float]:
     return max(radius * (end - begin), 0.01), np.inf
 
 
-def _height(part: Uneven, radius: float, phi: Array) -> tuple[Array, Array]:
+def _height(part: Uneven, radius: float, phi: Floats) -> tuple[Floats, Floats]:
     """Height e [m] and e_phi [m] of a part that does not look at the rail."""
     if isinstance(part, Harmonics):
         order, amplitude, phase = np.array(part.waves).T[..., None]
@@ -166,7 +149,7 @@ def _height(part: Uneven, radius: float, phi: Array) -> tuple[Array, Array]:
     return np.where(inside, radius * (np.cos(left) - 1.0), 0.0), np.where(inside, lead, 0.0)
 
 
-def _deviation(part: Sections) -> tuple[Array, float, float]:
+def _deviation(part: Sections) -> tuple[Floats, float, float]:
     """Heights of the sections less the round wheel's [m], and the angles of its flat.
 
     The round wheel is the median of all sections, or, of sections that do not go all around, the
@@ -192,20 +175,14 @@ def _deviation(part: Sections) -> tuple[Array, float, float]:
 
 
 def rolled_out(
-    part: Sections, radius: float, rail: RailCurve, tape: float, n: int, y: Array
-) -> tuple[Array, Array, tuple[float, float]]:
+    part: Sections, radius: float, rail: RailCurve, tape: float, n: int, y: Floats
+) -> tuple[Floats, Floats, tuple[float, float]]:
     """Height of the centre of a wheel with sections above its rail's top, and of the round one.
 
     Around the wheel the sections are smoothed as across (`SMOOTHING_AROUND`).
 
-    Returns
-    -------
-    heights : ndarray, shape (n, y.size)
-        Over the angle, from 0 on, and the lateral position [m].
-    level : ndarray, shape (y.size,)
-        The same of the round wheel [m].
-    extent : (float, float)
-        Angles of the flat [rad].
+    Returns `heights`, shape (n, y.size): over the angle, from 0 on, and the lateral position [m];
+    `level`, shape (y.size,): the same of the round wheel [m]; `extent`: angles of the flat [rad].
     """
     from scipy.interpolate import CubicSpline, make_smoothing_spline
 
@@ -256,7 +233,7 @@ def rolled_out(
     return heights, level, (part.angle + begin - reached, part.angle + end + reached)
 
 
-def _with_slopes(heights: Array, y: Array) -> Array:
+def _with_slopes(heights: Floats, y: Floats) -> Floats:
     """Heights over angle and y with e_phi, e_y and e_phi_y."""
     from scipy.interpolate import CubicSpline
 

@@ -25,18 +25,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import (
     RAIL_SPACING,
     STEEPEST,
     RailCurve,
     averaged_curvature,
     contour_curve,
+    single_valued_part,
 )
 from railsim.definitions.section_files import SectionList
-
-Array = NDArray[np.float64]
 
 DEEP = 8e-3  # m, of a groove between two rails
 TOP = 5e-3  # m below its highest point in which a rail is recognised in the next section
@@ -55,22 +54,16 @@ AHEAD = STEP * np.arange(-round(WINDOW / STEP), round(WINDOW / STEP) + 1)
 class RailPart:
     """One rail of the sections, as points of equal share over s.
 
-    Attributes
-    ----------
-    positions : ndarray, shape (n,)
-        Arc lengths of its sections [m].
-    contours : ndarray, shape (n, 2, k)
-        y and z of the points [m].
-    given : tuple of ndarray, shape (2, k)
-        y and z of the sections as they were given [m].
+    `positions`, shape (n,): arc lengths of its sections [m]; `contours`, shape (n, 2, k): y and z
+    of the points [m]; `given`, shape (2, k): y and z of the sections as they were given [m].
     """
 
-    positions: Array
-    contours: Array
-    given: tuple[Array, ...]
+    positions: Floats
+    contours: Floats
+    given: tuple[Floats, ...]
 
     @cached_property
-    def _slopes(self) -> Array:
+    def _slopes(self) -> Floats:
         h = np.diff(self.positions)[:, None, None]
         step = np.diff(self.contours, axis=0)
         secant = np.where(np.abs(step) > JUMP, 0.0, step) / h  # to where a section has ended
@@ -80,27 +73,26 @@ class RailPart:
         slopes[0] = secant[0]
         return np.asarray(slopes)
 
-    def contour(self, s: float) -> Array:
+    def contour(self, s: float) -> Floats:
         """Points y, z of its contour at an arc length within its ends [m]."""
         last = self.positions.size - 2
         i = int(np.clip(np.searchsorted(self.positions, s, "right") - 1, 0, last))
         h = self.positions[i + 1] - self.positions[i]
         u = (s - self.positions[i]) / h
-        rest = 1.0 - u
-        return np.asarray(
-            (1.0 + 2.0 * u) * rest**2 * self.contours[i]
-            + u**2 * (3.0 - 2.0 * u) * self.contours[i + 1]
-            + h * u * rest * (rest * self._slopes[i] - u * self._slopes[i + 1])
-        )
+        return cubic(u, h, [*self.contours[i : i + 2]], [*self._slopes[i : i + 2]])
 
-    def height(self, s: float, Y: Array) -> Array:
+    def height(self, s: float, Y: Floats) -> Floats:
         """Height below the rail tops at lateral positions, inf where the rail is not [m]."""
         if not self.positions[0] <= s <= self.positions[-1]:
             return np.full(Y.shape, np.inf)
         y, z = self.contour(s)
         return np.interp(Y, *_upper(y, z), left=np.inf, right=np.inf)
 
-    def unchanged(self, s: float) -> Array | None:
+    def heights_ahead(self, s: float, Y: Floats) -> Floats:
+        """Heights before and behind an arc length, at `AHEAD` of it, float64[ahead, Y] [m]."""
+        return np.array([self.height(s + ahead, Y) for ahead in AHEAD])
+
+    def unchanged(self, s: float) -> Floats | None:
         """Points of its sections as given where they do not change around `s`, else None."""
         first = int(np.searchsorted(self.positions, s - WINDOW, "right")) - 1
         last = int(np.searchsorted(self.positions, s + WINDOW, "left"))
@@ -111,7 +103,19 @@ class RailPart:
         return around[0] if same else None
 
 
-def _upper(y: Array, z: Array) -> tuple[Array, Array]:
+def cubic(
+    u: Floats | float, h: float, values: Sequence[Floats], slopes: Sequence[Floats]
+) -> Floats:
+    """Hermite's cubic at the shares `u` of a distance h, by values and slopes at both ends."""
+    rest = 1.0 - u
+    return np.asarray(
+        (1.0 + 2.0 * u) * rest**2 * values[0]
+        + u**2 * (3.0 - 2.0 * u) * values[1]
+        + h * u * rest * (rest * slopes[0] - u * slopes[1])
+    )
+
+
+def _upper(y: Floats, z: Floats) -> tuple[Floats, Floats]:
     """The part of a contour that is seen from above, to both sides of its top."""
     top = int(np.argmin(z))
     right = y >= np.maximum.accumulate(np.where(np.arange(y.size) >= top, y, -np.inf))
@@ -125,12 +129,9 @@ def _upper(y: Array, z: Array) -> tuple[Array, Array]:
 def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
     """Cut sections into rails and join those that belong together.
 
-    Returns
-    -------
-    tuple of RailPart
-        Rails of two sections at least, in the order of their begins.
+    Returns rails of two sections at least, in the order of their begins.
     """
-    chains: list[tuple[list[float], list[Array]]] = []
+    chains: list[tuple[list[float], list[Floats]]] = []
     open_chains: list[int] = []
     for s, points in zip(sections.positions.tolist(), sections.points, strict=True):
         going_on = []
@@ -156,12 +157,12 @@ def rail_parts(sections: SectionList) -> tuple[RailPart, ...]:
     )
 
 
-def _top_range(part: Array) -> tuple[float, float]:
+def _top_range(part: Floats) -> tuple[float, float]:
     top = part[0][part[1] < part[1].min() + TOP]
     return float(top.min()), float(top.max())
 
 
-def _cut(points: Array) -> list[Array]:
+def _cut(points: Floats) -> list[Floats]:
     """Cut a contour where a groove lies between two rails."""
     z = points[1]
     left = np.minimum.accumulate(z)
@@ -173,7 +174,7 @@ def _cut(points: Array) -> list[Array]:
     return _cut(points[:, : deepest + 1]) + _cut(points[:, deepest:])
 
 
-def _shares(part: Array) -> Array:
+def _shares(part: Floats) -> Floats:
     """Points of a contour at equal shares before its running edge, and from there to `FAR`."""
     from scipy.interpolate import Akima1DInterpolator
 
@@ -191,31 +192,14 @@ def _shares(part: Array) -> Array:
     return np.concatenate([flank, [places, behind]], axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class RolledRail:
-    """The section on which a wheel stands at one position, see the module's text.
+def _rolled(heights: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Section on which a wheel of some radius stands on a rail, of the rail's heights at `AHEAD`.
 
-    Attributes
-    ----------
-    Y, z, lead : ndarray, shape (n,)
-        Lateral position, height below the rail tops, and how far ahead of the axle [m].
+    Its heights below the rail tops, and how far ahead of the axle they are [m].
     """
-
-    Y: Array
-    z: Array
-    lead: Array
-
-
-def rolled_rail(part: RailPart, s: float, radius: float, Y: Array) -> RolledRail:
-    """Return the section of a rail on which a wheel of some radius stands at `s`."""
-    return _rolled(np.array([part.height(s + ahead, Y) for ahead in AHEAD]), radius, Y)
-
-
-def _rolled(heights: Array, radius: float, Y: Array) -> RolledRail:
-    """As `rolled_rail`, of the heights at `AHEAD`."""
     heights = heights + (radius - np.sqrt(radius**2 - AHEAD**2))[:, None]
     best = np.argmin(heights, axis=0)
-    columns = np.arange(Y.size)
+    columns = np.arange(heights.shape[1])
     inner = np.clip(best, 1, AHEAD.size - 2)
     a, b, c = (heights[inner + k, columns] for k in (-1, 0, 1))
     known = np.isfinite(a) & np.isfinite(b) & np.isfinite(c) & (best == inner)
@@ -224,7 +208,7 @@ def _rolled(heights: Array, radius: float, Y: Array) -> RolledRail:
     offset = np.where(bend > 0.0, 0.5 * (a - c) / np.where(bend > 0.0, bend, 1.0), 0.0)
     offset = np.clip(offset, -0.5, 0.5)
     z = heights[best, columns] - 0.25 * (a - c) * offset
-    return RolledRail(Y, z, AHEAD[best] + STEP * offset)
+    return z, AHEAD[best] + STEP * offset
 
 
 def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> RailCurve:
@@ -238,20 +222,15 @@ def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) ->
         return contour_curve(given[0] + zero, given[1])
     y, _ = part.contour(float(np.clip(s, part.positions[0], part.positions[-1])))
     Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * RAIL_SPACING)
-    rolled = rolled_rail(part, s, radius, Y)
-    known = np.isfinite(rolled.z)
-    Y, z = Y[known], rolled.z[known]
-    top = int(np.argmin(z))
-    step = np.abs(np.diff(z)) <= STEEPEST * np.diff(Y)
-    first, last = top, top
-    while first > 0 and step[first - 1]:
-        first -= 1
-    while last < Y.size - 1 and step[last]:
-        last += 1
+    z, _ = _rolled(part.heights_ahead(s, Y), radius)
+    known = np.isfinite(z)
+    Y, z = Y[known], z[known]
+    usable = single_valued_part(Y, z, int(np.argmin(z)), STEEPEST)
+    Y, z = Y[usable][:-1], z[usable][:-1]
     from scipy.interpolate import make_smoothing_spline
 
-    spline = make_smoothing_spline(1e3 * Y[first:last], 1e3 * z[first:last], lam=1e-4)
-    nodes = np.arange(Y[first], Y[last - 1], RAIL_SPACING)
+    spline = make_smoothing_spline(1e3 * Y, 1e3 * z, lam=1e-4)
+    nodes = np.arange(Y[0], Y[-1], RAIL_SPACING)
     slope = spline.derivative()(1e3 * nodes)
     slope[0], slope[-1] = -STEEPEST, STEEPEST  # walls, or where the section ends
     return RailCurve(
@@ -264,27 +243,15 @@ def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) ->
 
 
 def rigid_gaps(
-    part: RailPart, s: Array, radius: float, wheels: Sequence[tuple[Array, Array]], y: Array
-) -> Array:
+    part: RailPart, s: Floats, radius: float, wheels: Sequence[tuple[Floats, Floats]], y: Floats
+) -> Floats:
     """Heights at which parts of a wheel touch one rail, neither deforming.
 
-    Parameters
-    ----------
-    part : RailPart
-        Rail.
-    s : ndarray, shape (n_s,)
-        Positions of the axle, a whole number of `STEP` apart [m].
-    radius : float
-        Nominal rolling radius [m].
-    wheels : sequence of (ndarray, ndarray), shape (n,)
-        Lateral position from the nominal rolling circle, and radius, of each part of the wheel [m].
-    y : ndarray, shape (n_y,)
-        Lateral positions of the nominal rolling circle from y = 0 of the rails [m].
-
-    Returns
-    -------
-    ndarray, shape (n_s, n_wheels, n_y)
-        Height of the wheel below that on a level rail at the tops [m]; `NOWHERE` without contact.
+    `part`: rail; `s`, shape (n_s,): positions of the axle, a whole number of `STEP` apart [m];
+    `radius`: nominal rolling radius [m]; `wheels`, shape (n,): lateral position from the nominal
+    rolling circle, and radius, of each part of the wheel [m]; `y`, shape (n_y,): lateral positions
+    of the nominal rolling circle from y = 0 of the rails [m]. Returns shape (n_s, n_wheels, n_y),
+    height of the wheel below that on a level rail at the tops [m]; `NOWHERE` without contact.
     """
     present = [(k, u, r) for k, (u, r) in enumerate(wheels) if u.size]
     low, high = min(u[0] for _, u, _ in present), max(u[-1] for _, u, _ in present)
@@ -295,7 +262,7 @@ def rigid_gaps(
     gaps = np.full((s.size, len(wheels), y.size), NOWHERE)
     for i in range(s.size):
         around = heights[every * i : every * i + AHEAD.size]
-        z = np.minimum(_rolled(around, radius, Y).z, NOWHERE)
+        z = np.minimum(_rolled(around, radius)[0], NOWHERE)
         for k, u, r in present:
             for j, aside in enumerate(y):
                 gaps[i, k, j] = (np.interp(u + aside, Y, z) - r).min() + radius
@@ -303,32 +270,20 @@ def rigid_gaps(
 
 
 def kinematic_height(
-    parts: tuple[RailPart, ...], s: float, wheel: tuple[Array, Array], radius: float, y: float
+    parts: tuple[RailPart, ...], s: float, wheel: tuple[Floats, Floats], radius: float, y: float
 ) -> tuple[float, float, int]:
     """Height at which a wheel stands on rails without deforming them.
 
-    Parameters
-    ----------
-    parts : tuple of RailPart
-        Rails.
-    s, y : float
-        Position of the axle, and of the wheel's nominal rolling circle from y = 0 [m].
-    wheel : (ndarray, ndarray)
-        Lateral position from the nominal rolling circle, and radius [m].
-    radius : float
-        Nominal rolling radius [m].
-
-    Returns
-    -------
-    float, float, int
-        Height of the wheel below that on a level rail at the tops [m], contact ahead of the axle
-        [m], and which rail carries it.
+    `parts`: rails; `s`, `y`: position of the axle, and of the wheel's nominal rolling circle from y
+    = 0 [m]; `wheel`: lateral position from the nominal rolling circle, and radius [m]; `radius`:
+    nominal rolling radius [m]. Returns height of the wheel below that on a level rail at the tops
+    [m], contact ahead of the axle [m], and which rail carries it.
     """
     best = (np.inf, 0.0, -1)
     for number, part in enumerate(parts):
-        rolled = rolled_rail(part, s, radius, wheel[0] + y)
-        gap = rolled.z - (wheel[1] - radius)
+        z, ahead = _rolled(part.heights_ahead(s, wheel[0] + y), radius)
+        gap = z - (wheel[1] - radius)
         k = int(np.argmin(gap))
         if gap[k] < best[0]:
-            best = float(gap[k]), float(rolled.lead[k]), number
+            best = float(gap[k]), float(ahead[k]), number
     return best

@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact import rail_sections
 from railsim.contact.curves import (
     RailCurve,
@@ -32,7 +32,14 @@ from railsim.contact.curves import (
     tape_circle_position,
     wheel_curve,
 )
-from railsim.contact.rail_sections import WINDOW, RailPart, rail_parts, rigid_gaps, rolled_curve
+from railsim.contact.rail_sections import (
+    WINDOW,
+    RailPart,
+    cubic,
+    rail_parts,
+    rigid_gaps,
+    rolled_curve,
+)
 from railsim.contact.stored_table import generator_hash, kept_table
 from railsim.contact.table import (
     ContactTable,
@@ -46,8 +53,6 @@ from railsim.contact.zones import zone_windows
 from railsim.definitions.section_files import SectionList
 from railsim.kernels.contact_table import N_PATCH, G
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
 
 INWARDS, OUTWARDS = 0.012, 0.012  # m, lateral positions that a table covers
 ROLLS, YAWS = 4, 2  # nodes of the plain table to each side of no roll, and from no yaw on
@@ -64,20 +69,10 @@ USUAL = np.abs(TRIED) < 7e-3  # those at which nodes are chosen
 class Range:
     """Sections of a rail over a range of the track, as one kind of wheel meets them.
 
-    Attributes
-    ----------
-    sections : SectionList
-        Sections, in their own arc length.
-    begin, end : float
-        Range in that arc length [m].
-    zero : float
-        Where y = 0 of the sections lies beside the middle of the track [m].
-    wheel, rail : Profile
-        The wheel's, and that of the plain rail.
-    plain : ContactTable
-        Contact of the two.
-    normal : "hertz" or "kik-piotrowski"
-        Kind of normal contact.
+    `sections`: sections, in their own arc length; `begin`, `end`: range in that arc length [m];
+    `zero`: where y = 0 of the sections lies beside the middle of the track [m]; `wheel`, `rail`:
+    the wheel's, and that of the plain rail; `plain`: contact of the two; `normal`: kind of normal
+    contact.
     """
 
     sections: SectionList
@@ -93,13 +88,9 @@ class Range:
 def cached_section_table(given: Range) -> ContactTable:
     """Contact tables of the rails of a range, built once and kept on disk.
 
-    Returns
-    -------
-    ContactTable
-        Its `values` are those of zones one after the other, three to a table: shape (n, 3, n_w,
-        n_roll, n_y, n_field); `description` has under `parts` for each rail its nodes: position
-        from the begin of the range [m], and the zones of tread, flange root and flange, -1 where
-        nothing is near.
+    Its `values` are those of zones one after the other, three to a table: shape (n, 3, n_w, n_roll,
+    n_y, n_field); `description` has under `parts` for each rail its nodes: position from the begin
+    of the range [m], and the zones of tread, flange root and flange, -1 where nothing is near.
     """
     digest = hashlib.sha256(generator_hash().encode())
     for module in (rail_sections.__file__, __file__):
@@ -114,7 +105,7 @@ def cached_section_table(given: Range) -> ContactTable:
     return kept_table(digest.hexdigest(), lambda: section_table(given))
 
 
-def section_table(given: Range, workers: int | None = None) -> ContactTable:
+def section_table(given: Range) -> ContactTable:
     """As `cached_section_table`, built anew."""
     plain, about = given.plain, given.plain.description
     gauge, inclination, apart = (
@@ -124,16 +115,21 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
     grid = chosen_grid(None, given.normal)
     wheel = wheel_curve(given.wheel, radius, tape, min(grid.spacing, grid.ds))
     level = rail_curve(given.rail, gauge, inclination)
-    generator = Generator.of(wheel, level, radius, plain.centre_height, plain.G, plain.nu, grid)
+    generator = Generator(wheel, level, radius, plain.centre_height, plain.G, plain.nu, grid)
     parts = rail_parts(given.sections)
     nodes, running = chosen_nodes(parts, wheel, level, tape - given.zero, given)
     rise = _height(generator, level) - _height(
         generator, rolled_curve(parts[running[0]], given.begin, radius, given.zero)
     )
-    cut = _Cut.of(plain)
+    # the middle of the plain table: ranges of the lateral position and of the roll
+    middle = plain.values.shape[2] // 2
+    inner, outer = (round((end - plain.y0) / plain.dy) for end in (-INWARDS, OUTWARDS))
+    y = np.arange(max(inner, 1), min(outer, plain.values.shape[3] - 3) + 1)
+    rolls = np.arange(middle - ROLLS, middle + ROLLS + 1)
+    cut = plain.values[:, :YAWS, rolls[0] : rolls[-1] + 1, y[0] : y[-1] + 1]
     wanted: list[tuple[RailPart, float]] = []
     known: dict[tuple[int, bytes], int] = {}
-    rows: list[list[tuple[float, int, Array]]] = []
+    rows: list[list[tuple[float, int, Floats]]] = []
     for number, part in enumerate(parts):
         along = []
         for s, near in nodes[number]:
@@ -151,15 +147,22 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
         rows.append(along)
     kept, described = _kept_zones(rows, given.begin)
 
-    def fill(task: tuple[int, list[int]]) -> Array:
+    # coefficients at the ends of another rail's table need a node more
+    stretched = plain.roll0 + plain.droll * np.arange(rolls[0] - 1, rolls[-1] + 2)
+    lateral = plain.y0 + plain.dy * np.arange(y[0] - 1, y[-1] + 2)
+
+    def fill(task: tuple[int, list[int]]) -> Floats:
         table, zones = task
         if table == 0:
-            return cut.plain[zones]
+            return cut[zones]
         rail = rolled_curve(*wanted[table - 1], radius, given.zero)
-        return cut.table(generator, replace(rail, z=rail.z + rise))[zones]
+        rail = replace(rail, z=rail.z + rise)
+        nodes = lateral, unstretched_roll(stretched), plain.w[:YAWS]
+        fields = spline_coefficients(generator.values(rail, *nodes, 1), stretched)
+        return fields[zones, :, 1:-1, 1:-1]
 
     first = fill(kept[-1])  # compile once, not in every thread
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = [*pool.map(fill, kept[:-1]), first]
     missing = -sum(map(len, found)) % N_PATCH
     values = np.concatenate([*found, np.zeros((missing, *first.shape[1:]))])
@@ -168,15 +171,15 @@ def section_table(given: Range, workers: int | None = None) -> ContactTable:
     return replace(
         plain,
         values=values,
-        y0=plain.y0 + plain.dy * cut.y.start,
-        roll0=plain.roll0 + plain.droll * cut.roll.start,
+        y0=float(plain.y0 + plain.dy * y[0]),
+        roll0=float(plain.roll0 + plain.droll * rolls[0]),
         w=plain.w[:YAWS],
         description={**about, "parts": described, "tape": tape, "rise": rise},
     )
 
 
 def _kept_zones(
-    rows: list[list[tuple[float, int, Array]]], begin: float
+    rows: list[list[tuple[float, int, Floats]]], begin: float
 ) -> tuple[list[tuple[int, list[int]]], list[list[list[float]]]]:
     """Tables with the zones that are kept of each, and where those of each node lie.
 
@@ -214,40 +217,9 @@ def _height(generator: Generator, rail: RailCurve) -> float:
     return float(generator.values(rail, zero, zero, zero, 1)[:, 0, 0, 0, G].min())
 
 
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """The middle of a plain table: ranges of the lateral position and of the roll."""
-
-    whole: ContactTable
-    y: slice
-    roll: slice
-
-    @classmethod
-    def of(cls, plain: ContactTable) -> "_Cut":
-        middle = plain.values.shape[2] // 2
-        first, last = (round((end - plain.y0) / plain.dy) for end in (-INWARDS, OUTWARDS))
-        last = min(last, plain.values.shape[3] - 3)
-        return cls(plain, slice(max(first, 1), last + 1), slice(middle - ROLLS, middle + ROLLS + 1))
-
-    @property
-    def plain(self) -> Array:
-        """The plain rail's table."""
-        return self.whole.values[:, :YAWS, self.roll, self.y]
-
-    def table(self, generator: Generator, rail: RailCurve) -> Array:
-        """Table of another rail; coefficients at its ends need a node more."""
-        plain = self.whole
-        rolls = np.arange(self.roll.start - 1, self.roll.stop + 1)
-        stretched = plain.roll0 + plain.droll * rolls
-        s = plain.y0 + plain.dy * np.arange(self.y.start - 1, self.y.stop + 1)
-        roll = unstretched_roll(stretched)
-        values = generator.values(rail, s, roll, plain.w[:YAWS], 1)
-        return spline_coefficients(values, stretched)[:, :, 1:-1, 1:-1]
-
-
 def chosen_nodes(
     parts: tuple[RailPart, ...], wheel: WheelCurve, level: RailCurve, tape: float, given: Range
-) -> tuple[list[list[tuple[float, Array]]], tuple[int, int]]:
+) -> tuple[list[list[tuple[float, Floats]]], tuple[int, int]]:
     """Where along the track each rail has a table and of which zones, and which carry at the ends.
 
     `level`: the plain rail; `tape`: position of the nominal rolling circle from y = 0 [m].
@@ -280,19 +252,15 @@ def chosen_nodes(
     return nodes, running
 
 
-def _split(s: Array, gaps: Array, limit: Array, first: int, last: int) -> list[int]:
+def _split(s: Floats, gaps: Floats, limit: Floats, first: int, last: int) -> list[int]:
     """Indices from `first` to `last` between which cubics meet the gaps within a limit."""
     slope = np.gradient(gaps, s, axis=0)
 
     def between(a: int, b: int) -> list[int]:
         h = s[b] - s[a]
         u = ((s[a + 1 : b] - s[a]) / h)[:, None, None]
-        cubic = (
-            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * gaps[a]
-            + u**2 * (3.0 - 2.0 * u) * gaps[b]
-            + h * u * (1.0 - u) * ((1.0 - u) * slope[a] - u * slope[b])
-        )
-        met = (np.abs(cubic - gaps[a + 1 : b]) <= limit[a + 1 : b]).all()
+        found = cubic(u, h, (gaps[a], gaps[b]), (slope[a], slope[b]))
+        met = (np.abs(found - gaps[a + 1 : b]) <= limit[a + 1 : b]).all()
         if b - a < 2 or (met and h <= FARTHEST):
             return [a]
         middle = (a + b) // 2

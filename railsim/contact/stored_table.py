@@ -59,35 +59,23 @@ def cached_contact_table(
     is read once after each change of its file's number, size or time.
     """
     grid = chosen_grid(grid, normal)
-    numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu, centre_height)
+    numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu)
+    height = centre_height
     digest = hashlib.sha256(generator_hash().encode())
-    digest.update(repr((numbers, grid)).encode())
-    digest.update(wheel.key())
-    digest.update(rail.key())
+    for part in (repr((numbers, height, grid)).encode(), wheel.key(), rail.key()):
+        digest.update(part)
     return kept_table(
         digest.hexdigest(),
-        lambda: build_contact_table(
-            wheel,
-            rail,
-            radius,
-            gauge,
-            inclination,
-            back_to_back,
-            tape_circle_distance,
-            G,
-            nu,
-            centre_height=centre_height,
-            grid=grid,
-        ),
+        lambda: build_contact_table(wheel, rail, *numbers, centre_height=height, grid=grid),
     )
 
 
 def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
     """Return the table stored under a hash of all that enters, or build and store it."""
     folder = cache.own_folder("tables")
-    path = folder and folder / f"{digest[:32]}.npy"
-    if folder is None or path is None:
+    if folder is None:
         return build()
+    path = folder / f"{digest[:32]}.npy"
     if stored := _stored_table(path):
         return stored
     with alone(folder):

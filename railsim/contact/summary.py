@@ -2,22 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.creep_curves import Patch
 from railsim.contact.elastic import LoadedContact, loaded_contact
 from railsim.contact.exact_normal import ExactContact, exact_contact
 from railsim.contact.geometry import ContactGeometry, contact_geometry
 from railsim.contact.stored_table import cached_contact_table
-from railsim.contact.table import ContactTable, TableGrid
+from railsim.contact.table import ContactTable, Normal, TableGrid
 from railsim.errors import InputError, ModelError
 from railsim.profiles.profile import Profile
-
-Array = NDArray[np.float64]
-Normal = Literal["hertz", "kik-piotrowski"]
 
 STEP = 5e-5
 """Step of the lateral displacement [m]."""
@@ -30,11 +27,7 @@ OTHER_NORMAL: dict[Normal, Normal] = {"hertz": "kik-piotrowski", "kik-piotrowski
 class Pair:
     """Wheel and rail of one side with what places them.
 
-    Attributes
-    ----------
-    wheel, rail : Profile
-    gauge, inclination, back_to_back : float
-        As `railsim.contact.contact_geometry` [m], [1], [m].
+    `gauge`, `inclination`, `back_to_back`: as `railsim.contact.contact_geometry` [m], [1], [m].
     """
 
     wheel: Profile
@@ -86,8 +79,8 @@ class ContactSummary:
     load: float
     normal: Normal
     geometry: ContactGeometry
-    amplitudes: Array
-    conicity: Array
+    amplitudes: Floats
+    conicity: Floats
     contacts: dict[float, LoadedContact]
     exact: dict[float, ExactContact]
 
@@ -98,7 +91,7 @@ class ContactSummary:
         return [f"{p.source or p.name}: {note}" for p in profiles.values() for note in p.notes]
 
     @property
-    def functions(self) -> dict[str, Array]:
+    def functions(self) -> dict[str, Floats]:
         """Contact functions by name, SI."""
         geometry = self.geometry
         columns = {"lateral": geometry.lateral, "delta_r": geometry.delta_r}
@@ -175,7 +168,7 @@ def contact_summary(
     steps = max(round(max_shift / STEP), 10)
     lateral = np.linspace(-max_shift, max_shift, 2 * steps + 1)
     geometry = contact_geometry(wheels, rails, radii, gauge, inclination, back_to_back, lateral)
-    amplitudes: Array = 1e-3 * np.arange(0.5, 1e3 * max_shift + 1e-9, 0.5)
+    amplitudes: Floats = 1e-3 * np.arange(0.5, 1e3 * max_shift + 1e-9, 0.5)
     left, right = (
         Pair(wheel, rail, gauge, inclination, back_to_back)
         for wheel, rail in zip(wheels, rails, strict=True)
@@ -195,15 +188,11 @@ def contact_summary(
     )
 
 
-def conicity_over_gauge(found: ContactSummary, gauges: Sequence[float]) -> Array:
+def conicity_over_gauge(found: ContactSummary, gauges: Sequence[float]) -> Floats:
     """Equivalent conicity, float64[gauge, amplitude], at the amplitudes of a summary [1].
 
-    Parameters
-    ----------
-    found : ContactSummary
-        Profiles and their position.
-    gauges : sequence of float
-        Track gauges [m]; NaN for one at which the wheels do not stand on the rails.
+    `found`: profiles and their position; `gauges`: track gauges [m]; NaN for one at which the
+    wheels do not stand on the rails.
     """
     left, right = found.pairs
     rows = []

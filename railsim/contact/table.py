@@ -61,8 +61,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import (
     HALF_WIDTHS,
     RailCurve,
@@ -79,8 +79,6 @@ from railsim.kernels.contact_table import A1, B1, D_B1, FINE_ROLL, K2, N_FIELD, 
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
 
-Array = NDArray[np.float64]
-
 FORMAT = "railsim-contact-table/2"
 PATCHES = ("tread", "flange root", "flange")
 
@@ -92,29 +90,18 @@ Normal = Literal["hertz", "kik-piotrowski"]
 class TableGrid:
     """Extent and fineness of a contact table.
 
-    Attributes
-    ----------
-    s_min, s_max : float, optional
-        Range of the sheared lateral displacement [m]; default `table_range`.
-    ds : float
-        Its spacing [m].
-    roll_max, droll : float
-        Largest roll, both ways, and the spacing of its stretched coordinate, which is the roll's
-        own near the middle and four times as much at 20 mrad [rad].
-    yaw_max : float
-        Largest yaw [rad]; beyond, the table is continued linearly in w = yaw^2.
-    n_w : int
-        Number of nodes of w, from 0 to yaw_max^2, see `yaw_nodes`.
-    spacing : float
-        Distance of the candidates on the wheel's tread, at most `ds`: with nodes that lie closer
-        than the candidates the sums over the patch ripple from node to node [m].
-    reference : float
-        Load of the ellipse over which curvatures are averaged [N].
-    floor_ratio : float
-        Half relative curvature across is kept above about this share of that along [1].
-    normal : "hertz" or "kik-piotrowski"
-        Patch as the ellipse of the foundation's patch, or the non-elliptic patch under each of
-        the three loads, replaced by an ellipse of its area and proportions.
+    - `s_min`, `s_max`: range of the sheared lateral displacement [m]; default `table_range`
+    - `ds`: its spacing [m]
+    - `roll_max`, `droll`: largest roll, both ways, and the spacing of its stretched coordinate,
+      which is the roll's own near the middle and four times as much at 20 mrad [rad]
+    - `yaw_max`: largest yaw [rad]; beyond, the table is continued linearly in w = yaw^2
+    - `n_w`: number of nodes of w, from 0 to yaw_max^2, see `yaw_nodes`
+    - `spacing`: distance of the candidates on the wheel's tread, at most `ds`: with nodes that lie
+      closer than the candidates the sums over the patch ripple from node to node [m]
+    - `reference`: load of the ellipse over which curvatures are averaged [N]
+    - `floor_ratio`: half relative curvature across is kept above about this share of that along [1]
+    - `normal`: patch as the ellipse of the foundation's patch, or the non-elliptic patch under each
+      of the three loads, replaced by an ellipse of its area and proportions
     """
 
     s_min: float | None = None
@@ -158,12 +145,12 @@ class ContactTable:
         What the table was built from, for results and messages.
     """
 
-    values: Array
+    values: Floats
     y0: float
     dy: float
     roll0: float
     droll: float
-    w: Array
+    w: Floats
     shear: float
     r0: float
     centre_height: float
@@ -289,7 +276,7 @@ def build_contact_table(
     roll_nodes = unstretched_roll(stretched_nodes)
     s_nodes = s_min + grid.ds * np.arange(n_y, dtype=np.float64)
     w_nodes = yaw_nodes(grid)
-    generator = Generator.of(wheel_points, rail_nodes, radius, height, G, nu, grid)
+    generator = Generator(wheel_points, rail_nodes, radius, height, G, nu, grid)
     values = generator.values(rail_nodes, s_nodes, roll_nodes, w_nodes, workers or os.cpu_count())
     values = spline_coefficients(values, stretched_nodes)
     # as from the cache: the time loop is compiled once, not for both kinds of arrays
@@ -326,27 +313,15 @@ def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
     return replace(grid, normal=normal) if normal else grid
 
 
-@dataclass(frozen=True, eq=False)
 class Generator:
     """A wheel with its zones, and what its contact with any rail is computed with.
 
-    Attributes
-    ----------
-    wheel, elastic, hertz, strips : see `railsim.kernels.table_slice`
-    radius, height : float
-        Rolling radius; height of the wheelset's centre above the rail tops at z = 0 [m].
+    `wheel`, `rail`: the wheel, and the rail that decides about its zones; `radius`, `height`:
+    rolling radius; height of the wheelset's centre above the rail tops at z = 0 [m].
     """
 
-    wheel: kernel.Wheel
-    elastic: kernel.Elastic
-    hertz: kernel.Hertz
-    strips: kernel.Strips
-    radius: float
-    height: float
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         wheel: WheelCurve,
         rail: RailCurve,
         radius: float,
@@ -354,21 +329,21 @@ class Generator:
         G: float,
         nu: float,
         grid: TableGrid,
-    ) -> "Generator":
-        """Generator of a wheel whose zones are those on a rail."""
-        elastic = kernel.Elastic(
-            G / (1.0 - nu),
-            HALF_WIDTHS,
-            grid.reference,
-            grid.floor_ratio,
-            grid.normal == "kik-piotrowski",
+    ) -> None:
+        self._radius, self._height = radius, height
+        self._wheel = _wheel_arrays(wheel, rail)
+        elliptic = grid.normal == "hertz"
+        self._laws = (
+            kernel.Elastic(
+                G / (1.0 - nu), HALF_WIDTHS, grid.reference, grid.floor_ratio, not elliptic
+            ),
+            ellipse_functions(G, nu),
+            strip_influence(),
         )
-        wheels = _wheel_arrays(wheel, rail)
-        return cls(wheels, elastic, ellipse_functions(G, nu), strip_influence(), radius, height)
 
     def values(
-        self, rail: RailCurve, s: Array, roll: Array, w: Array, workers: int | None
-    ) -> Array:
+        self, rail: RailCurve, s: Floats, roll: Floats, w: Floats, workers: int | None
+    ) -> Floats:
         """Fields of the three patches on a rail, shape (3, w.size, roll.size, s.size, N_FIELD)."""
         values = np.empty((3, w.size, roll.size, s.size, N_FIELD))
         nodes = kernel.Rail(rail.Y0, rail.dY, rail.z, rail.slope, rail.curvature)
@@ -376,9 +351,9 @@ class Generator:
         def fill(task: tuple[int, int]) -> None:
             i_w, i_roll = task
             part = np.empty((3, s.size, N_FIELD))
-            y, yaw = s + self.radius * roll[i_roll], float(np.sqrt(w[i_w]))
-            arguments = self.wheel, nodes, self.elastic, self.hertz, self.strips
-            kernel.fill_table_slice(part, y, roll[i_roll], yaw, self.height, *arguments)
+            y, yaw = s + self._radius * roll[i_roll], float(np.sqrt(w[i_w]))
+            pose = y, roll[i_roll], yaw, self._height
+            kernel.fill_table_slice(part, *pose, self._wheel, nodes, *self._laws)
             values[:, i_w, i_roll] = part
 
         tasks = [(i_w, i_roll) for i_w in range(w.size) for i_roll in range(roll.size)]
@@ -406,39 +381,35 @@ def _wheel_arrays(wheel: WheelCurve, rail: RailCurve) -> kernel.Wheel:
     return kernel.Wheel(wheel.u, wheel.r, wheel.t, wheel.curvature, window, first, last)
 
 
-def yaw_nodes(grid: TableGrid) -> Array:
+def yaw_nodes(grid: TableGrid) -> Floats:
     """Nodes of w = yaw^2 [rad^2]: half of the cells up to 28 of 60 mrad, a quarter up to 40.
 
     Vehicles yaw by less in the tightest curves; more is the tangent of a rail with a sharp kink.
     """
     share = np.linspace(0.0, 1.0, grid.n_w)
-    nodes: Array = grid.yaw_max**2 * np.interp(
+    nodes: Floats = grid.yaw_max**2 * np.interp(
         share, (0.0, 0.5, 0.75, 1.0), (0.0, 2 / 9, 4 / 9, 1.0)
     )
     return nodes
 
 
-def unstretched_roll(stretched: Array) -> Array:
+def unstretched_roll(stretched: Floats) -> Floats:
     """Roll of which `railsim.kernels.contact_table.stretched_roll` makes the given values [rad]."""
     # q = x^2/sqrt(1 + x^2) with x = roll/FINE_ROLL: x^4 - q^2 x^2 - q^2 = 0
     q = (stretched / FINE_ROLL) ** 2
-    roll: Array = np.sign(stretched) * FINE_ROLL * np.sqrt(0.5 * q * (q + np.sqrt(q * q + 4.0)))
+    roll: Floats = np.sign(stretched) * FINE_ROLL * np.sqrt(0.5 * q * (q + np.sqrt(q * q + 4.0)))
     return roll
 
 
-def spline_coefficients(values: Array, stretched: Array) -> Array:
+def spline_coefficients(values: Floats, stretched: Floats) -> Floats:
     """Coefficients of the splines over s and roll that give back cubic functions of both.
 
     Over the roll only near the middle: farther out, where the nodes lie too far apart to follow the
     contact from one to the next, a spline through the values would swing; there they are the
     coefficients themselves.  Stiffnesses and axes are kept from falling below nothing.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_patch, n_w, n_roll, n_y, n_field)
-        Values at the nodes; those at the ends of an axis are taken as they are.
-    stretched : ndarray, shape (n_roll,)
-        Stretched roll of the nodes [rad].
+    `values`, shape (n_patch, n_w, n_roll, n_y, n_field): values at the nodes; those at the ends of
+    an axis are taken as they are; `stretched`, shape (n_roll,): stretched roll of the nodes [rad].
     """
     result = values.copy()
     near = 1.0 / (1.0 + (stretched / FINE_ROLL) ** 4)

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.contact.creep import LAWS
 from railsim.contact.creep_curves import Patch
-from railsim.contact.summary import Array, ContactSummary
+from railsim.contact.summary import ContactSummary
 from railsim.table import Column, Table
 
 _CONICITY = Column("equivalent_conicity", "tan(gamma_e)", "", ".3f")
@@ -58,7 +59,7 @@ def printed_conicity(found: ContactSummary) -> Table:
     return upright
 
 
-def conicity_map_table(found: ContactSummary, gauges: Sequence[float], values: Array) -> Table:
+def conicity_map_table(found: ContactSummary, gauges: Sequence[float], values: Floats) -> Table:
     """Return the equivalent conicity, float64[gauge, amplitude], of whole millimetres by gauge."""
     whole = range(1, len(found.amplitudes), 2)
     columns = [Column(f"{1e3 * found.amplitudes[k]:.0f} mm", format=".3f") for k in whole]

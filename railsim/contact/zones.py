@@ -1,11 +1,9 @@
 """Zones of a wheel, each of which has a patch of its own in the contact table."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.curves import RailCurve, WheelCurve
-
-Array = NDArray[np.float64]
 
 LONG_JUMP = 0.025
 """Jump of the rigid contact over the wheel from which on its ends are patches of their own [m]."""
@@ -32,7 +30,7 @@ def table_range(wheel: WheelCurve, rail: RailCurve) -> tuple[float, float]:
     return -float(climbed) - MORE_INWARDS, float(climbed)
 
 
-def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Array:
+def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:
     """Partition of a wheel's candidates into tread, flange root and flange.
 
     The borders lie where the profile's angle, followed from the nominal rolling circle towards the
@@ -43,10 +41,7 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Array:
     the rim on the field side to the side of the flange; where these borders would leave both ends
     with parts of the tread, the border of tread and root lies in between (`hollow_between`).
 
-    Returns
-    -------
-    ndarray, shape (3, n)
-        Windows adding up to 1 [1].
+    Returns shape (3, n), windows adding up to 1 [1].
     """
     angle = np.degrees(np.arctan(-wheel.t))
     start = int(np.argmin(np.abs(wheel.y)))
@@ -58,14 +53,14 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Array:
         beyond = np.flatnonzero(ahead > limit)
         return float(positions[beyond[0]]) if beyond.size else float(positions[-1])
 
-    def beyond(begin: float, end: float) -> Array:
+    def beyond(begin: float, end: float) -> Floats:
         """0 on the tread side of `begin`, 1 on the flange side of `end`."""
         width = max(begin - end, 1e-4)
         x = np.clip((begin - wheel.y) / width, 0.0, 1.0)
-        share: Array = x * x * (3.0 - 2.0 * x)
+        share: Floats = x * x * (3.0 - 2.0 * x)
         return share
 
-    def windows(begin: float, end: float) -> Array:
+    def windows(begin: float, end: float) -> Floats:
         root = beyond(begin, end)
         flange = np.minimum(beyond(passes(0.7 * steepest), passes(0.9 * steepest)), root)
         return np.stack((1.0 - root, root - flange, flange))
@@ -75,24 +70,18 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Array:
     return windows(*hollow) if hollow else by_angle
 
 
-def hollow_between(wheel: WheelCurve, rail: RailCurve, window: Array) -> tuple[float, float] | None:
+def hollow_between(
+    wheel: WheelCurve, rail: RailCurve, window: Floats
+) -> tuple[float, float] | None:
     """Where on the wheel two branches of the contact that share a zone lie apart.
 
     Between the ends of the longest jump of the rigid contact, the middle third, which nothing
     touches.  Jumps of up to 22 mm are those of unworn profiles: their ends nearly meet under load
     and are one patch of the zone.
 
-    Parameters
-    ----------
-    wheel, rail : WheelCurve, RailCurve
-        Profiles.
-    window : ndarray, shape (3, n)
-        Windows that are to separate the branches.
-
-    Returns
-    -------
-    (float, float) or None
-        Positions on the wheel, that on the field side first [m]; None where there is no such jump.
+    `wheel`, `rail`: profiles; `window`, shape (3, n): windows that are to separate the branches.
+    Returns positions on the wheel, that on the field side first [m]; None where there is no such
+    jump.
     """
     reach = table_range(wheel, rail)[1]
     lateral = np.arange(-reach, reach, JUMP_SEARCH)

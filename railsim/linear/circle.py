@@ -2,11 +2,20 @@
 
 import math
 
+from railsim.arrays import Floats
 from railsim.definitions import Settings, Track
+from railsim.kernels.system import ARC_LENGTH
 from railsim.model.uneven_wheels import UnevenWheels
 
 LENGTH = 50.0  # m; the tables reach beyond both ends
 POSITION = 25.0  # m, where a vehicle stands on it
+
+
+def placed(state: Floats) -> Floats:
+    """Return a state of the vehicle standing there."""
+    found = state.copy()
+    found[ARC_LENGTH] = POSITION
+    return found
 
 
 def left_out(track: Track, settings: Settings, wheels: UnevenWheels) -> tuple[str, ...]:

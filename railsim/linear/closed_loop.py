@@ -9,11 +9,9 @@ Digital control of dynamic systems, 4.4); the delay is that of Pade of order 1,
 at 0.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from railsim.arrays import Floats
 from railsim.definitions import Settings, Track, Vehicle
@@ -21,25 +19,16 @@ from railsim.errors import ModelError
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import TIME, System
+from railsim.kernels.system import TIME
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.coordinates import FreeVehicle
-from railsim.linear.system import Linearisation, without_forceless
+from railsim.linear.system import Linearisation, jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.model.control import with_control
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 
 COMMAND_STEP = 1.0  # unit of the command
-
-
-@dataclass(frozen=True)
-class _Loop:
-    """What controllers give for a state: w = K x + D u, and its delays [s]."""
-
-    K: Floats
-    D: Floats
-    delay: Floats
 
 
 def closed_loop(
@@ -66,16 +55,16 @@ def closed_loop(
     free.system = free.system._replace(actuators=free.system.actuators._replace(which=which))
     n = len(free.coordinates.names)
     A, B = free.tangent(), _commanded(free)
-    loop = _loop(prepared, free, vehicle, settings or Settings(), delays + step)
+    K, D, delay = _loop(prepared, free, vehicle, settings or Settings(), delays + step)
     m = B.shape[1]
     matrix = np.zeros((n + m, n + m))
     # u = z - w with z' = -2/T z + 4/T w
-    inverse = np.linalg.inv(np.eye(m) + loop.D)
-    u_x, u_z = -inverse @ loop.K, inverse
+    inverse = np.linalg.inv(np.eye(m) + D)
+    u_x, u_z = -inverse @ K, inverse
     matrix[:n, :n], matrix[:n, n:] = A + B @ u_x, B @ u_z
-    rate = 1.0 / loop.delay[:, None]
-    matrix[n:, :n] = 4.0 * rate * (loop.K + loop.D @ u_x)
-    matrix[n:, n:] = 4.0 * rate * (loop.D @ u_z) - 2.0 * rate * np.eye(m)
+    rate = 1.0 / delay[:, None]
+    matrix[n:, :n] = 4.0 * rate * (K + D @ u_x)
+    matrix[n:, n:] = 4.0 * rate * (D @ u_z) - 2.0 * rate * np.eye(m)
     names = (*free.coordinates.names, *(f"{a}.delay" for a in prepared.model.index.actuators))
     state = np.concatenate([free.x, np.zeros(m)])
     w = free.coordinates.forceless
@@ -100,7 +89,8 @@ def _commanded(free: FreeVehicle) -> Floats:
 
 def _loop(
     prepared: LinearVehicle, free: FreeVehicle, vehicle: Vehicle, settings: Settings, delay: Floats
-) -> _Loop:
+) -> tuple[Floats, Floats, Floats]:
+    """What controllers give for a state: w = K x + D u, and its delays [s]."""
     model = with_control(prepared.model, vehicle, settings)
     signals, controllers = model.system.signals, model.system.controllers
     plain, row = signals.which.copy(), signals.row.copy()
@@ -113,51 +103,28 @@ def _loop(
         own=model.system.own,
     )
     where = system.actuators.which[:, acts.COMMAND]
-    given = _Commands(system, free, empty_recorder(prepared.model, 1), where)
-    x, m = free.x, len(where)
-    K = np.empty((m, len(x)))
-    for k, h in enumerate(free.coordinates.steps):
-        ahead, behind = (given(x + s * h * np.eye(len(x))[k], np.zeros(m)) for s in (1.0, -1.0))
-        K[:, k] = (ahead - behind) / (2.0 * h)
-    D = np.empty((m, m))
-    for k in range(m):
-        u = COMMAND_STEP * np.eye(m)[k]
-        D[:, k] = (given(x, u) - given(x, -u)) / (2.0 * COMMAND_STEP)
+    work, recorder = work_arrays(system), empty_recorder(prepared.model, 1)
+
+    def given(x: Floats, u: Floats) -> Floats:
+        """Commands for a state and commands before, by one call of the time loop."""
+        state = free.state.copy()
+        state[free.coordinates.indices] = x
+        work.memory[:] = system.own.memory
+        work.memory[kernel.START], work.memory[where] = state[TIME], u
+        rates, stages = np.zeros_like(state), np.zeros((3, len(state)))
+        how = recorder, FAST, 1e-3, Chunk(0, 0, 1, 0, 1)
+        status, *_ = time_loop(system, work, state, rates, stages, *how)
+        if status != RUNNING:
+            raise ModelError("a controller gives no finite command in steady rolling")
+        return np.array(work.memory[where])
+
+    x, u = free.x, np.zeros(len(where))
+    steps = np.full(len(where), COMMAND_STEP)
+    K = jacobian(lambda rows: np.array([given(row, u) for row in rows]), x, free.coordinates.steps)
+    D = jacobian(lambda rows: np.array([given(x, row) for row in rows]), u, steps)
     for c, one in enumerate(controllers.which):
         begin, gives = one[kernel.WIRES], one[kernel.GIVES]
         wires = controllers.wires[begin : begin + gives + one[kernel.TAKES]]
         late = signals.row[wires[gives:], kernel.DELAY].max(initial=0.0)
         delay[wires[:gives]] += 0.5 * controllers.period[c] + late
-    return _Loop(K, D, np.maximum(delay, 1e-6))
-
-
-class _Commands:
-    """Commands that the controllers give for a state, by one call of the time loop."""
-
-    def __init__(
-        self, system: System, free: FreeVehicle, recorder: Any, where: NDArray[np.int64]
-    ) -> None:
-        self._system, self._work = system, work_arrays(system)
-        self._free, self._where = free, where
-        self._recorder = recorder
-
-    def __call__(self, x: Floats, u: Floats) -> Floats:
-        state = self._free.state.copy()
-        state[self._free.coordinates.indices] = x
-        memory = self._work.memory
-        memory[:] = self._system.own.memory
-        memory[kernel.START], memory[self._where] = state[TIME], u
-        status, *_ = time_loop(
-            self._system,
-            self._work,
-            state,
-            np.zeros_like(state),
-            np.zeros((3, len(state))),
-            self._recorder,
-            FAST,
-            1e-3,
-            Chunk(0, 0, 1, 0, 1),
-        )
-        if status != RUNNING:
-            raise ModelError("a controller gives no finite command in steady rolling")
-        return np.array(memory[self._where])
+    return K, D, np.maximum(delay, 1e-6)

@@ -8,14 +8,14 @@ it would be a car body of infinite mass.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import FREE, N_SCALARS, SPEED, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
@@ -23,8 +23,6 @@ from railsim.linear.system import Linearisation, jacobian, without_forceless
 from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
-
-Indices = NDArray[np.int64]
 
 TRACK_PARTS = (
     "rail.left.y",
@@ -52,18 +50,13 @@ class Coordinates:
     """
 
     names: tuple[str, ...]
-    indices: Indices
-    bodies: Indices
-    components: Indices
+    indices: Integers
+    bodies: Integers
+    components: Integers
     n_positions: int
     n_velocities: int
     steps: Floats
-    forceless: Indices
-
-    def index_of(self, body: int, component: int) -> int:
-        """Index of a body's position among the coordinates."""
-        same = (self.bodies == body) & (self.components == component)
-        return int(np.flatnonzero(same)[0])
+    forceless: Integers
 
     @property
     def positions(self) -> slice:
@@ -74,6 +67,20 @@ class Coordinates:
     def velocities(self) -> slice:
         """Where the velocities stand."""
         return slice(self.n_positions, self.n_positions + self.n_velocities)
+
+    @cached_property
+    def position_of(self) -> dict[tuple[int, int], int]:
+        """Index of the position of each body and component."""
+        return self._indices(self.positions)
+
+    @cached_property
+    def velocity_of(self) -> dict[tuple[int, int], int]:
+        """Index of the velocity of each body and component."""
+        return self._indices(self.velocities)
+
+    def _indices(self, part: slice) -> dict[tuple[int, int], int]:
+        places = zip(self.bodies[part].tolist(), self.components[part].tolist(), strict=True)
+        return {place: k for k, place in enumerate(places, start=part.start)}
 
 
 def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -> Coordinates:
@@ -119,7 +126,7 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
 
 
 def track_indices(model: Model) -> tuple[list[int], list[str]]:
-    """Indices of the displacements of elastic rails and sleepers in the state, and their names."""
+    """Integers of the displacements of elastic rails and sleepers in the state, and their names."""
     support = model.system.support
     if not support.elastic:
         return [], []
@@ -204,18 +211,15 @@ class FreeVehicle:
         return matrix
 
     def linearisation(self, matrix: Floats) -> Linearisation:
-        """Linearisation with the rates of rails without mass eliminated.
+        """Linearisation of a Jacobian of `rate`, with the rates of rails without mass eliminated.
 
         Of such a rail B_y y + B_w w = 0 is the balance of forces, w its rate: w = -B_w^-1 B_y y.
+        The parameter is the speed.
         """
         c, matrix = self.coordinates, without_forceless(matrix, self.coordinates.forceless)
         kept = np.setdiff1d(np.arange(len(c.names)), c.forceless)
         names = tuple(c.names[k] for k in kept)
         return Linearisation(names, matrix, self.x[kept], float(self.state[SPEED]))
-
-    def linearised(self) -> Linearisation:
-        """Linearise about the state of steady rolling; the parameter is the speed."""
-        return self.linearisation(self.tangent())
 
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a whole state as the kernels give it; leaves forces in `work`.
@@ -228,7 +232,7 @@ class FreeVehicle:
         derivatives = np.empty_like(states)
         status, where, _ = right_hand_sides(self.system, self.work, states, derivatives)
         if status != RUNNING:
-            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
+            sentence = self.model.index.sentence(status, where)
             raise ModelError(f"outside the range of the model: {sentence}")
         return derivatives
 

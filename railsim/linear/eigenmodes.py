@@ -13,14 +13,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq, linear_sum_assignment
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats, Indices
 from railsim.linear.system import Linearisation
 
-Complex = NDArray[np.complex128]
 At = Callable[[float], Linearisation]
 
 SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are looked for
@@ -40,9 +38,9 @@ class Eigenmodes:
     """
 
     linearisation: Linearisation
-    eigenvalues: Complex
-    shapes: Complex
-    left: Complex
+    eigenvalues: Complexes
+    shapes: Complexes
+    left: Complexes
 
     @property
     def frequencies(self) -> Floats:
@@ -60,7 +58,7 @@ class Eigenmodes:
         size = np.abs(self.eigenvalues)
         return np.asarray(-self.eigenvalues.real / np.where(size > 0.0, size, 1.0))
 
-    def taken(self, order: Sequence[int] | NDArray[np.intp]) -> "Eigenmodes":
+    def taken(self, order: Sequence[int] | Indices) -> "Eigenmodes":
         """Return some of the modes, in this order."""
         chosen = np.asarray(order, dtype=int)
         return Eigenmodes(
@@ -78,7 +76,9 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     >>> modes.natural_frequencies.round(4), modes.damping_ratios.round(4)
     (array([0.3183]), array([0.1]))
     """
-    values, left, right = _eig(linearisation.matrix)
+    solved: Any = eig(linearisation.matrix, left=True, right=True)
+    parts: list[Complexes] = [np.asarray(part, dtype=complex) for part in solved]
+    values, left, right = parts
     upper = np.flatnonzero(values.imag >= 0.0)
     order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
     shapes = right[:, order].T
@@ -89,12 +89,6 @@ def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     # a defective pair, such as two zero eigenvalues of a free vehicle, has no product to divide by
     dual = dual / np.where(np.abs(product) > 1e-30, product, 1.0)[:, None]
     return Eigenmodes(linearisation, values[order], shapes, dual)
-
-
-def _eig(matrix: Floats) -> tuple[Complex, Complex, Complex]:
-    found: Any = eig(matrix, left=True, right=True)
-    values, left, right = (np.asarray(part, dtype=complex) for part in found)
-    return values, left, right
 
 
 def pairing(before: Eigenmodes, after: Eigenmodes) -> Floats:
@@ -160,7 +154,7 @@ def _partners(
     return {i: second[j] for i, j in first.items() if j in second}
 
 
-def _ordered(modes: Eigenmodes, indices: NDArray[np.intp]) -> Eigenmodes:
+def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     """Modes of given indices, NaN where there is none (-1)."""
     there = indices >= 0
     size, n = len(indices), modes.shapes.shape[1]

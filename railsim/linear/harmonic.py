@@ -49,7 +49,7 @@ class ContactPath:
         """
         found = tangent.copy()
         for body in vehicle.system.contact.body:
-            y, z, roll = (vehicle.coordinates.index_of(int(body), k) for k in (Y, Z, ROLL))
+            y, z, roll = (vehicle.coordinates.position_of[int(body), k] for k in (Y, Z, ROLL))
             force, height, angle = self._harmonics(vehicle, int(body))
             found[:, y] = force - tangent[:, z] * height - tangent[:, roll] * angle
         return found
@@ -85,7 +85,7 @@ class ContactPath:
         self, vehicle: FreeVehicle, body: int, y: float, pose: Floats
     ) -> tuple[Floats, Floats]:
         """Coordinates with a wheelset moved by y along its path, and its dz and droll."""
-        indices = [vehicle.coordinates.index_of(body, k) for k in (Y, Z, ROLL)]
+        indices = [vehicle.coordinates.position_of[body, k] for k in (Y, Z, ROLL)]
         base = vehicle.x
         vehicle.rate(base)
         goal = vehicle.work.rail_force[body, [2, 3]].copy()

@@ -8,8 +8,8 @@ from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
 from railsim.errors import argument_error
@@ -20,8 +20,6 @@ from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.table import Column, Table
 from railsim.units import speed_in_si
-
-Complex = NDArray[np.complex128]
 
 SPEED_RANGE = (0.5, 150.0)  # m/s
 LEAST_SHARE = 0.005  # of the kinetic energy that is listed
@@ -114,12 +112,8 @@ class Modes(Plottable):
     @property
     def oscillations(self) -> tuple[Mode, ...]:
         """Modes that oscillate, by rising frequency."""
-        return tuple(
-            sorted(
-                (mode for mode in self.modes if mode.exists and mode.oscillates),
-                key=lambda mode: mode.natural_frequency,
-            )
-        )
+        found = (mode for mode in self.modes if mode.exists and mode.oscillates)
+        return tuple(sorted(found, key=lambda mode: mode.natural_frequency))
 
     @property
     def least_damped(self) -> Mode | None:
@@ -186,7 +180,7 @@ class RootLocus(Plottable):
     sets: tuple[Modes, ...]
 
     @property
-    def eigenvalues(self) -> Complex:
+    def eigenvalues(self) -> Complexes:
         """Eigenvalues, complex128[value, mode], NaN where a mode does not exist [1/s]."""
         return np.array([[mode.eigenvalue for mode in modes.modes] for modes in self.sets])
 
@@ -325,17 +319,8 @@ def modes(
     0.90 Hz, 11 %
     """
     contact = Contact(linearisation, amplitude, conicity)
-    prepared = LinearVehicle(
-        vehicle,
-        track or load_track("straight"),
-        contact=contact,
-        radius=radius,
-        cant=cant,
-        held=held,
-        hold=hold,
-        settings=smooth_law(settings),
-        profiles=profiles,
-    )
+    where = {"radius": radius, "cant": cant, "held": held, "hold": hold}
+    prepared = _prepared(vehicle, track, contact, settings, profiles=profiles, **where)
     (speed,) = checked_speeds([speed])
     return _named(prepared, eigenmodes(prepared.linearised(speed)), speed)
 
@@ -356,13 +341,23 @@ def root_locus(
         hold, settings, profiles.
     """
     speeds = checked_speeds(speeds, "speeds")
-    how = {**how, "settings": smooth_law(how.get("settings"))}
     names = ("linearisation", "amplitude", "conicity")
     contact = Contact(**{name: how.pop(name) for name in names if name in how})
-    prepared = LinearVehicle(vehicle, track or load_track("straight"), contact=contact, **how)
+    prepared = _prepared(vehicle, track, contact, **how)
     sets = followed(prepared.linearised, speeds, FOLLOWED)
     named = [_named(prepared, found, speed) for found, speed in zip(sets, speeds, strict=True)]
     return RootLocus("speed", tuple(speeds), tuple(named))
+
+
+def _prepared(
+    vehicle: Vehicle,
+    track: Track | None,
+    contact: Contact,
+    settings: Settings | None = None,
+    **how: Any,
+) -> LinearVehicle:
+    track, settings = track or load_track("straight"), smooth_law(settings)
+    return LinearVehicle(vehicle, track, contact=contact, settings=settings, **how)
 
 
 def parameter_locus(
@@ -406,8 +401,8 @@ def _named(
 ) -> Modes:
     c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
     names = [
-        "" if np.isnan(value) else mode_name(parts, shape, complex(value), speed)
-        for shape, value in zip(found.shapes, found.eigenvalues, strict=True)
+        "" if np.isnan(value) else mode_name(parts, found, k)
+        for k, value in enumerate(found.eigenvalues)
     ]
     listed = []
     for name, value, shape in zip(numbered(names), found.eigenvalues, found.shapes, strict=True):
@@ -419,18 +414,11 @@ def _named(
         shown = (positions / largest if largest else positions).tolist()
         shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
         listed.append(Mode(name, complex(value), _participation(parts, shape), shapes))
-    return Modes(
-        speed,
-        prepared.contact,
-        tuple(listed),
-        prepared.remarks,
-        parameter,
-        prepared.name,
-        prepared.place,
-    )
+    about = prepared.remarks, parameter, prepared.name, prepared.place
+    return Modes(speed, prepared.contact, tuple(listed), *about)
 
 
-def _participation(parts: Parts, shape: Complex) -> dict[str, float]:
+def _participation(parts: Parts, shape: Complexes) -> dict[str, float]:
     c, shares = parts.coordinates, parts.energy_shares(shape)
     names = [name.rstrip("'") for name in c.names[c.velocities]]
     values = shares[c.bodies[c.velocities], c.components[c.velocities]]

@@ -23,15 +23,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
+from railsim.linear.eigenmodes import Eigenmodes
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
-
-Complex = NDArray[np.complex128]
 
 NEAR_ZERO = 0.05  # 1/s, |lambda| of rolling
 HUNTING_RATIO = 0.3
@@ -62,7 +60,7 @@ class Parts:
         bodies = self.model.system.bodies
         return np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia])
 
-    def energy_shares(self, shape: Complex) -> Floats:
+    def energy_shares(self, shape: Complexes) -> Floats:
         """Share of each body and component in the kinetic energy, float64[n_bodies, 6]."""
         c = self.coordinates
         own = c.velocities
@@ -72,15 +70,9 @@ class Parts:
         total = float(energy.sum())
         return energy / total if total > 0.0 else energy
 
-    @cached_property
-    def _indices(self) -> dict[tuple[int, int], int]:
-        """Index of each position component among the coordinates."""
-        c = self.coordinates
-        return {(int(c.bodies[k]), int(c.components[k])): k for k in range(c.n_positions)}
-
-    def component(self, shape: Complex, body: int, component: int) -> complex:
+    def component(self, shape: Complexes, body: int, component: int) -> complex:
         """Position component of a shape, 0 where the body is held or has none."""
-        index = self._indices.get((body, component))
+        index = self.coordinates.position_of.get((body, component))
         return 0j if index is None else complex(shape[index])
 
     def bogie_of(self, body: int) -> str:
@@ -110,11 +102,10 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
     )
 
 
-def mode_name(parts: Parts, shape: Complex, eigenvalue: complex, speed: float) -> str:
-    """Name one mode.
-
-    `shape`: right eigenvector; `eigenvalue`: [1/s]; `speed`: [m/s].
-    """
+def mode_name(parts: Parts, modes: Eigenmodes, k: int = 0) -> str:
+    """Name one of the modes of a vehicle at a speed."""
+    shape, eigenvalue = modes.shapes[k], complex(modes.eigenvalues[k])
+    speed = modes.linearisation.parameter
     shares = parts.energy_shares(shape)
     if abs(eigenvalue) < NEAR_ZERO and shares[:, 0].sum() + shares[:, 4].sum() > 0.9:
         return "rolling"
@@ -149,7 +140,7 @@ def _wheelset_name(parts: Parts, shares: Floats, component: int) -> str:
     )
 
 
-def _car_name(parts: Parts, shape: Complex, shares: Floats) -> str:
+def _car_name(parts: Parts, shape: Complexes, shares: Floats) -> str:
     component = int(np.argmax(shares[list(parts.cars)].sum(axis=0)))
     car = max(parts.cars, key=lambda b: float(shares[b].sum()))
     if component in CAR_NAMES:
@@ -160,7 +151,7 @@ def _car_name(parts: Parts, shape: Complex, shares: Floats) -> str:
     return "lower sway" if (y * roll.conjugate()).real > 0.0 else "upper sway"
 
 
-def _phase(parts: Parts, shape: Complex, component: int) -> str:
+def _phase(parts: Parts, shape: Complexes, component: int) -> str:
     """Whether the outermost bogies move together or against each other."""
     if len(parts.frames) < 2:
         return ""
@@ -174,7 +165,7 @@ def _phase(parts: Parts, shape: Complex, component: int) -> str:
 
 
 def _hunting_bogie(
-    parts: Parts, shape: Complex, shares: Floats, eigenvalue: complex, speed: float
+    parts: Parts, shape: Complexes, shares: Floats, eigenvalue: complex, speed: float
 ) -> str | None:
     """Name of the bogie that hunts most, empty without bogies; None where nothing hunts."""
     omega = eigenvalue.imag

@@ -102,7 +102,7 @@ class SlidingPath:
     def to(self, goal: float) -> None:
         """Go to another share of the load in one step, or in halves of it.
 
-        Raises NotConverged Says at which share; state and share are those reached.
+        Raises NotConverged: says at which share; state and share are those reached.
         """
         step = goal - self.share
         while self.share != goal:
@@ -112,7 +112,7 @@ class SlidingPath:
             system, guess = self._placed(ahead, self.state)
             solver = Sliding(self._model, system, self._grip, held=self._held)
             try:
-                state = solver.solve(guess, self._speed).state
+                state = solver.solve(guess, self._speed)
             except NotConverged as error:
                 step *= 0.5
                 if abs(step) < SMALLEST:

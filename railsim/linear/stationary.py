@@ -6,6 +6,7 @@ the closed formulas of EN 14363 and EN 15273.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import ARC_LENGTH, FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
-from railsim.linear.circle import POSITION, circle
+from railsim.linear.circle import POSITION, circle, placed
 from railsim.linear.sliding import Placed, SlidingPath, has_pads
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
@@ -56,10 +57,10 @@ def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = Fal
     `balance`: of the vehicle at `WALKING_PACE`; `track`: whose rails and friction count; `cant`:
     [m]; `held`: hold the wheelsets across the track.
     """
-    model, start = balance.model, _placed(balance)
+    model, start = balance.model, placed(balance.state)
     system = model.system._replace(track=track_tables(circle(track, cant=cant)))
     solver = SteadyRolling(model, system, held=held)
-    state = solver.solve(start, WALKING_PACE).state
+    state = solver.solve(start, WALKING_PACE)
     solver.evaluate(state)
     return Standing(state, _loads(solver, held), balance.Q0)
 
@@ -113,7 +114,7 @@ def twist_loop(
 
     Without dry friction both directions give the same, and only the two twists are computed.
 
-    `balance`, `track`, `heights`, `held`: as in `on_twist`. Raises NotConverged There is no steady
+    `balance`, `track`, `heights`, `held`: as in `on_twist`. Raises NotConverged: there is no steady
     state on the way, or the loop does not close.
     """
     raised = np.asarray(heights, dtype=float)
@@ -162,12 +163,11 @@ def on_twist(
         path = _loaded(lambda: _path(balance, track, raised, curvature, held))
         state, solver = path.state, path.solver
     else:
-        placed = _placing(balance, track, raised, curvature, held)
-        start = _placed(balance)
-        found, rolling = led(
-            balance.model, lambda share: (placed(share, start)[0], WALKING_PACE), start
+        under = _placing(balance, track, raised, curvature, held)
+        start = placed(balance.state)
+        state, solver = led(
+            balance.model, lambda share: (under(share, start)[0], WALKING_PACE), start
         )
-        state, solver = found.state, rolling
     solver.evaluate(state)
     Y = None if held else np.asarray(solver.work.wheel[:, :, W_Y].copy())
     return Standing(state, _loads(solver, held), balance.Q0, Y)
@@ -175,16 +175,14 @@ def on_twist(
 
 def _loaded(begin: Callable[[], SlidingPath]) -> SlidingPath:
     """A path at its full load, in as many steps as lead there: a long one may pass a gap."""
-    for parts in (PARTS, 2, 1):
-        path = begin()
-        try:
+    for parts in (PARTS, 2):
+        with suppress(NotConverged):
+            path = begin()
             for share in np.linspace(0.0, 1.0, parts + 1)[1:]:
                 path.to(float(share))
-        except NotConverged:
-            if parts == 1:
-                raise
-            continue
-        break
+            return path
+    path = begin()
+    path.to(1.0)
     return path
 
 
@@ -192,8 +190,8 @@ def _path(
     balance: Equilibrium, track: Track, heights: Floats, curvature: float, held: bool
 ) -> SlidingPath:
     """The way from straight level track to a twist, and to a curve."""
-    placed = _placing(balance, track, heights, curvature, held)
-    return SlidingPath(balance.model, placed, _placed(balance), WALKING_PACE, held=held)
+    under = _placing(balance, track, heights, curvature, held)
+    return SlidingPath(balance.model, under, placed(balance.state), WALKING_PACE, held=held)
 
 
 def _placing(
@@ -214,18 +212,12 @@ def _placing(
     upright = balance.state[rolls]
 
     def standing(share: float, state: Floats) -> tuple[System, Floats]:
-        placed = state.copy()
-        placed[rolls] = upright + share * heights / CANT_BASE
-        placed[ARC_LENGTH] = 0.0
-        return level, placed
+        held_at = state.copy()
+        held_at[rolls] = upright + share * heights / CANT_BASE
+        held_at[ARC_LENGTH] = 0.0
+        return level, held_at
 
     return standing
-
-
-def _placed(balance: Equilibrium) -> Floats:
-    state = balance.state.copy()
-    state[ARC_LENGTH] = POSITION
-    return state
 
 
 def _twisted(system: System, heights: Floats) -> System:

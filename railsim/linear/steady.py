@@ -13,14 +13,14 @@ state to the one sought, and steps that fail are halved.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
 
 import numpy as np
 
 from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.status import RUNNING
 from railsim.kernels.system import AXLEBOX, SPEED, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.model.assembly import Model
@@ -31,25 +31,12 @@ from railsim.notation import COMPONENTS
 RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
 GOOD_ENOUGH = 1e-5  # the same where rounding and the cells of the creep law let it be no smaller
 MOST_ITERATIONS = 40
-LEAST_FACTOR = 2.0**-10  # of the line search
+FACTORS = 2.0 ** -np.arange(11.0)  # of the line search
 STEP = 1e-8  # of the difference quotients (m, rad; of spin rates times the speed over 1 m)
 
 
 class NotConverged(ModelError):
     """Newton's method found no steady state."""
-
-
-@dataclass(frozen=True)
-class SteadyState:
-    """A state of steady rolling.
-
-    `residual`: largest remaining acceleration [m/s2, rad/s2]; `iterations`: steps of Newton's
-    method.
-    """
-
-    state: Floats
-    residual: float
-    iterations: int
 
 
 class SteadyRolling:
@@ -71,30 +58,27 @@ class SteadyRolling:
         self._no_pitch = bodies.kind[self._rigid] == WHEELSET
         self._frames = bodies.frame[self._rigid]
 
-    def solve(self, guess: Floats, speed: float) -> SteadyState:
+    def solve(self, guess: Floats, speed: float) -> Floats:
         """Return the steady state nearest to a guess.
 
         `guess`: positions and spin rates count; position and time are kept; `speed`: [m/s]. Raises
-        NotConverged Names the largest remaining accelerations.
+        NotConverged: names the largest remaining accelerations.
         """
         state = self.prepared(guess, speed)
         forces = self._forces(state)
-        iterations = 0
-        while self._largest(forces) >= RESIDUAL and iterations < MOST_ITERATIONS:
-            iterations += 1
-            better = self._better(state, forces)
+        for _ in range(MOST_ITERATIONS):
+            better = self._better(state, forces) if self._largest(forces) >= RESIDUAL else None
             if better is None:
                 break
             state, forces = better
-        residual = self._largest(forces)
-        if not residual < GOOD_ENOUGH:
+        if not self._largest(forces) < GOOD_ENOUGH:
             raise NotConverged(self._message(forces))
-        return SteadyState(state, residual, iterations)
+        return state
 
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a state, forces into `work`.
 
-        Raises NotConverged The state lies outside the range of the model.
+        Raises NotConverged: the state lies outside the range of the model.
         """
         return np.asarray(self._evaluated(state[None])[0])
 
@@ -103,8 +87,7 @@ class SteadyRolling:
         derivatives = np.empty_like(states)
         status, where, self.patches = right_hand_sides(self.system, self.work, states, derivatives)
         if status != RUNNING:
-            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
-            raise NotConverged(f"no steady state: {sentence}")
+            raise NotConverged(f"no steady state: {self.model.index.sentence(status, where)}")
         return derivatives
 
     def prepared(self, guess: Floats, speed: float) -> Floats:
@@ -151,7 +134,7 @@ class SteadyRolling:
 
     def _better(self, state: Floats, forces: Floats) -> tuple[Floats, Floats] | None:
         """State and forces after one step of Newton's method, None if none is better."""
-        matrix = self._jacobian(state, forces)
+        matrix = difference_quotients(self._forces, state, forces, self._unknowns, STEP)
         try:
             change = np.asarray(np.linalg.solve(matrix, -forces), dtype=float)
             better = self._line_search(state, forces, change)
@@ -162,25 +145,17 @@ class SteadyRolling:
             better = self._line_search(state, forces, np.asarray(least, dtype=float))
         return better
 
-    def _jacobian(self, state: Floats, forces: Floats) -> Floats:
-        return difference_quotients(self._forces, state, forces, self._unknowns, STEP)
-
     def _line_search(
         self, state: Floats, forces: Floats, change: Floats
     ) -> tuple[Floats, Floats] | None:
         size = float(np.linalg.norm(forces))
-        factor = 1.0
-        while factor >= LEAST_FACTOR:
+        for factor in FACTORS:
             trial = state.copy()
             trial[self._unknowns] += factor * change
-            try:
+            with suppress(NotConverged):
                 found = self._forces(trial)
-            except NotConverged:
-                factor *= 0.5
-                continue
-            if np.linalg.norm(found) < (1.0 - 0.1 * factor) * size:
-                return trial, found
-            factor *= 0.5
+                if np.linalg.norm(found) < (1.0 - 0.1 * factor) * size:
+                    return trial, found
         return None
 
     def _message(self, forces: Floats) -> str:
@@ -201,13 +176,13 @@ Systems = Callable[[float], tuple[System, float]]
 
 def led(
     model: Model, along: Systems, start: Floats, *, smallest: float = 1.0 / 64.0
-) -> tuple[SteadyState, SteadyRolling]:
+) -> tuple[Floats, SteadyRolling]:
     """Lead a steady state from where it is known to where it is sought.
 
     `model`: with preloads; `along`: share of the way, above 0 to 1, to the system and the speed
     there; `start`: state at share 0; `smallest`: step at which the path ends for lack of
     convergence. Returns: at share 1, and the solver with the forces there in `work`. Raises
-    NotConverged Says how far it came.
+    NotConverged: says how far it came.
     """
     done, step = 0.0, 1.0
     before, now = start, start
@@ -228,8 +203,8 @@ def led(
                 raise NotConverged(f"{reason} ({100.0 * done:.0f} % of the way)")
             continue
         before, length = now, share - done
-        now, done = found.state, share
+        now, done = found, share
         if done >= 1.0:
             solver.evaluate(now)
-            return found, solver
+            return now, solver
         step = min(2.0 * step, 1.0 - done)

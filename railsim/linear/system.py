@@ -8,9 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats)
     return np.asarray(((ahead - behind) / (2.0 * steps[:, None])).T)
 
 
-def without_forceless(matrix: Floats, w: NDArray[np.int64]) -> Floats:
+def without_forceless(matrix: Floats, w: Integers) -> Floats:
     """Eliminate the rates `w` of rails without mass, which follow from the balance of forces.
 
     A rate stands in the equation of its displacement as well as in all others; further rows are

@@ -19,25 +19,21 @@ What this model does not hold of the contact forces of a wheelset is an input to
 of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belong to.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import schur
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats, Integers
 from railsim.constants import CANT_BASE, GRAVITY
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import System
 from railsim.linear.circle import POSITION
-from railsim.linear.coordinates import Coordinates, FreeVehicle
-from railsim.linear.system import without_forceless
+from railsim.linear.coordinates import FreeVehicle
+from railsim.linear.system import jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.result.sensors import Sensor
-
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
 """Irregularities [m]; the cross level as height of the left rail over the right one."""
@@ -76,22 +72,21 @@ class TrackResponse:
     C: Floats
     D: Floats
     R: Floats
-    rows: Indices
+    rows: Integers
     own: Floats
     steady: Floats
 
-    def over(self, wave_numbers: Floats, chosen: Sequence[int] | None = None) -> Complex:
+    def over(self, wave_numbers: Floats) -> Complexes:
         """Frequency response H over the angular wave number, complex128[k, output, input].
 
         Inputs are the quantities, then the unknown accelerations of the wheelsets.
 
-        `wave_numbers`: 2 pi over the wavelength [rad/m]; `chosen`: outputs; all by default.
+        `wave_numbers`: 2 pi over the wavelength [rad/m].
         """
-        out = slice(None) if chosen is None else list(chosen)
-        C, D = (self.C + self.R @ self.A)[out], self.D[out]
-        D = D + np.einsum("mn,nwqo->mwqo", self.R[out], self.B)
+        C = self.C + self.R @ self.A
+        D = self.D + np.einsum("mn,nwqo->mwqo", self.R, self.B)
         unknown = self.rows.ravel()
-        direct = self.own.reshape(len(self.own), -1)[out] + self.R[out][:, unknown]
+        direct = self.own.reshape(len(self.own), -1) + self.R[:, unknown]
         found = np.empty((len(wave_numbers), len(C), len(QUANTITIES) + len(unknown)), complex)
         T, Z = schur(self.A, output="complex")
         B = np.einsum("nm,nwqo->mwqo", Z.conj(), self.B)
@@ -124,7 +119,7 @@ def track_response(
     track = vehicle.system.track
     rail = track.rail.copy()
     system = vehicle.system._replace(track=track._replace(rail=rail, has_irregularity=1))
-    free = FreeVehicle(vehicle.model, system, vehicle.steady(speed).state)
+    free = FreeVehicle(vehicle.model, system, vehicle.steady(speed))
     offsets = system.frame_offset[system.bodies.frame[system.contact.body]]
     x, c = free.x, free.coordinates
 
@@ -133,11 +128,8 @@ def track_response(
         forces = [free.work.wheel[:, :, column].ravel() for column in (W_Q, W_Y)]
         return np.concatenate([rates, *forces])
 
-    columns = []
-    for k, step in enumerate(c.steps):
-        moved = np.zeros(len(x))
-        moved[k] = step
-        columns.append((evaluated(x + moved) - evaluated(x - moved)) / (2.0 * step))
+    of_states = jacobian(lambda rows: np.array([evaluated(row) for row in rows]), x, c.steps)
+    columns = [*of_states.T]
     for offset in offsets:
         cell, u = divmod(POSITION + float(offset) - track.s_start, track.ds)
         cell = int(cell)
@@ -164,7 +156,7 @@ def track_response(
     lateral = np.zeros((len(offsets), *inputs.shape[1:]))
     lateral[range(len(offsets)), range(len(offsets)), 0, 0] = -1.0
     bodies = system.contact.body
-    places = np.array([c.index_of(int(b), 1) for b in bodies])
+    places = np.array([c.position_of[int(b), 1] for b in bodies])
     return TrackResponse(
         speed,
         (*names, *_of_wheelsets(len(offsets))),
@@ -174,7 +166,7 @@ def track_response(
         np.concatenate([C, whole[n:, :n], np.eye(n)[places]]),
         np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:], lateral]),
         np.concatenate([R, np.zeros((6 * count, n))]),
-        np.array([[_velocity(c, int(b), k) for k in COMPONENTS] for b in bodies]),
+        np.array([[c.velocity_of[int(b), k] for k in COMPONENTS] for b in bodies]),
         _forces_of(system, len(C)),
         np.concatenate([np.zeros(len(C)), steady, np.zeros(count)]),
     )
@@ -210,12 +202,6 @@ def _forces_of(system: System, before: int) -> Floats:
     return own
 
 
-def _velocity(c: Coordinates, body: int, component: int) -> int:
-    """Index of a body's velocity."""
-    there = (c.bodies == body) & (c.components == component)
-    return int(np.flatnonzero(there & (np.arange(len(there)) >= c.n_positions))[0])
-
-
 def _power(order: int, u: float) -> Floats:
     """Coefficients of (v - u)^order / order! over v, by rising powers."""
     return np.array(([1.0], [-u, 1.0], [0.5 * u * u, -u, 0.5])[order])
@@ -226,26 +212,21 @@ def _readings(
 ) -> tuple[Floats, Floats, list[str]]:
     """C and R of what sensors read along x, y, z and of their roll rate, and their names."""
     bodies, c = free.model.index.bodies, free.coordinates
-    known = {
-        (int(b), int(k), i >= c.n_positions): i
-        for i, (b, k) in enumerate(zip(c.bodies, c.components, strict=True))
-        if b >= 0
-    }
     C, R, names = [], [], []
     for name, sensor in sensors.items():
         b = bodies.index(sensor.body)
 
-        def row(component: int, velocity: bool, b: int = b) -> Floats:
+        def row(component: int, known: Mapping[tuple[int, int], int], b: int = b) -> Floats:
             """Unit row of a displacement or velocity; zero where the body does not move so."""
-            found = known.get((b, component, velocity))
+            found = known.get((b, component))
             return np.zeros(n) if found is None else np.eye(1, n, found)[0]
 
-        turn = np.array([row(k, True) for k in (3, 4, 5)])
-        pitch = np.zeros(n) if sensor.axlebox else row(4, False)
+        turn = np.array([row(k, c.velocity_of) for k in (3, 4, 5)])
+        pitch = np.zeros(n) if sensor.axlebox else row(4, c.position_of)
         turn[1] *= not sensor.axlebox
-        point = np.array([row(k, True) for k in (0, 1, 2)])
+        point = np.array([row(k, c.velocity_of) for k in (0, 1, 2)])
         point += np.cross(turn, np.array(sensor.arm)[:, None], axis=0)
         R += [*point, np.zeros(n)]
-        C += [GRAVITY * pitch, -GRAVITY * row(3, False), np.zeros(n), row(3, True)]
+        C += [GRAVITY * pitch, -GRAVITY * row(3, c.position_of), np.zeros(n), row(3, c.velocity_of)]
         names += [f"{name}.{axis}" for axis in ("x", "y", "z", "roll_rate")]
     return np.reshape(C, (-1, n)), np.reshape(R, (-1, n)), names

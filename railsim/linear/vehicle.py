@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +15,10 @@ from railsim.definitions.loading import check_types
 from railsim.errors import Faults, ModelError, argument_error
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
-from railsim.linear.circle import POSITION, circle, left_out
+from railsim.linear.circle import circle, left_out, placed
 from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
-from railsim.linear.steady import SteadyRolling, SteadyState, led
+from railsim.linear.steady import SteadyRolling, led
 from railsim.linear.system import Linearisation
 from railsim.model.assembly import Model, SharedTables, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
@@ -49,20 +50,13 @@ def smooth_law(settings: Settings | None) -> Settings:
 
 def conditions(track: Track, settings: Settings) -> dict[str, str]:
     """Return in words on what rails, with which creep law and friction."""
-
-    def words(settings: Settings) -> str:
-        law = CREEP_LAWS[settings.creep_law]
-        cells = " {} x {} cells".format(*settings.fastsim_grid) if law.grid else ""
-        return f"{law.label}{cells}"
-
+    words = {}
+    for key, one in (("law", settings), ("linear_law", smooth_law(settings))):
+        law = CREEP_LAWS[one.creep_law]
+        words[key] = law.label + (" {} x {} cells".format(*one.fastsim_grid) if law.grid else "")
     sides = np.unique(track.friction)
     friction = "from a table" if track.friction_table else "/".join(f"{mu:g}" for mu in sides)
-    return {
-        "rails": track.support.preset,
-        "law": words(settings),
-        "linear_law": words(smooth_law(settings)),
-        "friction": friction,
-    }
+    return {"rails": track.support.preset, **words, "friction": friction}
 
 
 @dataclass(frozen=True)
@@ -116,9 +110,10 @@ class LinearVehicle:
     - `hold`: bodies that are fixed to the moving track frame where they are in steady rolling
     - `profiles`: profiles that take precedence over built-in ones and files
     - `name`: of the vehicle
+    - `remarks`: remarks for the reader of the results
     - `sticking`: number of friction elements, which a linearisation takes as sticking
 
-    Raises InputError: something is out of range. ModelError The vehicle has no equilibrium.
+    Raises InputError: something is out of range. ModelError: the vehicle has no equilibrium.
     """
 
     def __init__(
@@ -156,15 +151,19 @@ class LinearVehicle:
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
         omitted = left_out(track, settings or Settings(), assembled.wheels)
-        self._remarks = (*balance.remarks, *omitted)
+        self.remarks = (*balance.remarks, *omitted)
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
+        if self.sticking:
+            self.remarks += (
+                f"{self.sticking} friction elements stick: they are linearised with their "
+                "elasticity in sticking, and what they damp in sliding is left out",
+            )
         _check_hold(self.model, hold)
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
-        self._known: dict[float, SteadyState] = {}
+        self._known: dict[float, Floats] = {}
         self._tangents: dict[float, tuple[FreeVehicle, Floats]] = {}
-        self._rest = balance.state.copy()
-        self._rest[-2] = POSITION
+        self._rest = placed(balance.state)
         there = circle(track, curvature=self.curvature, cant=cant)
         check_fixed(assembled.flat, there)
         self.system = without_loads(self.model.system)._replace(track=track_tables(there))
@@ -179,38 +178,23 @@ class LinearVehicle:
         where = conditions(self.track, Settings())
         return f"{shape}, rails {where['rails']}, friction {where['friction']}"
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Remarks for the reader of the results."""
-        if not self.sticking:
-            return self._remarks
-        return (
-            *self._remarks,
-            f"{self.sticking} friction elements stick: they are linearised with their elasticity "
-            "in sticking, and what they damp in sliding is left out",
-        )
-
-    def steady(self, speed: float) -> SteadyState:
+    def steady(self, speed: float) -> Floats:
         """Return the state of steady rolling at a speed [m/s].
 
         Raises ModelError: there is none.
         """
+        solver = SteadyRolling(self.model, self.system, held=self.held)
+        if speed not in self._known and self._known:
+            near = min(self._known, key=lambda v: abs(v - speed))
+            with suppress(ModelError):  # too far from the known one: led there from straight track
+                self._known[speed] = solver.solve(self._known[near], speed)
         if speed not in self._known:
-            near = min(self._known, key=lambda v: abs(v - speed), default=None)
-            if near is not None:
-                try:
-                    solver = SteadyRolling(self.model, self.system, held=self.held)
-                    self._known[speed] = solver.solve(self._known[near].state, speed)
-                    return self._known[speed]
-                except ModelError:
-                    pass  # too far from the known one: led there from straight track
-            self._known[speed] = self._led(speed)
+            straight = not self.curvature and not self.cant
+            self._known[speed] = solver.solve(self._rest, speed) if straight else self._led(speed)
         return self._known[speed]
 
-    def _led(self, speed: float) -> SteadyState:
-        if not self.curvature and not self.cant:
-            solver = SteadyRolling(self.model, self.system, held=self.held)
-            return solver.solve(self._rest, speed)
+    def _led(self, speed: float) -> Floats:
+        """The same, led there from straight track."""
 
         def along(share: float) -> tuple[System, float]:
             part = circle(self.track, curvature=share * self.curvature, cant=share * self.cant)
@@ -222,7 +206,7 @@ class LinearVehicle:
     def free(self, speed: float) -> FreeVehicle:
         """Return the vehicle about its steady rolling at a speed [m/s]."""
         return FreeVehicle(
-            self.model, self.system, self.steady(speed).state, held=self.held, hold=self.hold
+            self.model, self.system, self.steady(speed), held=self.held, hold=self.hold
         )
 
     def linearised(self, speed: float, path: ContactPath | None = None) -> Linearisation:

@@ -112,7 +112,7 @@ def in_the_mean(
     amplitudes = []
     coordinates = linear.coordinates
     for w, b in enumerate(linear.model.system.contact.body):
-        y, yaw = coordinates.index_of(int(b), 1), coordinates.index_of(int(b), 5)
+        y, yaw = (coordinates.position_of[int(b), k] for k in (1, 5))
         of = [y, yaw, int(tangent.rows[w, 0]), int(tangent.rows[w, 3])]
         parts = x[of].copy()
         parts[0] -= u[0] * shift[:, w, 0]

@@ -58,7 +58,9 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
         from railsim.profiles.readers import read_profile_file
         from railsim.profiles.recognition import recognised_profile
 
-        return recognised_profile(read_profile_file(path), name_or_path, kind)
+        points = read_profile_file(path)
+        points.file = name_or_path
+        return recognised_profile(points, kind)
     else:
         raise input_error(
             shortened(name_or_path, LONGEST_FILE),

@@ -12,20 +12,10 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.profiles.profile import Profile
 
+Height = Callable[[Floats], Floats]
+
 SPACING = 0.05
 """Distance of the points along the contour [mm]."""
-
-S1002_SECTIONS = (
-    # lower end [mm], upper end [mm], name of the section in EN 13715
-    (-70.0, -62.764705882, "H"),
-    (-62.764705882, -49.662510381, "G"),
-    (-49.662510381, -39.764473993, "F"),
-    (-39.764473993, -38.426669071, "E"),
-    (-38.426669071, -35.0, "D"),
-    (-35.0, -26.0, "C"),
-    (-26.0, 32.15796, "B"),
-    (32.15796, 60.0, "A"),
-)
 
 S1002_OUTER = (1.364323640, -0.066666667)
 S1002_FLANK_END = -39.764473993
@@ -53,38 +43,42 @@ S1002_ROOT = (
 )
 
 
+def _circle(centre_y: float, centre_z: float, radius: float) -> Height:
+    """Arc above its centre, of a negative radius below it."""
+
+    def height(y: Floats) -> Floats:
+        half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
+        return np.asarray(centre_z + np.copysign(half, radius))
+
+    return height
+
+
+def _polynomial(coefficients: tuple[float, ...]) -> Height:
+    return lambda y: np.asarray(np.polynomial.polynomial.polyval(y, coefficients))
+
+
+S1002_SECTIONS: dict[str, tuple[float, Height]] = {
+    # name of the section in EN 13715: upper end [mm], height
+    "H": (-62.764705882, _circle(-49.5, 9.519259302, 20.5)),
+    "G": (-49.662510381, _circle(-55.0, 16.0, 12.0)),
+    "F": (S1002_FLANK_END, _circle(-58.558326413, 8.834924130, 20.0)),
+    "E": (-38.426669071, _polynomial(S1002_FLANK)),
+    "D": (-35.0, _circle(-26.210665, 16.446, -13.0)),
+    "C": (-26.0, _polynomial(S1002_ROOT)),
+    "B": (32.15796, _polynomial(S1002_TREAD)),
+    "A": (60.0, _polynomial(S1002_OUTER)),
+}
+
+
 def s1002_height(y: Floats) -> Floats:
     """Height of the S1002 contour [mm] at the lateral position y [mm], flange at negative y.
 
-    Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H.  The standard's
-    polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
+    Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H, from -70 mm on.  The
+    standard's polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
     """
-
-    def circle(y: Floats, centre_y: float, centre_z: float, radius: float) -> Floats:
-        half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
-        z: Floats = centre_z + np.copysign(half, radius)
-        return z
-
-    def polynomial(y: Floats, coefficients: tuple[float, ...]) -> Floats:
-        return np.asarray(np.polynomial.polynomial.polyval(y, coefficients), dtype=np.float64)
-
-    section: dict[str, Callable[[Floats], Floats]] = {
-        "A": lambda y: polynomial(y, S1002_OUTER),
-        "B": lambda y: polynomial(y, S1002_TREAD),
-        "C": lambda y: polynomial(y, S1002_ROOT),
-        "D": lambda y: circle(y, -26.210665, 16.446, -13.0),
-        "E": lambda y: polynomial(y, S1002_FLANK),
-        "F": lambda y: circle(y, -58.558326413, 8.834924130, 20.0),
-        "G": lambda y: circle(y, -55.0, 16.0, 12.0),
-        "H": lambda y: circle(y, -49.5, 9.519259302, 20.5),
-    }
-    upper = [end for _, end, _ in S1002_SECTIONS[:-1]]
-    index = np.searchsorted(upper, y, side="right")
-    z = np.empty_like(y)
-    for i, (_, _, name) in enumerate(S1002_SECTIONS):
-        inside = index == i
-        z[inside] = section[name](y[inside])
-    return z
+    ends, heights = zip(*S1002_SECTIONS.values(), strict=True)
+    index = np.searchsorted(ends[:-1], y, side="right")
+    return np.piecewise(y, [index == k for k in range(len(heights))], heights)
 
 
 def even_points(y: Floats, z: Floats, spacing: float) -> Floats:
@@ -95,12 +89,17 @@ def even_points(y: Floats, z: Floats, spacing: float) -> Floats:
     return positions
 
 
-def s1002() -> Profile:
-    """Wheel profile S1002 of EN 13715, flange 32.5 mm thick and 28 mm high."""
+def _wheel(name: str, height: Height, source: str) -> Profile:
+    """Wheel profile of a contour from -70 to 60 mm [mm]."""
     # finely pre-sampled so that the distances along the nearly vertical flange back are right
     fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
-    y = even_points(fine, s1002_height(fine), SPACING)
-    return Profile("S1002", "wheel", 1e-3 * y, 1e-3 * s1002_height(y), "EN 13715, profile S1002")
+    y = even_points(fine, height(fine), SPACING)
+    return Profile(name, "wheel", 1e-3 * y, 1e-3 * height(y), source)
+
+
+def s1002() -> Profile:
+    """Wheel profile S1002 of EN 13715, flange 32.5 mm thick and 28 mm high."""
+    return _wheel("S1002", s1002_height, "EN 13715, profile S1002")
 
 
 HOLLOW_DEPTH, HOLLOW_HALF = 0.9, 35.0
@@ -137,7 +136,6 @@ def cone(taper: float) -> Profile:
     centre_y, centre_z = np.linalg.solve(lines, right_side)
     start = centre_y - radius * taper / np.hypot(taper, 1.0)
     end = centre_y + radius * slope / np.hypot(slope, 1.0)
-    fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
 
     def height(y: Floats) -> Floats:
         fillet = centre_z - np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
@@ -145,28 +143,24 @@ def cone(taper: float) -> Profile:
         flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
         return np.where(y > start, -taper * y, np.where(y > end, fillet, flange))
 
-    y = even_points(fine, height(fine), SPACING)
-    return Profile(
-        f"cone 1:{1.0 / taper:.0f}",
-        "wheel",
-        1e-3 * y,
-        1e-3 * height(y),
-        f"cone of 1:{1.0 / taper:.0f}, flank, tip and back of S1002, fillet of 13 mm",
-    )
+    ratio = f"1:{1.0 / taper:.0f}"
+    source = f"cone of {ratio}, flank, tip and back of S1002, fillet of 13 mm"
+    return _wheel(f"cone {ratio}", height, source)
+
+
+FLANK_DEPTH = 38.0
+"""Depth below the crown to which the flank of a rail is drawn [mm]."""
 
 
 def arc_chain_rail(
-    half_widths: tuple[float, ...],
-    radii: tuple[float, ...],
-    flank_slope: float = 0.05,
-    depth: float = 38.0,
+    half_widths: tuple[float, ...], radii: tuple[float, ...], flank_slope: float = 0.05
 ) -> tuple[Floats, Floats]:
     """Rail head of tangent arcs and a straight flank, symmetric about its axis.
 
     `half_widths`: distances from the axis at which each arc but the last meets the next one [mm];
     `radii`: radii from the crown to the gauge corner [mm]; `flank_slope`: flank's inclination to
-    the vertical [1]; `depth`: depth below the crown to which the flank is drawn [mm]. Returns: `y,
-    z` (shape (n,)): contour from the left flank to the right one, z down from the crown [mm].
+    the vertical [1]. Returns: `y, z` (shape (n,)): contour from the left flank to the right one, z
+    down from the crown [mm].
     """
     angles, centre = [0.0], [(0.0, radii[0])]
     for i, half_width in enumerate(half_widths):
@@ -185,8 +179,8 @@ def arc_chain_rail(
         y_parts.append(centre[i][0] + radius * np.sin(angle_points))
         z_parts.append(centre[i][1] - radius * np.cos(angle_points))
     y_end, z_end = y_parts[-1][-1], z_parts[-1][-1]
-    n = int(np.ceil((depth - z_end) / SPACING))
-    z_flank = np.linspace(z_end, depth, n + 1)[1:]
+    n = int(np.ceil((FLANK_DEPTH - z_end) / SPACING))
+    z_flank = np.linspace(z_end, FLANK_DEPTH, n + 1)[1:]
     y_parts.append(y_end + flank_slope * (z_flank - z_end))
     z_parts.append(z_flank)
     y, z = np.concatenate(y_parts), np.concatenate(z_parts)
@@ -240,10 +234,7 @@ DEFINITIONS: dict[str, Callable[[], Profile]] = {
     "S1002_hollow": s1002_hollow,
     "cone_1in20": partial(cone, 1 / 20),
     "cone_1in40": partial(cone, 1 / 40),
-    "60E1": partial(en_rail, "60E1"),
-    "60E2": partial(en_rail, "60E2"),
-    "54E1": partial(en_rail, "54E1"),
-    "49E1": partial(en_rail, "49E1"),
+    **{name: partial(en_rail, name) for name in RAIL_HEADS},
     "benchmark": rail_benchmark,
 }
 

@@ -80,16 +80,10 @@ class Profile:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Profile):
             return NotImplemented
-        return (
-            self.name == other.name
-            and self.kind == other.kind
-            and self.inclination == other.inclination
-            and np.array_equal(self.y, other.y)
-            and np.array_equal(self.z, other.z)
-        )
+        return self.name == other.name and self.key() == other.key()
 
     def __hash__(self) -> int:
-        return hash((self.name, self.kind, self.inclination, self.y.tobytes(), self.z.tobytes()))
+        return hash((self.name, self.key()))
 
     def __repr__(self) -> str:
         return f"<Profile {printable(self.name)!r}: {self.kind}, {self.y.size} points>"

@@ -13,11 +13,11 @@ import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import InputError, input_error
 from railsim.files.access import read_bytes
 from railsim.profiles.profile import Kind
@@ -31,45 +31,49 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 
 
 @dataclass
-class RawProfile:
-    """What a file holds.
+class Points:
+    """Points of a file on their way to a profile.
 
-    `y`, `z`, shape (n,): points in the file's order and axes [m, or the file's unit if `unit` is
-    None]; `line`, shape (n,): line of each point in the file, from 1; `unit`: metres per unit of
-    the file; None if the file does not say; `kind`: what the file says that it is; `name`: title;
-    `notes`: what was done on the file's own request.
+    `file`: its name, for messages; `y`, `z`, shape (n,): as read in the file's order, axes and
+    unit; `line`, shape (n,): line of each point in the file, from 1; `unit`: metres per unit of the
+    file; None if the file does not say; `kind`: what the file says that it is; `name`: title;
+    `notes`: what was done on the file's own request, then what was recognised.
     """
 
+    file: str
     y: Floats
     z: Floats
-    line: NDArray[np.int64]
+    line: Integers
     unit: float | None = None
     kind: Kind | None = None
     name: str = ""
     notes: list[str] = field(default_factory=list)
 
+    def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:
+        """Return what to raise about a point."""
+        key = "" if at is None else f"line {int(self.line[at])}"
+        return input_error(self.file, found, remedy, key=key)
 
-class _Points:
-    """Collects points line by line; the first fault ends the reading."""
+    def keep(self, which: Any) -> None:
+        """Keep some of the points, or bring them into another order."""
+        self.y, self.z, self.line = self.y[which], self.z[which], self.line[which]
 
-    def __init__(self, file: str) -> None:
-        self.file = file
-        self.y: list[float] = []
-        self.z: list[float] = []
-        self.line: list[int] = []
 
-    def add(self, texts: list[str], line: int) -> None:
-        if len(texts) < 2:
-            raise _fault(self.file, line, f"one number instead of two: {_shown(texts)}")
-        values = [_number(text) for text in texts[:2]]
-        if values[0] is None or values[1] is None:
-            raise _fault(self.file, line, f"not a pair of numbers: {_shown(texts)}")
-        self.y.append(values[0])
-        self.z.append(values[1])
-        self.line.append(line)
+Row = tuple[float, float, int]  # y, z, line of the file
 
-    def raw(self) -> RawProfile:
-        return RawProfile(np.array(self.y), np.array(self.z), np.array(self.line, dtype=np.int64))
+
+def _points(file: str, rows: list[Row], **facts: Any) -> Points:
+    y, z, line = np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(-1, 3).T)
+    return Points(file, y, z, line.astype(np.int64), **facts)
+
+
+def _row(file: str, texts: list[str], line: int) -> Row:
+    if len(texts) < 2:
+        raise _fault(file, line, f"one number instead of two: {_shown(texts)}")
+    y, z = map(_number, texts[:2])
+    if y is None or z is None:
+        raise _fault(file, line, f"not a pair of numbers: {_shown(texts)}")
+    return y, z, line
 
 
 def _shown(texts: list[str]) -> str:
@@ -89,13 +93,12 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def read_profile_file(path: str | Path) -> RawProfile:
+def read_profile_file(path: Path) -> Points:
     """Read a profile file.
 
     `path`: file; its suffix decides about the format. Raises InputError: if the file cannot be read
     or a line is not what its format wants.
     """
-    path = Path(path)
     file = str(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -106,22 +109,20 @@ def read_profile_file(path: str | Path) -> RawProfile:
     # titles may hold any character; numbers are ASCII in every one of these encodings
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     if suffix in (".prw", ".prr"):
-        raw = _simpack(file, lines)
-        told: Kind = "wheel" if suffix == ".prw" else "rail"
-        raw.kind = raw.kind or told
+        found = _simpack(file, lines)
+        found.kind = found.kind or ("wheel" if suffix == ".prw" else "rail")
     elif suffix in (".whl", ".ban"):
-        raw = _miniprof(file, lines)
-        raw.kind = "wheel" if suffix == ".whl" else "rail"
-        raw.unit = raw.unit or 1e-3
+        found = _miniprof(file, lines)
+        found.kind = "wheel" if suffix == ".whl" else "rail"
     else:
-        raw = _csv(file, lines)
-    raw.name = raw.name or path.stem
-    return raw
+        found = _csv(file, lines)
+    found.name = found.name or path.stem
+    return found
 
 
-def _csv(file: str, lines: list[str]) -> RawProfile:
+def _csv(file: str, lines: list[str]) -> Points:
     """Columns y, z with an optional header that gives the unit; further columns are left out."""
-    points = _Points(file)
+    rows: list[Row] = []
     unit: float | None = None
     columns = (0, 1)
     for number, line in enumerate(lines, start=1):
@@ -129,16 +130,14 @@ def _csv(file: str, lines: list[str]) -> RawProfile:
         if not text or text.startswith("#"):
             continue
         cells = _cells(text)
-        if not points.y and _number(cells[0]) is None:
+        if not rows and _number(cells[0]) is None:
             names = [cell.strip().strip('"').lower() for cell in cells]
             columns, unit = _header(file, number, names)
             continue
         if len(cells) <= max(columns):
             raise _fault(file, number, f"{len(cells)} columns: {_shown(cells)}")
-        points.add([cells[columns[0]], cells[columns[1]]], number)
-    raw = points.raw()
-    raw.unit = unit
-    return raw
+        rows.append(_row(file, [cells[column] for column in columns], number))
+    return _points(file, rows, unit=unit)
 
 
 def _cells(text: str) -> list[str]:
@@ -166,9 +165,9 @@ def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], fl
     )
 
 
-def _simpack(file: str, lines: list[str]) -> RawProfile:
+def _simpack(file: str, lines: list[str]) -> Points:
     """SIMPACK: keys of a spline section, then points; processing in the file's numbered order."""
-    points = _Points(file)
+    rows: list[Row] = []
     values: dict[str, float] = {}
     title, inside, kind_flag = "", False, None
     for number, line in enumerate(lines, start=1):
@@ -180,7 +179,7 @@ def _simpack(file: str, lines: list[str]) -> RawProfile:
             inside = lower == "point.begin"
             continue
         if inside:
-            points.add(text.split(), number)
+            rows.append(_row(file, text.split(), number))
             continue
         key, _, value = (part.strip() for part in text.partition("="))
         if key.lower() == "comment":
@@ -192,22 +191,20 @@ def _simpack(file: str, lines: list[str]) -> RawProfile:
             values[key.lower()] = parsed
         elif key.lower() in NUMERIC_KEYS:
             raise _fault(file, number, f"{key} is not a number: {value!r}", "give a number")
-    if not points.y:
+    if not rows:
         raise input_error(
             file, "no points", "SIMPACK files hold them from point.begin to point.end"
         )
-    raw = points.raw()
-    raw.name = title
-    if kind_flag is not None:
-        raw.kind = "wheel" if kind_flag == 1.0 else "rail"
     per_metre = values.get("units.len.f", 1.0)
     if per_metre <= 0.0:
         raise input_error(
             file, f"{per_metre:g}", "units per metre, 1000 for millimetres", key="units.len.f"
         )
-    raw.unit = 1.0 / per_metre
-    _process_simpack(raw, values)
-    return raw
+    found = _points(file, rows, unit=1.0 / per_metre, name=title)
+    if kind_flag is not None:
+        found.kind = "wheel" if kind_flag == 1.0 else "rail"
+    _process_simpack(found, values)
+    return found
 
 
 NUMERIC_KEYS = (
@@ -222,34 +219,35 @@ NUMERIC_KEYS = (
 )
 
 
-def _process_simpack(raw: RawProfile, values: dict[str, float]) -> None:
+def _process_simpack(points: Points, values: dict[str, float]) -> None:
     """Shift, rotate, cut and mirror as the file asks, in its order."""
-    raw.y = raw.y + values.get("shift.y", 0.0)
-    raw.z = raw.z + values.get("shift.z", 0.0)
+    points.y = points.y + values.get("shift.y", 0.0)
+    points.z = points.z + values.get("shift.z", 0.0)
     angle = values.get("rotate", 0.0) / (values.get("units.ang.f", 1.0) or 1.0)
     if angle != 0.0:
         cosine, sine = math.cos(angle), math.sin(angle)
-        raw.y, raw.z = raw.y * cosine - raw.z * sine, raw.y * sine + raw.z * cosine
-        raw.notes.append(f"rotated by {1e3 * angle:.3f} mrad as the file asks")
-    keep = np.ones(raw.y.size, dtype=bool)
-    for axis, points in (("y", raw.y), ("z", raw.z)):
+        y, z = points.y, points.z
+        points.y, points.z = y * cosine - z * sine, y * sine + z * cosine
+        points.notes.append(f"rotated by {1e3 * angle:.3f} mrad as the file asks")
+    keep = np.ones(points.y.size, dtype=bool)
+    for axis, coordinate in (("y", points.y), ("z", points.z)):
         lower, upper = values.get(f"bound.{axis}.min", 1.0), values.get(f"bound.{axis}.max", 0.0)
         if lower < upper:  # the default 1, 0 means no bounds
-            keep &= (points >= lower) & (points <= upper)
+            keep &= (coordinate >= lower) & (coordinate <= upper)
     if not keep.all():
-        raw.notes.append(f"{np.sum(~keep)} points beyond the file's own bounds left out")
-        raw.y, raw.z, raw.line = raw.y[keep], raw.z[keep], raw.line[keep]
+        points.notes.append(f"{np.sum(~keep)} points beyond the file's own bounds left out")
+        points.keep(keep)
     if values.get("mirror.y", 0.0) == 1.0:
-        raw.y = -raw.y
+        points.y = -points.y
     if values.get("mirror.z", 0.0) == 1.0:
-        raw.z = -raw.z
+        points.z = -points.z
     if values.get("inversion", 0.0) == 1.0:
-        raw.y, raw.z, raw.line = raw.y[::-1].copy(), raw.z[::-1].copy(), raw.line[::-1].copy()
+        points.keep(np.arange(points.y.size)[::-1])
 
 
-def _miniprof(file: str, lines: list[str]) -> RawProfile:
+def _miniprof(file: str, lines: list[str]) -> Points:
     """MiniProf: header of Key=Value lines or a title block, an empty line, columns X Y."""
-    points = _Points(file)
+    rows: list[Row] = []
     columns = [0, 1]
     facts: dict[str, str] = {}
     for number, line in enumerate(lines, start=1):
@@ -258,7 +256,7 @@ def _miniprof(file: str, lines: list[str]) -> RawProfile:
             continue  # a quotation mark begins a remark
         words = text.replace(",", " ").split()
         numeric = len(words) > 1 and _number(words[0]) is not None and _number(words[1]) is not None
-        if "=" in text or (not points.y and not numeric):
+        if "=" in text or (not rows and not numeric):
             key, _, value = text.partition("=")
             facts[key.strip().lower()] = value.strip()
             if key.strip().lower() == "columndef" and value:
@@ -266,13 +264,12 @@ def _miniprof(file: str, lines: list[str]) -> RawProfile:
             continue
         if len(words) <= max(columns):
             raise _fault(file, number, f"{len(words)} columns: {_shown(words)}")
-        points.add([words[columns[0]], words[columns[1]]], number)
-    raw = points.raw()
-    if facts.get("columndef"):
-        stated = facts.get("xypoints", "")
-        if stated.isdigit() and int(stated) != raw.y.size:
-            raw.notes.append(f"the header announces {stated} points, the file holds {raw.y.size}")
-    return raw
+        rows.append(_row(file, [words[column] for column in columns], number))
+    found = _points(file, rows, unit=1e-3)
+    stated = facts.get("xypoints", "") if facts.get("columndef") else ""
+    if stated.isdigit() and int(stated) != len(rows):
+        found.notes.append(f"the header announces {stated} points, the file holds {len(rows)}")
+    return found
 
 
 def _miniprof_columns(file: str, line: int, value: str) -> list[int]:

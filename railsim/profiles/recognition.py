@@ -10,14 +10,12 @@ seen from the rail, within its first half and round (the contour turns back behi
 of a rail: a crown from which the contour only falls, 14 mm or more on the gauge side.
 """
 
-from pathlib import Path
-
 import numpy as np
 
 from railsim.arrays import Floats
 from railsim.profiles.profile import FLANGE_BACK, Kind, Profile
-from railsim.profiles.readers import RawProfile
-from railsim.profiles.smoothing import Points, smoothed_points, used_part
+from railsim.profiles.readers import Points
+from railsim.profiles.smoothing import smoothed_points, used_part
 
 FEWEST_POINTS = 20
 LARGEST_HOLE = 0.006
@@ -35,24 +33,23 @@ UPRIGHT = 4e-3
 """Lean that measuring noise and wear may feign [1]."""
 
 
-def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> Profile:
+def recognised_profile(work: Points, kind: Kind | None = None) -> Profile:
     """Turn a file's points into a profile.
 
-    `raw`: what the file holds; `file`: its name, for messages; `kind`: what it is used as; None
-    goes by the file. Returns: with a note on every correction. Raises InputError: if it is not a
-    usable profile of that kind.
+    `work`: what the file holds; is changed; `kind`: what it is used as; None goes by the file.
+    Returns: with a note on every correction. Raises InputError: if it is not a usable profile of
+    that kind.
     """
-    kind = kind or raw.kind
+    kind = kind or work.kind
     if kind is None:
-        kind = "wheel" if _looks_like_wheel(raw) else "rail"
-    work = Points(file, raw.y.copy(), raw.z.copy(), raw.line, list(raw.notes))
-    if raw.y.size < FEWEST_POINTS:
+        kind = "wheel" if _looks_like_wheel(work) else "rail"
+    if work.y.size < FEWEST_POINTS:
         raise work.fail(
-            f"{raw.y.size} points", f"a profile needs {FEWEST_POINTS} or more, 0.5 mm apart"
+            f"{work.y.size} points", f"a profile needs {FEWEST_POINTS} or more, 0.5 mm apart"
         )
-    if raw.kind is not None and raw.kind != kind:
-        raise work.fail(f"this is a {raw.kind} profile", f"give a {kind} profile")
-    _to_metres(work, raw.unit, kind)
+    if work.kind is not None and work.kind != kind:
+        raise work.fail(f"this is a {work.kind} profile", f"give a {kind} profile")
+    _to_metres(work, kind)
     _remove_double_points(work)
     _bring_into_order(work)
     _remove_outliers(work)
@@ -69,49 +66,48 @@ def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> 
     level = float(np.interp(0.0, *_function_part(y, z, 0.0)) if kind == "wheel" else z.min())
     smoothed = y is not work.y
     return Profile(
-        raw.name or Path(file).stem,
+        work.name,
         kind,
         y,
         z - level,
-        str(file),
+        work.file,
         inclination,
         tuple(work.notes),
         measured=np.stack((work.y, work.z - level)) if smoothed else None,
     )
 
 
-def _looks_like_wheel(raw: RawProfile) -> bool:
+def _looks_like_wheel(work: Points) -> bool:
     """Guess for files that do not say: wheels are more than 95 mm wide, rail heads less."""
-    width = np.ptp(raw.y) if raw.y.size else 0.0
-    scale = raw.unit or (1e-3 if width > 1.0 else 1.0)
+    width = np.ptp(work.y) if work.y.size else 0.0
+    scale = work.unit or (1e-3 if width > 1.0 else 1.0)
     return bool(width * scale > 0.095)
 
 
-def _to_metres(work: Points, unit: float | None, kind: Kind) -> None:
+def _to_metres(work: Points, kind: Kind) -> None:
     """Convert to metres, from the file's unit or from the size."""
+    unit = work.unit
     width = float(np.ptp(work.y))
     sizes = (0.060, 0.220) if kind == "wheel" else (0.030, 0.250)
 
     def fits(scale: float) -> bool:
         return sizes[0] <= width * scale <= sizes[1]
 
-    remedy = f"a {kind} is {1e3 * sizes[0]:.0f} to {1e3 * sizes[1]:.0f} mm wide"
-    if unit is None:
-        found = [scale for scale in (1e-3, 1.0) if fits(scale)]
-        if not found:
-            raise work.fail(f"width {width:g}, neither millimetres nor metres", remedy)
-        unit = found[0]
-        work.notes.append(f"taken as {'millimetres' if unit == 1e-3 else 'metres'} by its width")
-    elif not fits(unit):
-        other = next((scale for scale in (1e-3, 1.0) if fits(scale)), None)
-        if other is None:
-            raise work.fail(f"{1e3 * width * unit:.4g} mm wide", remedy)
-        names = {1e-3: "millimetres", 1.0: "metres"}
-        work.notes.append(
-            f"the file says {names.get(unit, f'{unit:g} m')}, its width says {names[other]}: "
-            f"taken as {names[other]}"
-        )
-        unit = other
+    names = {1e-3: "millimetres", 1.0: "metres"}
+    if unit is None or not fits(unit):
+        by_width = next((scale for scale in names if fits(scale)), None)
+        if by_width is None:
+            found = f"width {width:g}, neither millimetres nor metres"
+            found = found if unit is None else f"{1e3 * width * unit:.4g} mm wide"
+            remedy = f"a {kind} is {1e3 * sizes[0]:.0f} to {1e3 * sizes[1]:.0f} mm wide"
+            raise work.fail(found, remedy)
+        taken = names[by_width]
+        words = f"taken as {taken} by its width"
+        if unit is not None:
+            said = names.get(unit, f"{unit:g} m")
+            words = f"the file says {said}, its width says {taken}: taken as {taken}"
+        work.notes.append(words)
+        unit = by_width
     work.y, work.z = work.y * unit, work.z * unit
 
 
@@ -193,14 +189,10 @@ def _orient_wheel(work: Points) -> None:
         z = sign * work.z
         tip = int(np.argmax(z))
         lateral = (work.y[tip] - work.y.min()) / np.ptp(work.y)
-        for side, share in (("low", lateral), ("high", 1.0 - lateral)):
-            if share > 0.45:
-                continue
-            beyond = work.y < work.y[tip] if side == "low" else work.y > work.y[tip]
-            tread_from = 0.045
-            inward = work.y - work.y[tip] if side == "low" else work.y[tip] - work.y
-            tread = (inward > tread_from) & (inward < 0.100)
-            if tread.sum() < 3:
+        for side, share in ((1.0, lateral), (-1.0, 1.0 - lateral)):
+            inward = side * (work.y - work.y[tip])
+            beyond, tread = inward < 0.0, (inward > 0.045) & (inward < 0.100)
+            if share > 0.45 or tread.sum() < 3:
                 continue
             level = float(np.median(z[tread]))
             height = float(z[tip] - level)
@@ -225,7 +217,7 @@ def _orient_wheel(work: Points) -> None:
     if sign < 0:
         work.z = -work.z
         work.notes.append("z pointed to the axle: turned")
-    if side == "high":
+    if side < 0:
         work.y = -work.y
         work.notes.append("flange at positive y: mirrored")
     _flange_side_first(work)
@@ -301,7 +293,6 @@ def _orient_rail(work: Points) -> float:
         work.z = -work.z
         work.notes.append("z pointed upwards: turned")
     work.z = work.z - work.z.min()
-    top = int(np.argmin(work.z))
     _flange_side_first(work)
     top = int(np.argmin(work.z))
     for part in (work.z[top:], work.z[top::-1]):

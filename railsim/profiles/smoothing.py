@@ -1,14 +1,11 @@
 """Smoothing of measured profiles against their own noise."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
-from railsim.arrays import Floats
-from railsim.errors import InputError, input_error
+from railsim.arrays import Flags, Floats
 from railsim.profiles.profile import Kind
+from railsim.profiles.readers import Points
 
 CURVATURE_NOISE = 3.0
 """Curvature that noise may leave after smoothing [1/m], some 4 % of a gauge corner's."""
@@ -23,27 +20,7 @@ NOISE_FLOOR = 0.15e-6
 """Noise below this is the rounding of printed numbers and is left alone [m]."""
 
 
-@dataclass
-class Points:
-    """Points on their way to a profile."""
-
-    file: str
-    y: Floats
-    z: Floats
-    line: NDArray[np.int64]
-    notes: list[str]
-
-    def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:
-        """Return what to raise about a point."""
-        key = "" if at is None else f"line {int(self.line[at])}"
-        return input_error(self.file, found, remedy, key=key)
-
-    def keep(self, which: Floats | NDArray[np.bool_] | NDArray[np.int64]) -> None:
-        """Keep some of the points, or bring them into another order."""
-        self.y, self.z, self.line = self.y[which], self.z[which], self.line[which]
-
-
-def used_part(y: Floats, z: Floats, kind: Kind) -> NDArray[np.bool_]:
+def used_part(y: Floats, z: Floats, kind: Kind) -> Flags:
     """Intervals between points on which wheel and rail may touch."""
     middle_y, middle_z = 0.5 * (y[1:] + y[:-1]), 0.5 * (z[1:] + z[:-1])
     if kind == "rail":
@@ -93,12 +70,13 @@ def _noise(s: Floats, values: Floats) -> float:
     if n < 8:
         return 0.0
     centre = np.arange(2, n - 2)
+    neighbours = centre[:, None] + np.array([-2, -1, 1, 2])
     weights = np.ones((centre.size, 4))
-    near = s[centre[:, None] + np.array([-2, -1, 1, 2])]
+    near = s[neighbours]
     for a in range(4):
         for b in range(4):
             if a != b:
                 weights[:, a] *= (s[centre] - near[:, b]) / (near[:, a] - near[:, b])
-    predicted = np.sum(weights * values[centre[:, None] + np.array([-2, -1, 1, 2])], axis=1)
+    predicted = np.sum(weights * values[neighbours], axis=1)
     spread = np.sqrt(1.0 + np.sum(weights**2, axis=1))
     return float(np.median(np.abs(values[centre] - predicted) / spread) / 0.6745)

@@ -34,13 +34,6 @@ if TYPE_CHECKING:
 
 D = TypeVar("D")
 Attributes = Mapping[str, str | float | int]
-Writer = Callable[["Result", str | Path, bool], Path]
-_WRITERS: dict[str, Writer] = {}  # of files; each enters itself when the package is imported
-
-
-def register_writer(kind: str, write: Writer) -> None:
-    """Let `Result` write files of a kind: the layout of a file is built on this module."""
-    _WRITERS[kind] = write
 
 
 class Result:
@@ -101,9 +94,7 @@ class Result:
         self._profiles = MappingProxyType(dict(profiles))
         frozen_groups = {group: FrozenArrays(arrays) for group, arrays in groups.items()}
         self._groups = MappingProxyType(frozen_groups)
-        # read when they are first asked for
-        self._vehicle: Vehicle | None = None
-        self._track: Track | None = None
+        self._definitions: dict[str, Any] = {}  # read when they are first asked for
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what `pickle` restores the result from: all arrays, read if necessary."""
@@ -221,7 +212,10 @@ class Result:
     def _index(self, dim: str, label: str | int | None) -> int | slice:
         if label is None:
             return slice(None)
-        if dim == "time" and not isinstance(label, str):
+        if dim == "time":
+            instants = len(self["time"])
+            if isinstance(label, str) or not -instants <= label < instants:
+                raise KeyError(f"no instant {label!r}; 0 to {instants - 1}")
             return label
         return index_of(dim, self._coordinates[dim], label)
 
@@ -281,17 +275,13 @@ class Result:
         """Rebuild the vehicle's definition from the text that the result carries."""
         from railsim.definitions.loading import load_vehicle_text
 
-        if self._vehicle is None:
-            self._vehicle = self._rebuilt("vehicle_toml", load_vehicle_text)
-        return self._vehicle
+        return self._rebuilt("vehicle_toml", load_vehicle_text)
 
     def track(self) -> "Track":
         """Rebuild the track's definition from the text that the result carries."""
         from railsim.definitions.loading import load_track_text
 
-        if self._track is None:
-            self._track = self._rebuilt("track_toml", load_track_text)
-        return self._track
+        return self._rebuilt("track_toml", load_track_text)
 
     def settings(self) -> "Settings":
         """Rebuild the settings from what the result carries."""
@@ -301,13 +291,16 @@ class Result:
 
     def _rebuilt(self, name: str, load: Callable[[str], D]) -> D:
         """Return what an attribute describes; its faults name the file that holds it."""
-        try:
-            return load(str(self._attributes[name]))
-        except InputError as error:
-            source = f"{self._source}: " if self._source else ""
-            raise InputError(
-                replace(fault, file=f"{source}{fault.file}") for fault in error.faults
-            ) from None
+        if name not in self._definitions:
+            try:
+                self._definitions[name] = load(str(self._attributes[name]))
+            except InputError as error:
+                source = f"{self._source}: " if self._source else ""
+                raise InputError(
+                    replace(fault, file=f"{source}{fault.file}") for fault in error.faults
+                ) from None
+        found: D = self._definitions[name]
+        return found
 
     def inputs(self) -> dict[str, Any]:
         """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
@@ -371,17 +364,12 @@ class Result:
         InputError
             The file exists and may not be overwritten, or cannot be written.
         """
-        return _WRITERS["hdf5"](self, path, overwrite)
+        from railsim.result.hdf5 import write  # the layout of the file is built on this module
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the result file, as `to_hdf5`: definitions and results alike are saved by `save`.
+        return write(self, path, overwrite=overwrite)
 
-        Raises
-        ------
-        InputError
-            The file exists and may not be overwritten, or cannot be written.
-        """
-        return self.to_hdf5(path, overwrite=overwrite)
+    save = to_hdf5
+    """As `to_hdf5`: definitions and results alike are saved by `save`."""
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the arrays as an `xarray.Dataset` with named coordinates and units.

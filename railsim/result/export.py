@@ -17,7 +17,7 @@ from railsim.arrays import Floats
 from railsim.errors import InputError, argument_error, argument_fault, nearest
 from railsim.files.access import check_file, whole_file
 from railsim.result.data import Result
-from railsim.result.filters import low_passed
+from railsim.result.filters import even_step, low_passed
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
@@ -90,10 +90,10 @@ def selected(
 
 def _smooth(time: Floats, values: Floats, rate: float) -> Floats:
     """Return values without what changes faster than half the rate; as they are at uneven times."""
-    steps = np.diff(time[:-1])  # the last one may be shorter
-    if len(steps) < 2 or np.ptp(steps) > 1e-6 * steps[0] or rate * steps[0] >= 1.0:
+    step = even_step(time)
+    if step is None or len(time) < 4 or rate * step >= 1.0:
         return values
-    return low_passed(values, 1.0 / float(np.mean(steps)), 0.4 * rate)
+    return low_passed(values, 1.0 / step, 0.4 * rate)
 
 
 def _at(instants: Floats, time: Floats, values: Floats) -> Floats:

@@ -14,7 +14,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.track.section import Section
 from railsim.notation import Quantity
 from railsim.result.data import Result
-from railsim.result.filters import low_passed
+from railsim.result.filters import even_step, low_passed
 
 FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
 """Quantities whose peaks are also given after the low pass."""
@@ -118,7 +118,7 @@ def _extreme(array: Floats, kind: str) -> tuple[Any, ...]:
     return np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
 
 
-def low_pass_of(result: Result, name: str, known: dict[str, Floats] | None = None) -> Floats | None:
+def _low_pass_of(result: Result, name: str, known: dict[str, Floats]) -> Floats | None:
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
     Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
@@ -126,15 +126,10 @@ def low_pass_of(result: Result, name: str, known: dict[str, Floats] | None = Non
 
     `known` keeps what has been filtered of this result, and is filled.
     """
-    time = result["time"]
-    if len(time) < 3:
-        return None
-    steps = np.diff(time[: len(time) - 1])  # the last one may be shorter
-    step = float(np.mean(steps))
-    if np.ptp(steps) > 1e-6 * step or step * LOW_PASS * LEAST_RATE > 1.0:
+    step = even_step(result["time"])
+    if step is None or step * LOW_PASS * LEAST_RATE > 1.0:
         return None
     rate = 1.0 / step
-    known = {} if known is None else known
 
     def passed(part: str) -> Floats:
         if part not in known:
@@ -152,13 +147,6 @@ def low_pass_of(result: Result, name: str, known: dict[str, Floats] | None = Non
             return None
         smooth = passed(name)
     return np.asarray(smooth[evaluated(result)])
-
-
-def _with_low_pass(result: Result, found: Peak, known: dict[str, Floats]) -> Peak:
-    smooth = low_pass_of(result, found.quantity.name, known)
-    if smooth is None or not len(smooth) or np.isnan(smooth).all():
-        return found
-    return replace(found, smooth=float(smooth[_extreme(smooth, found.kind)]))
 
 
 def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...]:
@@ -181,9 +169,12 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     known: dict[str, Floats] = {}
     found: list[Peak] = []
     for name in _wanted(result, names):
+        smooth = _low_pass_of(result, name, known) if name in FORCES else None
         for kind in ("max", "min") if name in BY_SIGN else ("abs",):
             one = peak(result, name, kind)
-            found.append(_with_low_pass(result, one, known) if name in FORCES else one)
+            if smooth is not None and not np.isnan(smooth).all():
+                one = replace(one, smooth=float(smooth[_extreme(smooth, kind)]))
+            found.append(one)
     return tuple(found)
 
 
@@ -265,9 +256,7 @@ def mid_curves(
     for section in curvature_sections(on):
         middle = 0.5 * (section.begin + section.end)
         if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:
-            curve = _mid_curve(result, wanted, section)
-            smooth = not on.irregularities
-            found.append(curve if smooth else replace(curve, settling=False))
+            found.append(_mid_curve(result, wanted, section, smooth=not on.irregularities))
     return tuple(found)
 
 
@@ -287,7 +276,7 @@ def _full_curve(result: Result, section: Section) -> tuple[float, float]:
     return (begin, end) if begin < middle < end else (middle, middle)
 
 
-def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
+def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bool) -> MidCurve:
     radius, middle = 1.0 / section.start_value, 0.5 * (section.begin + section.end)
     distance = result["distance"]
     after = max(1, int(np.searchsorted(distance, middle)))
@@ -321,7 +310,7 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
     changes = np.concatenate(settling) if settling else np.zeros(0)
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
     found = values, tuple(largest), medians, scatter, steady, (begin, end)
-    unsettled = bool(len(changes) and np.mean(changes) > 0.5)
+    unsettled = bool(smooth and len(changes) and np.mean(changes) > 0.5)
     return MidCurve(radius, middle, time, *found, unsettled)
 
 
@@ -345,7 +334,7 @@ def _settling(values: Floats) -> Floats:
 
 def _largest(result: Result, name: str, array: Floats, time: float, distance: float) -> Peak:
     """Largest magnitude over the dimensions of a quantity."""
-    index = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
+    index = _extreme(array, "abs")
     labels = _labels(result, name, index)
     return Peak(result.quantities[name], float(array[index]), labels, time, distance)
 

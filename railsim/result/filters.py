@@ -23,6 +23,7 @@ from railsim.arrays import Complexes, Floats
 Response = Callable[[Floats], Complexes | Floats]
 
 BLOCK = 2**16  # samples of a block at least
+CELLS = 2**14  # of percentiles, an even number
 REACH = 6.0
 """Periods of the lowest corner after which a Butterworth filter of order 4 has forgotten
 (its slowest part has fallen to exp(-2 pi 0.383 6) = 5e-7)."""
@@ -117,6 +118,14 @@ def _continued(x: Floats, begin: int, end: int) -> Floats:
     return found
 
 
+def even_step(time: Floats) -> float | None:
+    """Step of a record [s], None where steps are not equal; the last one may be shorter."""
+    steps = np.diff(time[:-1])
+    if not len(steps) or np.ptp(steps) > 1e-6 * np.mean(steps):
+        return None
+    return float(np.mean(steps))
+
+
 def low_passed(x: Floats, rate: float, corner: float, *, causal: bool = False) -> Floats:
     """Butterworth low pass of order 4 without phase, or causal."""
     return band_passed(x, rate, 0.0, corner, causal=causal)
@@ -137,9 +146,15 @@ def band_passed(x: Floats, rate: float, low: float, high: float, *, causal: bool
     else:
         sections = signal.butter(4, high, "lowpass", fs=rate, output="sos")
     x = np.asarray(x, dtype=np.float64)
+    return np.asarray(signal.sosfilt(sections, x, axis=0, zi=steady_start(sections, x[0]))[0])
+
+
+def steady_start(sections: Floats, first: Floats) -> Floats:
+    """State of a causal filter, given as second-order sections, that has always seen `first`."""
+    from scipy import signal
+
     start = signal.sosfilt_zi(sections)
-    start = start.reshape(*start.shape, *(1 for _ in x.shape[1:])) * x[0]
-    return np.asarray(signal.sosfilt(sections, x, axis=0, zi=start)[0])
+    return np.asarray(start.reshape(*start.shape, *(1 for _ in first.shape)) * first)
 
 
 def integral(s: Floats, x: Floats) -> Floats:
@@ -196,10 +211,10 @@ class StreamingPercentiles:
     """Percentiles of a stream of any length within a stated bound.
 
     Counts values in cells of equal width; where a value falls outside, the cells are made twice as
-    wide, so that there are never more than `cells` of them.
+    wide, so that there are never more than `CELLS` of them.
 
-    `width`: Present width: no percentile is further than this from one of the whole record.
-    `width`: Width of the cells at the start. `cells`: Number of cells, even.
+    `width`: Width of the cells at the start, later their present one: no percentile is further than
+    this from one of the whole record.
 
     Examples
     --------
@@ -210,9 +225,9 @@ class StreamingPercentiles:
     True
     """
 
-    def __init__(self, width: float, cells: int = 2**14) -> None:
+    def __init__(self, width: float) -> None:
         self.width = width
-        self._counts = np.zeros(cells, dtype=np.int64)
+        self._counts = np.zeros(CELLS, dtype=np.int64)
         self.count = 0
 
     def add(self, values: Floats) -> None:

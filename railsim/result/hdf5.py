@@ -37,7 +37,7 @@ from railsim.files.access import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result import sinks
-from railsim.result.data import Attributes, Result, frozen, register_writer
+from railsim.result.data import Attributes, Result, frozen
 from railsim.result.integrity import DIGEST, content_digest, seal
 from railsim.result.reading import open_result
 
@@ -66,7 +66,7 @@ class Storage:
 PLAIN = Storage()
 
 
-class Hdf5Sink(sinks.SinkContext):
+class Hdf5Sink(sinks.Sink):
     """Streams chunks to a result file.
 
     The file is created at once beside its target under a hidden name, so that an output that
@@ -251,17 +251,14 @@ def write(
     return sink.path
 
 
-register_writer("hdf5", lambda result, path, overwrite: write(result, path, overwrite=overwrite))
-
-
 def _of_quantities(
     groups: Mapping[str, Mapping[str, Any]], quantities: Mapping[str, Quantity]
 ) -> dict[str, Mapping[str, Any]]:
     """Groups of a result, with the peaks of the quantities that it keeps only."""
     kept: dict[str, Mapping[str, Any]] = dict(groups)
     if PEAKS in kept:
-        bases = {n: n.removesuffix("_time").removesuffix("_distance") for n in kept[PEAKS]}
-        kept[PEAKS] = {n: array for n, array in kept[PEAKS].items() if bases[n] in quantities}
+        of_run = kept[PEAKS].items()
+        kept[PEAKS] = {n: array for n, array in of_run if sinks.peak_quantity(n) in quantities}
     return {group: arrays for group, arrays in kept.items() if arrays}
 
 
@@ -330,7 +327,7 @@ def _describe_peaks(group: h5py.Group, file: h5py.File) -> None:
     for name, dataset in group.items():
         if name == "extreme":
             continue
-        base = name.removesuffix("_time").removesuffix("_distance")
+        base = sinks.peak_quantity(name)
         quantity = QUANTITIES[base]
         words = f"largest and smallest {quantity.long_name}"
         if name == base:

@@ -16,6 +16,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.notation import Quantity
 from railsim.result.data import Attributes
+from railsim.result.filters import steady_start
 from railsim.result.sinks import ALWAYS, Sink, SinkBefore
 
 ATTENUATION = 80.0  # dB
@@ -180,9 +181,7 @@ class _Causal:
             passed = array
             if name not in UNFILTERED:
                 if name not in self._states:
-                    start = self._signal.sosfilt_zi(self._sections)
-                    start = start.reshape(*start.shape, *(1 for _ in array.shape[1:]))
-                    self._states[name] = start * array[0]
+                    self._states[name] = steady_start(self._sections, array[0])
                 passed, self._states[name] = self._signal.sosfilt(
                     self._sections, array, axis=0, zi=self._states[name]
                 )

@@ -25,7 +25,7 @@ from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result.data import FrozenArrays, Result, frozen
 from railsim.result.integrity import DIGEST, REMEDY, content_digest, sealed
-from railsim.result.sinks import FORMAT
+from railsim.result.sinks import FORMAT, peak_quantity
 
 # what the result of every run holds
 ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
@@ -319,7 +319,7 @@ class _Reader:
         coordinates: Mapping[str, tuple[str, ...]],
     ) -> None:
         for name, array in arrays.items():
-            base = name.removesuffix("_time").removesuffix("_distance")
+            base = peak_quantity(name)
             beside = {f"{base}{ending}" for ending in ("", "_time", "_distance")}
             if base not in QUANTITIES or base not in quantities or not beside <= arrays.keys():
                 raise self.fault(f"peaks/{name}", "no such quantity, or not all of it is there")

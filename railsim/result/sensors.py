@@ -6,7 +6,7 @@ its y axis so reads a_y - g sin(cant angle + roll): the uncompensated lateral ac
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from railsim.definitions.vehicle.flatten import FlatBody, flatten
 from railsim.track.alignment import Alignment
 
 BOX = 1.0  # distance of a sensor on an axlebox from the middle of the wheelset [m]
+MOTIONS = ("position", "velocity", "acceleration")
 NEAR = 3.0  # A frame above a wheelset lies no further from it than this along the vehicle [m]
 
 
@@ -67,7 +68,7 @@ def _placed(body: FlatBody, point: tuple[float, float, float], origin: float) ->
     """Return the sensor at a point in vehicle axes; `origin` is that of the distance [m]."""
     x, y, z = body.position
     arm = (point[0] - x, point[1] - y, point[2] - z)
-    return Sensor(body.name, x - origin, arm)
+    return Sensor(body.name, x - origin, arm, axlebox=body.kind == "wheelset")
 
 
 def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
@@ -88,8 +89,7 @@ def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
             arm = (0.0, sign * across, 0.0)
             found[f"axlebox_{number}_{side}"] = Sensor(wheelset.name, x - origin, arm, axlebox=True)
     for name, point in vehicle.sensors.items():
-        sensor = _placed(bodies[point.body], point.position, origin)
-        found[name] = replace(sensor, axlebox=bodies[point.body].kind == "wheelset")
+        found[name] = _placed(bodies[point.body], point.position, origin)
     return found
 
 
@@ -101,23 +101,18 @@ def motions(
     Displacements and velocities are those against the moving track frame of the body, in its axes;
     accelerations in the axes of the body.
     """
-    shape = (len(motion["distance"]), len(placed), 3)
-    names = "displacement", "velocity", "absolute_acceleration"
-    found = {f"sensor_{name}": np.zeros(shape) for name in names}
-    for number, sensor in enumerate(placed.values()):
-        b = bodies.index(sensor.body)
-        position, rates = motion["body_position"][:, b], motion["body_velocity"][:, b]
-        absolute, arm = motion["body_acceleration"][:, b], np.array(sensor.arm)
-        roll, pitch, yaw = _attitude(sensor, position)
-        turned = _out_of_body(np.broadcast_to(arm, (len(roll), 3)), roll, pitch, yaw)
-        found["sensor_displacement"][:, number] = position[:, :3] + turned - arm
-        spin = _turning(sensor, rates)
-        moved = _out_of_body(np.cross(spin, arm), roll, pitch, yaw)
-        found["sensor_velocity"][:, number] = rates[:, :3] + moved
-        turning = np.cross(_turning(sensor, absolute), arm)
-        acceleration = absolute[:, :3] + turning + np.cross(spin, np.cross(spin, arm))
-        found["sensor_absolute_acceleration"][:, number] = acceleration
-    return found
+    b = [bodies.index(sensor.body) for sensor in placed.values()]
+    position, rates, absolute = (motion[f"body_{name}"][:, b] for name in MOTIONS)
+    attitude, spin, turning = _of_axes([*placed.values()], position, rates, absolute)
+    arm = np.array([sensor.arm for sensor in placed.values()]).reshape(-1, 3)
+    turned = _out_of_body(np.broadcast_to(arm, (*position.shape[:2], 3)), *attitude)
+    moved = _out_of_body(_cross(spin, arm), *attitude)
+    of_point = absolute[..., :3] + _cross(turning, arm) + _cross(spin, _cross(spin, arm))
+    return {
+        "sensor_displacement": position[..., :3] + turned - arm,
+        "sensor_velocity": rates[..., :3] + moved,
+        "sensor_absolute_acceleration": of_point,
+    }
 
 
 def readings(
@@ -158,9 +153,7 @@ def _of_bodies(
     Each float64[time, body, 3], of the bodies of some sensors.
     """
     b = [bodies.index(sensor.body) for sensor in sensors]
-    position = motion["body_position"][:, b]
-    rates = motion["body_velocity"][:, b]
-    absolute = motion["body_acceleration"][:, b]
+    position, rates, absolute = (motion[f"body_{name}"][:, b] for name in MOTIONS)
     offset = np.array([sensor.offset for sensor in sensors])
     s = motion["distance"][:, None] + offset + position[..., 0]
     cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
@@ -170,15 +163,24 @@ def _of_bodies(
     pitch_rate = alignment.grade_angle_rate(s) + kappa * sine
     turned = np.stack([alignment.cant_angle_rate(s), pitch_rate, kappa * c], axis=-1)
     turning = speed[:, None, None] * turned
-    # an axlebox does not spin with its wheelset
-    spins = np.array([not sensor.axlebox for sensor in sensors])
-    roll, pitch, yaw = position[..., 3], np.where(spins, position[..., 4], 0.0), position[..., 5]
-    linear = absolute[..., :3] - GRAVITY * _into_body(down, roll, pitch, yaw)
+    attitude, own, angular = _of_axes(sensors, position, rates, absolute)
+    linear = absolute[..., :3] - GRAVITY * _into_body(down, *attitude)
     linear[..., 2] += GRAVITY
-    own, angular = np.array(rates[..., 3:]), np.array(absolute[..., 3:])
-    own[..., 1] = np.where(spins, own[..., 1], 0.0)
-    angular[..., 1] = np.where(spins, angular[..., 1], 0.0)
-    return linear, own + _into_body(turning, roll, pitch, yaw), angular
+    return linear, own + _into_body(turning, *attitude), angular
+
+
+def _of_axes(
+    sensors: Sequence[Sensor], position: Floats, rates: Floats, absolute: Floats
+) -> tuple[tuple[Floats, Floats, Floats], Floats, Floats]:
+    """Roll, pitch and yaw, angular velocity and angular acceleration of the axes of sensors.
+
+    Those of their bodies, but for an axlebox, which does not spin with its wheelset.
+    """
+    spins = np.array([not sensor.axlebox for sensor in sensors])
+    turns = np.stack([position[..., 3:], rates[..., 3:], absolute[..., 3:]])
+    turns[..., 1] = np.where(spins, turns[..., 1], 0.0)
+    attitude, own, angular = turns
+    return (attitude[..., 0], attitude[..., 1], attitude[..., 2]), own, angular
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -188,23 +190,9 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
-def _attitude(sensor: Sensor, position: Floats) -> tuple[Floats, Floats, Floats]:
-    """Roll, pitch and yaw of the axes of a sensor; an axlebox does not spin with its wheelset."""
-    pitch = np.zeros(len(position)) if sensor.axlebox else position[:, 4]
-    return position[:, 3], pitch, position[:, 5]
-
-
-def _turning(sensor: Sensor, rates: Floats) -> Floats:
-    """Angular velocity or acceleration of the axes of a sensor."""
-    turning = np.array(rates[:, 3:])
-    if sensor.axlebox:
-        turning[:, 1] = 0.0
-    return turning
-
-
 def _out_of_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
     """Components in track axes of a vector in body axes: C v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
-    x, y, z = vector.T
+    x, y, z = (vector[..., k] for k in range(3))
     z, x = _turned(z, x, pitch)
     y, z = _turned(y, z, roll)
     x, y = _turned(x, y, yaw)

@@ -31,7 +31,16 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Sink(Protocol):
-    """What a simulation needs of its output's destination."""
+    """What a simulation needs of its output's destination.
+
+    Left as a context manager before `close` it forgets what it took.
+    """
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.abort()
 
     def begin(
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
@@ -65,20 +74,7 @@ class Sink(Protocol):
         """Forget everything; harmless after `close`."""
 
 
-class SinkContext:
-    """What all sinks share: leaving one before `close` forgets what it took."""
-
-    def abort(self) -> None:
-        """Forget everything; harmless after `close`."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.abort()
-
-
-class SinkBefore(SinkContext):
+class SinkBefore(Sink):
     """A sink that looks at chunks or changes them, and hands them on to another one."""
 
     def __init__(self, sink: Sink) -> None:
@@ -103,7 +99,7 @@ class SinkBefore(SinkContext):
         self._sink.abort()
 
 
-class MemorySink(SinkContext):
+class MemorySink(Sink):
     """Keeps all chunks in memory.
 
     `attributes`: Root attributes to add to those of the run. `only`: Names of the quantities that
@@ -149,6 +145,10 @@ class MemorySink(SinkContext):
         facts = root_attributes(self._attributes, attributes)
         return Result(arrays, self._quantities, self._coordinates, facts, profiles, groups)
 
+    def abort(self) -> None:
+        """See `Sink.abort`."""
+        self._chunks = {}
+
     def _shape(self, name: str) -> tuple[int, ...]:
         return tuple(len(self._coordinates[dim]) for dim in self._quantities[name].dims[1:])
 
@@ -162,6 +162,11 @@ def full_coordinates(coordinates: Mapping[str, Sequence[str]]) -> dict[str, tupl
 def timed(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:
     """Return the names of the quantities that are functions of time."""
     return tuple(name for name, quantity in quantities.items() if "time" in quantity.dims)
+
+
+def peak_quantity(name: str) -> str:
+    """Return the quantity whose values, times or distances an array in ``peaks`` holds."""
+    return name.removesuffix("_time").removesuffix("_distance")
 
 
 def root_attributes(*parts: Attributes) -> dict[str, str | float | int]:

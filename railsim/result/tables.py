@@ -5,7 +5,7 @@ from math import isnan
 
 from railsim.notation import Quantity
 from railsim.result.data import Result
-from railsim.result.extremes import MidCurve, Peak, mid_curves, peaks
+from railsim.result.extremes import MidCurve, mid_curves, peaks
 from railsim.table import Amount, Column, Table
 
 KINDS = {"abs": "", "max": ", largest", "min": ", smallest"}
@@ -14,18 +14,14 @@ PLACE = [Column("time", "t", "s", ".2f"), Column("distance", "s", "m", ".1f")]
 """When, and where the reference body was."""
 
 
-def wheelset_number(result: Result, name: str) -> str:
-    """Return number (from 1) and name of a wheelset; nothing where there is none."""
-    return f"{result.wheelsets.index(name) + 1} {name}" if name else ""
-
-
-def peak_table(result: Result, found: Sequence[Peak] | None = None) -> Table:
-    """Return the peaks of a result, by default all: value, and after a low pass of 20 Hz."""
+def peak_table(result: Result) -> Table:
+    """Return the peaks of a result: value, and after a low pass of 20 Hz."""
     rows = []
-    for peak in peaks(result) if found is None else found:
+    for peak in peaks(result):
         column = Column.of(peak.quantity)
         words = f"{peak.quantity.words}{KINDS[peak.kind]}"
-        wheelset = wheelset_number(result, peak.labels.get("wheelset", ""))
+        name = peak.labels.get("wheelset", "")
+        wheelset = f"{result.wheelsets.index(name) + 1} {name}" if name else ""
         smooth = None if isnan(peak.smooth) else Amount(peak.smooth, column)
         where = wheelset, peak.labels.get("side", ""), Amount(peak.value, column)
         rows.append([peak.quantity.name, words, *where, smooth, peak.time, peak.distance])
@@ -59,12 +55,11 @@ def _with_scatter(quantity: Quantity, value: float, scatter: float) -> str:
     return quantity.text(value) + ("" if zero else f" ± {around}")
 
 
-def full_curves_table(result: Result, curves: Sequence[MidCurve] | None = None) -> Table:
+def full_curves_table(result: Result, curves: Sequence[MidCurve]) -> Table:
     """Return one line for each curve: the largest median of each quantity over all wheels."""
-    found = mid_curves(result) if curves is None else curves
-    names = list(found[0].medians) if found else []
+    names = list(curves[0].medians)
     rows = []
-    for curve in found:
+    for curve in curves:
         largest = {peak.quantity.name: peak.value for peak in curve.median_peaks}
         begin, end = curve.full_curve
         where = f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}"

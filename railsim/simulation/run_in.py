@@ -39,7 +39,7 @@ from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import ARC_LENGTH, SPEED, System, Work
 from railsim.kernels.time_loop import FAST
-from railsim.linear.circle import POSITION, circle
+from railsim.linear.circle import circle, placed
 from railsim.linear.steady import NotConverged, led
 from railsim.model.assembly import Model
 from railsim.model.check_rails import CheckRails, standing_at
@@ -305,10 +305,8 @@ def _steady(
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)
         return level._replace(track=track_tables(part)), speed
 
-    rolling = balance.state.copy()
-    rolling[-2] = POSITION
     try:
-        state = led(model, along, rolling)[0].state
+        state = led(model, along, placed(balance.state))[0]
     except NotConverged as error:
         remark(f"The run begins with a run-in, as Newton's method found {error}.")
         return None

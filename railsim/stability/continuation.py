@@ -6,6 +6,7 @@ slow ends: there the stable motion meets an unstable one and turns back.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -61,7 +62,7 @@ def followed_branches(
     if lost.parameter is None:
         found.remarks.append("continuation: no loss of stability at which it could begin")
     else:
-        _follow(found, lambda: _birth(motion, lost), speeds, "the branch of small motions")
+        _follow(found, partial(_birth, motion, lost), speeds, "the branch of small motions")
         if found.branches:
             found.begins = found.branches[0].points[0]
     pieces = [piece for one in known if one.direction in RUNS for piece in one.pieces()]
@@ -78,7 +79,7 @@ def followed_branches(
             f"the branch of runs from {piece[0].speed:.4g} to {piece[-1].speed:.4g} m/s, "
             f"{1e3 * seed.amplitude:.2f} mm at {seed.speed:.4g} m/s,"
         )
-        _follow(found, lambda seed=seed: _at(motion, seed), speeds, name)  # type: ignore[misc]
+        _follow(found, partial(_at, motion, seed), speeds, name)
     found.branches = [settled_to(branch, pieces) for branch in found.branches]
     return found
 
@@ -203,7 +204,7 @@ def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, Peri
     period = 1.0 / frequency
     # the scheme's memory settles
     state = motion.stretch(motion.rest(speed, FIRST), speed, speed, 2.0 * period).state
-    rest = flow.reduced(motion.prepared.steady(speed).state)
+    rest = flow.reduced(motion.prepared.steady(speed))
     begin = flow.reduced(state) - rest
     quarter = flow.after((rest + begin)[None], np.array([0.25 * period]), np.array([speed]))[0]
     scale = flow.scale(rest + begin, period, speed, FIRST)

@@ -1,7 +1,7 @@
 """`critical_speed`: from which speed a vehicle hunts, linear and non-linear, and how it begins."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from numbers import Real
 
@@ -22,7 +22,7 @@ from railsim.linear.eigenmodes import (
 )
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.modes import SPEED_RANGE
-from railsim.linear.naming import Parts, mode_name, parts_of
+from railsim.linear.naming import mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
 from railsim.profiles import Profile
 from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, jumps, lowest_of
@@ -126,14 +126,18 @@ def critical_speed(
         found.linear = replace(found.linear, speed_of_runs=begins.parameter)
     shape = _hunting_shape(of_runs, begins.parameter or high)
     motion = VehicleMotion(of_runs, settings.scheme, shape)
-    search = _Search(found, motion, begins, points, excitations)
     for number, method in enumerate(wanted):
 
         def share(fraction: float, number: int = number) -> None:
             tell(0.05 + 0.95 * (number + fraction) / len(wanted))
 
         try:
-            _ACTIONS[method](search, share)
+            if method == "ramp":
+                _by_ramp(found, motion, excitations, share)
+            elif method == "bifurcation":
+                _by_diagram(found, motion, begins.parameter, points, excitations, share)
+            else:
+                _by_continuation(found, motion, begins, share)
         except (LeftRange, ModelError) as error:
             found.remarks.append(f"{method}: {error}")
     _conclude(found, of_runs, begins.parameter)
@@ -177,14 +181,10 @@ def _checked(
 # linear -------------------------------------------------------------------------------------------
 
 
-def _hunts(parts: Parts) -> Callable[[Eigenmodes], bool]:
+def _hunts(prepared: LinearVehicle) -> Callable[[Eigenmodes], bool]:
     """Whether a mode is hunting."""
-
-    def answer(mode: Eigenmodes) -> bool:
-        speed, value = mode.linearisation.parameter, complex(mode.eigenvalues[0])
-        return mode_name(parts, mode.shapes[0], value, speed).endswith("hunting")
-
-    return answer
+    parts = parts_of(prepared.model, prepared.coordinates)
+    return lambda mode: mode_name(parts, mode).endswith("hunting")
 
 
 def _loss_of_hunting(
@@ -197,7 +197,7 @@ def _loss_of_hunting(
     """
     counts = None
     if prepared.sticking:
-        counts = _hunts(parts_of(prepared.model, prepared.coordinates))
+        counts = _hunts(prepared)
     return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
 
 
@@ -205,13 +205,9 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
     """The linear critical speed; a remark where there is none, or where friction sticks."""
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
-    def name(mode: Eigenmodes) -> str:
-        value = complex(mode.eigenvalues[0])
-        return mode_name(parts, mode.shapes[0], value, mode.linearisation.parameter)
-
     def words(mode: Eigenmodes) -> str:
         return (
-            f"{name(mode)}, {mode.frequencies[0]:.3g} Hz, damping "
+            f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, damping "
             f"{100.0 * mode.damping_ratios[0]:.3g} % at {mode.linearisation.parameter:g} m/s"
         )
 
@@ -221,13 +217,13 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
         if (other.parameter is not None and other.parameter != lost.parameter) or other.already:
             mode = other.modes[0]
             found.remarks.append(
-                f"{name(mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
+                f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
                 f"{mode.linearisation.parameter:.4g} m/s or less as long as all friction elements "
                 "stick; sliding damps it, so that it is not counted"
             )
     if lost.parameter is not None:
         mode = lost.modes[0]
-        return LinearLoss(lost.parameter, float(mode.frequencies[0]), name(mode))
+        return LinearLoss(lost.parameter, float(mode.frequencies[0]), mode_name(parts, mode))
     if lost.already:
         found.remarks.append(f"unstable at the lower end of the range: {words(lost.modes[0])}")
     else:
@@ -259,9 +255,8 @@ def _conicity(prepared: LinearVehicle) -> Conicity | None:
     Where it falls with the amplitude below 3 mm, small limit cycles come first (Polach 2006).
     """
     body = prepared.model.flat.of_kind("wheelset")[0]
-    geometry = None
-    if body.wheelset is not None:
-        geometry = geometry_of(body.wheelset, prepared.track, prepared.model.profiles)
+    assert body.wheelset is not None
+    geometry = geometry_of(body.wheelset, prepared.track, prepared.model.profiles)
     if geometry is None:
         return None
     values = _conicities(geometry)
@@ -283,7 +278,7 @@ def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
     Where none is a hunting mode, the one whose wheelsets move most against all else.
     """
     found = oscillations(eigenmodes(prepared.linearised(speed)), SEARCHED[1])
-    hunts = _hunts(parts_of(prepared.model, prepared.coordinates))
+    hunts = _hunts(prepared)
     hunting = [k for k in range(len(found.eigenvalues)) if hunts(found.taken([k]))]
     if hunting:
         return found.taken([min(hunting, key=lambda k: found.damping_ratios[k])])
@@ -295,20 +290,10 @@ def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
     return found.taken([int(np.argmax(share))])
 
 
-@dataclass(frozen=True)
-class _Search:
-    """What the non-linear methods work on."""
-
-    found: CriticalSpeed
-    motion: VehicleMotion
-    begins: LossOfStability
-    points: int
-    excitations: Sequence[float]
-
-
-def _by_ramp(search: _Search, progress: Progress) -> None:
-    found = search.found
-    lowest, branch = ramp(search.motion, found.low, found.high, progress, search.excitations)
+def _by_ramp(
+    found: CriticalSpeed, motion: VehicleMotion, excitations: Sequence[float], progress: Progress
+) -> None:
+    lowest, branch = ramp(motion, found.low, found.high, progress, excitations)
     found.nonlinear["ramp"] = lowest
     found.branches.append(branch)
     if lowest is None:
@@ -333,10 +318,16 @@ def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[flo
     return [*np.linspace(least, most, near).tolist(), *above.tolist()]
 
 
-def _by_diagram(search: _Search, progress: Progress) -> None:
-    found = search.found
-    speeds = _speeds(found, search.begins.parameter, search.points)
-    branches = diagram(search.motion, speeds, progress, search.excitations)
+def _by_diagram(
+    found: CriticalSpeed,
+    motion: VehicleMotion,
+    begins: float | None,
+    points: int,
+    excitations: Sequence[float],
+    progress: Progress,
+) -> None:
+    speeds = _speeds(found, begins, points)
+    branches = diagram(motion, speeds, progress, excitations)
     found.nonlinear["bifurcation"] = lowest_of(branches)
     found.branches += branches
     found.jumps = jumps(branches)
@@ -347,10 +338,11 @@ def _by_diagram(search: _Search, progress: Progress) -> None:
         found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
 
 
-def _by_continuation(search: _Search, progress: Progress) -> None:
-    found, begins = search.found, search.begins
+def _by_continuation(
+    found: CriticalSpeed, motion: VehicleMotion, begins: LossOfStability, progress: Progress
+) -> None:
     limits = found.low, found.high
-    followed = followed_branches(search.motion, begins, found.branches, limits, progress)
+    followed = followed_branches(motion, begins, found.branches, limits, progress)
     found.branches += followed.branches
     found.remarks += followed.remarks
     ends = list(followed.folds)
@@ -360,9 +352,6 @@ def _by_continuation(search: _Search, progress: Progress) -> None:
         ends.append(Point(begins.parameter, 0.0, float(begins.modes[0].frequencies[0])))
     if ends:
         found.nonlinear["continuation"] = min(ends, key=lambda point: point.speed)
-
-
-_ACTIONS = {"ramp": _by_ramp, "bifurcation": _by_diagram, "continuation": _by_continuation}
 
 
 def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | None) -> None:

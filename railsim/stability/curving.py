@@ -9,13 +9,13 @@ such points are marked, and those where it does not come to rest or leaves the t
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.cant import curve_speed
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
@@ -25,12 +25,13 @@ from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import ARC_LENGTH, System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.linear.circle import POSITION, circle, left_out
+from railsim.linear.circle import POSITION, circle, left_out, placed
 from railsim.linear.coordinates import coordinates
+from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
-from railsim.model.assembly import Model, assemble, check_fixed
+from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
 from railsim.model.work import work_arrays
@@ -44,7 +45,6 @@ from railsim.track.tables import track_tables
 Progress = Callable[[float], None]
 
 SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m
-SPEED_RANGE = (0.5, 150.0)  # m/s
 FAILED, NEWTON, TIME = range(3)
 SETTLING = 60.0  # s, longest time integration of a point
 COLUMNS = (
@@ -92,7 +92,7 @@ class Curving(Plottable):
     friction: Floats
     cant: float
     speed: Floats
-    converged: NDArray[np.int64]
+    converged: Integers
     Q: Floats
     Y: Floats
     Y_over_Q: Floats
@@ -250,8 +250,7 @@ def curving(
 
 
 def _friction(track: Track) -> float:
-    mean: float = sum(track.friction) / 2.0
-    return mean
+    return float(sum(track.friction) / 2.0)
 
 
 def _check(
@@ -285,14 +284,6 @@ def _speed(radius: float, cant: float, deficiency: float) -> float:
     return curve_speed(radius, cant + deficiency) or math.nan
 
 
-@dataclass(frozen=True)
-class _Known:
-    """A steady state; curvature, cant, square of the speed and friction at which it holds."""
-
-    values: Floats
-    state: Floats
-
-
 Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
 
 
@@ -311,15 +302,18 @@ class _Search:
         assembled = assemble(vehicle, circle(track), settings.in_steady_rolling(), profiles)
         check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
         balance = equilibrium(assembled, WALKING_PACE)
-        self.model: Model = balance.model
+        self.model = balance.model
         self.Q0 = balance.Q0
-        omitted = left_out(track, settings, assembled.wheels)
-        self.remarks = (*balance.remarks, *_remarks(balance.model), *omitted)
+        self.remarks = balance.remarks
+        if pads := int(np.count_nonzero(self.model.system.internal.kind == PAD)):
+            self.remarks += (
+                f"{pads} friction elements hold nothing: what the way into the curve leaves in "
+                "them, up to their limits, is left out",
+            )
+        self.remarks += left_out(track, settings, assembled.wheels)
         self.parts = parts_of(self.model, coordinates(self.model))
-        rest = balance.state.copy()
-        rest[-2] = POSITION
-        self._rest = _Known(np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)]), rest)
-        self._last: _Known = self._rest
+        values = np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)])
+        self._rest = self._last = values, placed(balance.state)
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:
         there = circle(self.track, curvature=curvature, cant=cant, friction=friction)
@@ -329,31 +323,29 @@ class _Search:
         """Steady state at one point of the grid."""
         speed = _speed(radius, self.cant, deficiency)
         goal = np.array([1.0 / radius, math.copysign(self.cant, radius), speed**2, friction])
-        for start in (self._last, self._rest):
-            if start.values[0] * radius < 0.0:
+        for values, start in (self._last, self._rest):
+            if values[0] * radius < 0.0:
                 continue
 
-            def along(share: float, start: _Known = start) -> tuple[System, float]:
-                curvature, cant, square, mu = start.values + share * (goal - start.values)
+            def along(share: float, values: Floats = values) -> tuple[System, float]:
+                curvature, cant, square, mu = values + share * (goal - values)
                 return self._system(curvature, cant, mu), math.sqrt(square)
 
-            try:
-                found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
-            except NotConverged:
-                continue
-            self._last = _Known(goal, found.state)
-            return solver, found.state, NEWTON
+            with suppress(NotConverged):
+                found, solver = led(self.model, along, start, smallest=1.0 / 16.0)
+                self._last = goal, found
+                return solver, found, NEWTON
         system = self._system(goal[0], goal[1], friction)
         return self._in_time(system, speed, self._system(0.0, 0.0, friction))
 
     def _in_time(self, system: System, speed: float, straight: System) -> Point:
         """Run on the circle until nothing changes; failed where it does not come to that."""
         solver = SteadyRolling(self.model, system)
-        state = self._last.state.copy()
+        state = self._last[1].copy()
         state[-3:] = 0.0, POSITION, speed
         try:
             state = solver.prepared(state, speed)
-            rolling = solver.prepared(self._rest.state, speed)
+            rolling = solver.prepared(self._rest[1], speed)
             # the curve itself is where the run settles: judged with the state that Newton left
             step = Stability(
                 self.model, straight, rolling, "fast", lambda _: (system, state)
@@ -435,17 +427,6 @@ class _Search:
         found.steering[index] = state[[6 * b + YAW for b in frames]]
         if self.parts.cars:
             found.car_roll[index] = state[6 * self.parts.cars[0] + ROLL]
-
-
-def _remarks(model: Model) -> tuple[str, ...]:
-    """What steady states leave out."""
-    pads = int(np.count_nonzero(model.system.internal.kind == PAD))
-    if not pads:
-        return ()
-    return (
-        f"{pads} friction elements hold nothing: what the way into the curve leaves in them, up to "
-        "their limits, is left out",
-    )
 
 
 def _contact_positions(solver: SteadyRolling, wheelsets: int) -> Floats:

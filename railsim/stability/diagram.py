@@ -37,7 +37,7 @@ ARRIVED = 0.9  # share of the way between the two at which it has
 def diagram(
     motion: Motion,
     speeds: Sequence[float],
-    progress: Progress | None = None,
+    tell: Progress = lambda _: None,
     excitations: Sequence[float] = EXCITATIONS,
 ) -> list[Branch]:
     """Bifurcation diagram by steps of speed upwards and then downwards with carried states.
@@ -49,7 +49,6 @@ def diagram(
     down, then the others, at last the unstable motions between two branches. A branch upwards ends
     where the vehicle derails.
     """
-    tell = progress or (lambda _: None)
     up, down = Branch("up"), Branch("down")
     for speed in speeds:
         try:

@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
-from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.status import RUNNING
 from railsim.kernels.system import TABLE, TIME, Drive, System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
@@ -114,7 +114,7 @@ class VehicleMotion:
         """Time step at a speed: the shorter one of those at both ends of its class [s]."""
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
         if number not in self._steps:
-            states = [self.prepared.steady(SPEED_CLASS**end).state for end in (number, number + 1)]
+            states = [self.prepared.steady(SPEED_CLASS**end) for end in (number, number + 1)]
             self._steps[number] = min(
                 Stability(self.model, self.system, state, self._scheme, lambda _: None).choose(
                     1.0 / OUTPUT_RATE
@@ -125,7 +125,7 @@ class VehicleMotion:
 
     def rest(self, speed: float, amplitude: float) -> Floats:
         """State of steady rolling with a disturbance that moves a wheelset by `amplitude` [m]."""
-        state = self.prepared.steady(speed).state.copy()
+        state = self.prepared.steady(speed).copy()
         state[self._disturbed] += amplitude * self._shape
         state[TIME] = -1.0  # marks a state without memory
         return state
@@ -165,7 +165,7 @@ class VehicleMotion:
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
         """Move a state of the time loop by a chunk of steps; number of records.
 
-        Raises LeftRange The motion leaves the range of the model.
+        Raises LeftRange: the motion leaves the range of the model.
         """
         status, where, _, rows = time_loop(
             system,
@@ -178,10 +178,10 @@ class VehicleMotion:
             step,
             chunk,
         )
-        if status != RUNNING or not np.isfinite(state).all():
-            sentence = STATUS[status][1] if status != RUNNING else "the state is not finite"
-            names = self.model.index.wheelsets
-            raise LeftRange(sentence.format(where=names[where] if where < len(names) else where))
+        if status != RUNNING:
+            raise LeftRange(self.model.index.sentence(status, where))
+        if not np.isfinite(state).all():
+            raise LeftRange("the state is not finite")
         return int(rows)
 
     def records(self, rows: int) -> Floats:

@@ -1,8 +1,7 @@
 """Periodic motions by shooting, followed over the speed by arc length, with their multipliers.
 
 A periodic motion is a state x, a period T and a speed V with Phi_T(x; V) = x, where Phi is the flow
-of the system.  A system that is its own mirror image, S, has motions with Phi_T/2(x; V) = S x: only
-half of the period is computed.  Newton's method solves for u = (x, T, V) with two more conditions:
+of the system.  Newton's method solves for u = (x, T, V) with two more conditions:
 
     f(x_0) . (x - x_0) = 0        phase: no shift along the motion from the last one, x_0
     t . (u - u_0) = ds            pseudo arc length along the tangent t (Keller 1977)
@@ -20,10 +19,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from railsim.arrays import Floats
+from railsim.arrays import Complexes, Floats
 from railsim.errors import ModelError
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
@@ -40,10 +38,6 @@ LEAD = 0.05  # least cosine between a tangent and the direction it is to lead in
 
 class Flow(Protocol):
     """What the search for periodic motions asks of a system."""
-
-    @property
-    def mirror(self) -> Floats | None:
-        """S of a system that is its own mirror image, float64[n, n]; else None."""
 
     def after(self, states: Floats, durations: Floats, speeds: Floats) -> Floats:
         """States after a while, one motion a row, float64[k, n]."""
@@ -69,7 +63,7 @@ class PeriodicMotion:
     period: float
     speed: float
     amplitude: float
-    multipliers: NDArray[np.complex128]
+    multipliers: Complexes
     tangent: Floats
     along: Floats
     matrix: Floats | None = None
@@ -95,11 +89,9 @@ class Shooting:
     def __init__(self, flow: Flow, scale: Floats, period_scale: float, speed_scale: float) -> None:
         self._flow = flow
         self._scale = np.concatenate([scale, [period_scale, speed_scale]])
-        self._share = 1.0 if flow.mirror is None else 0.5
-        self._back = None if flow.mirror is None else np.linalg.inv(flow.mirror)
 
     def beginning(
-        self, state: Floats, shape: NDArray[np.complex128], frequency: float, speed: float
+        self, state: Floats, shape: Complexes, frequency: float, speed: float
     ) -> PeriodicMotion:
         """Return the motion of no amplitude at the bifurcation.
 
@@ -190,7 +182,7 @@ class Shooting:
         before, formed = np.inf, 0
         for iteration in range(1, MOST_ITERATIONS + 1):
             if matrix is not None:
-                residual = self._residual(u)
+                residual = self._ends(u[None])[0] - u[:-2]
             elif formed < MOST_MATRICES:
                 residual, matrix = self._periodicity(u)
                 formed += 1
@@ -232,25 +224,18 @@ class Shooting:
         forward(root)
         return found[root]
 
-    def _residual(self, u: Floats) -> Floats:
-        """x(T) - x, scaled."""
-        n = len(u) - 2
-        trial = u * self._scale
-        end = self._flow.after(trial[None, :n], self._share * trial[n : n + 1], trial[n + 1 :])[0]
-        if self._back is not None:
-            end = self._back @ end
-        return np.asarray(end / self._scale[:n] - u[:n])
+    def _ends(self, rows: Floats) -> Floats:
+        """x(T) of several scaled u, one a row, scaled."""
+        n = rows.shape[1] - 2
+        trials = rows * self._scale
+        states = np.ascontiguousarray(trials[:, :n])
+        ends = self._flow.after(states, trials[:, n], trials[:, n + 1])
+        return np.asarray(ends / self._scale[:n])
 
     def _periodicity(self, u: Floats) -> tuple[Floats, Floats]:
         """Residual x(T) - x and its Jacobian over the scaled u, all scaled."""
         n = len(u) - 2
-        trials = np.vstack([u, u + DIFFERENCE * np.eye(n + 2)]) * self._scale
-        ends = self._flow.after(
-            np.ascontiguousarray(trials[:, :n]), self._share * trials[:, n], trials[:, n + 1]
-        )
-        if self._back is not None:
-            ends = ends @ self._back.T
-        ends = ends / self._scale[:n]
+        ends = self._ends(np.vstack([u, u + DIFFERENCE * np.eye(n + 2)]))
         matrix = (ends[1:] - ends[0]).T / DIFFERENCE
         matrix[:, :n] -= np.eye(n)
         return ends[0] - u[:n], matrix
@@ -264,16 +249,15 @@ class Shooting:
         state, period, speed = u[:n] * self._scale[:n], u[n] * self._scale[n], u[-1]
         speed = float(speed * self._scale[-1])
         multipliers = np.linalg.eigvals(matrix[:, :n] + np.eye(n)).astype(complex)
-        # in half a period of a symmetric motion the trivial one is 1 as well, not -1
         multipliers = np.delete(multipliers, np.argmin(np.abs(multipliers - 1.0)))
         return PeriodicMotion(
             state,
             float(period),
             speed,
             self._flow.amplitude(state, float(period), speed),
-            multipliers ** round(1.0 / self._share),
+            multipliers,
             tangent / np.linalg.norm(tangent),
-            # end of the motion, mirrored back: the direction in which it begins
+            # of the end over the period: the direction in which the motion begins
             matrix[:, n] / np.linalg.norm(matrix[:, n]),
             matrix,
         )

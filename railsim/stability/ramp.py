@@ -31,7 +31,7 @@ STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailmen
 def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
     """Excite hunting at a speed by a disturbance [m] and let it settle; one that derails is halved.
 
-    Raises LeftRange Even a small disturbance ends in a derailment.
+    Raises LeftRange: even a small disturbance ends in a derailment.
     """
     while True:
         try:
@@ -63,7 +63,7 @@ def ramp(
     motion: Motion,
     low: float,
     high: float,
-    progress: Progress | None = None,
+    tell: Progress = lambda _: None,
     excitations: Sequence[float] = EXCITATIONS,
 ) -> tuple[Point | None, Branch]:
     """Let the speed fall from `high` until hunting dies, then bisect with runs at constant speed.
@@ -74,7 +74,6 @@ def ramp(
     `high`, a lower one is taken; `excitations`: sizes of the disturbances at the highest speed [m].
     Returns: the slowest motion that sustains itself, and the amplitude on the ramp.
     """
-    tell = progress or (lambda _: None)
     speed = high
     while True:
         hard: list[Point] = []

@@ -6,9 +6,8 @@ rates are counted from steady rolling at the speed at hand.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS, SPEED
 from railsim.kernels.time_loop import Chunk
@@ -29,18 +28,16 @@ class VehicleFlow:
     [m/s].
     """
 
-    mirror = None
-
     def __init__(self, motion: VehicleMotion, speed: float) -> None:
         self._motion = motion
         self._system = motion.system._replace(drive=CONSTANT_SPEED)
         self._step = motion.step_at(speed)
-        self._rest = motion.prepared.steady(speed).state.copy()
+        self._rest = motion.prepared.steady(speed).copy()
         self._indices, self._floors = self._moving()
         spins = 6 * motion.model.index.n_bodies + 6 * self._system.contact.body + 4
         self._spins, self._per_speed = spins, self._rest[spins] / speed
 
-    def _moving(self) -> tuple[NDArray[np.int64], Floats]:
+    def _moving(self) -> tuple[Integers, Floats]:
         """Indices of all entries that move, and the least size of each."""
         model, system = self._motion.model, self._system
         n, m = model.index.n_bodies, len(system.internal.kind)

@@ -33,23 +33,20 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
-def track_tables(
-    track: Track, before: float = BEFORE, after: float = AFTER, cell_length: float | None = None
-) -> TrackTables:
+def track_tables(track: Track, cell_length: float | None = None) -> TrackTables:
     """Tables of a track over arc length.
 
-    `track`: the track; `before`, `after`: how far the tables reach before s = 0 and behind the
-    track's end [m]; `cell_length`: length of a cell [m]; by default `usual_cell_length`. Returns:
-    see `railsim.kernels.track_frame`. Raises InputError: elements that do not fit together; a track
-    too long for its details.
+    `track`: the track; `cell_length`: length of a cell [m]; by default `usual_cell_length`.
+    Returns: see `railsim.kernels.track_frame`. Raises InputError: elements that do not fit
+    together; a track too long for its details.
     """
     alignment = Alignment(track)
-    ds = cell_length or usual_cell_length(track, before + after)
-    if (track.length + before + after) / ds > 10 * MOST_CELLS:
+    ds = cell_length or usual_cell_length(track)
+    if (track.length + BEFORE + AFTER) / ds > 10 * MOST_CELLS:
         found = f"{track.length:g} m of track with details of {ds:g} m"
         raise input_error(track.name, found, "a shorter track, or coarser details", key="plan")
-    cells_before = int(np.ceil(before / ds))
-    n_cells = cells_before + int(np.ceil((track.length + after) / ds))
+    cells_before = int(np.ceil(BEFORE / ds))
+    n_cells = cells_before + int(np.ceil((track.length + AFTER) / ds))
     s: Floats = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)
     text = track.model_dump_json(exclude={"friction", "friction_table"})
     line = _Line(text, float(ds), cells_before, n_cells, alignment, s)
@@ -74,20 +71,24 @@ class _Line:
 
 def _coefficients(line: _Line) -> Floats:
     """Position, heading, grade and cant angle over the cells, float64[n_cells, 6, 4]."""
-    found = aligned_zeros((line.cells, 6, 4))
-    for row, (value, rate) in enumerate(_centre_line(line.alignment, line.s, line.before)):
+    found, alignment, s = aligned_zeros((line.cells, 6, 4)), line.alignment, line.s
+    rows = [
+        *_centre_line(alignment, s, line.before),
+        (alignment.heading(s), alignment.curvature(s)),
+        (alignment.grade_angle(s), alignment.grade_angle_rate(s)),
+        (alignment.cant_angle(s), alignment.cant_angle_rate(s)),
+    ]
+    for row, (value, rate) in enumerate(rows):
         found[:, row] = hermite(value, rate, line.ds)
-    for row, (value, rate) in enumerate(_angles(line.alignment, line.s)):
-        found[:, 3 + row] = hermite(value, rate, line.ds)
     return found
 
 
 _kept_coefficients = lru_cache(MOST_LINES)(_coefficients)
 
 
-def usual_cell_length(track: Track, margin: float = BEFORE + AFTER) -> float:
+def usual_cell_length(track: Track) -> float:
     """Length of a cell [m]: 0.25 m, more for very long tracks, less where details need it."""
-    longest = max(CELL_LENGTH, (track.length + margin) / MOST_CELLS)
+    longest = max(CELL_LENGTH, (track.length + (BEFORE + AFTER)) / MOST_CELLS)
     return min(longest, 0.25 * track.rounding, shortest_length(track))
 
 
@@ -101,14 +102,6 @@ def hermite(value: Floats, rate: Floats, ds: float) -> Floats:
     c2 = (3.0 * step - 2.0 * rate[:-1] - rate[1:]) / ds
     c3 = (rate[:-1] + rate[1:] - 2.0 * step) / ds**2
     return np.stack((value[:-1], rate[:-1], c2, c3), axis=-1)
-
-
-def _angles(alignment: Alignment, s: Floats) -> list[tuple[Floats, Floats]]:
-    return [
-        (alignment.heading(s), alignment.curvature(s)),
-        (alignment.grade_angle(s), alignment.grade_angle_rate(s)),
-        (alignment.cant_angle(s), alignment.cant_angle_rate(s)),
-    ]
 
 
 def _direction(alignment: Alignment, s: Floats) -> Floats:

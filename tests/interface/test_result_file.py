@@ -142,6 +142,10 @@ def test_unknown_names_are_answered_with_the_nearest(written):
         _ = result.wheelset_jaw
     with pytest.raises(KeyError, match=r"did you mean 'front\.inner\.wheelset'"):
         result.series("Q", wheelset="front.iner.wheelset")
+    with pytest.raises(KeyError, match=r"no instant 'x'; 0 to \d"):
+        result.series("Q", time="x")
+    with pytest.raises(KeyError, match="no instant 1000000;"):
+        result.series("Q", time=1_000_000)
 
 
 def test_series_takes_names_and_indices():

@@ -97,9 +97,7 @@ def path(x, begin, end, h, steps):
 class Periods:
     """Flow of the bogie for the search of periodic motions."""
 
-    mirror = -np.eye(14)
-
-    def __init__(self, steps=250):
+    def __init__(self, steps=500):
         self.steps = steps
 
     def after(self, states, durations, speeds):
@@ -111,7 +109,7 @@ class Periods:
         )
 
     def amplitude(self, state, duration, speed):
-        y = path(state, speed, speed, duration / self.steps / 2.0, 2 * self.steps)[:, 0]
+        y = path(state, speed, speed, duration / self.steps, self.steps)[:, 0]
         return 0.5 * (np.max(y) - np.min(y))
 
 

@@ -161,7 +161,7 @@ def test_a_run_from_the_modes_own_shape_decays_with_its_damping(name, below):
 
 def run_from(prepared, mode, speed, scheme):
     """Damping ratio of a mode in a run that starts with its shape."""
-    model, rest = prepared.model, prepared.steady(speed).state
+    model, rest = prepared.model, prepared.steady(speed)
     names = mode.linearisation.names
     indices = prepared.coordinates.indices[[prepared.coordinates.names.index(n) for n in names]]
     lateral = [abs(mode.shapes[0, names.index(f"{w}.y")]) for w in model.index.wheelsets]
