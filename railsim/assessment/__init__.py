@@ -2,6 +2,7 @@
 
 =====================  =====================================================================
 `assess.py`            `assess`: all runs of a vehicle to one `Assessment`
+`assessment.py`        `Assessment`: what was found
 `running.py`           running tests: runs, populations, zones, verdicts
 `record.py`            a result read as a measured record, part by part
 `sections.py`          test sections and zones of the track that a run covers
@@ -30,6 +31,7 @@ The package only reads results; it starts no runs.  Limits are data files, ``lim
 Begin reading in `assess.py`.
 """
 
-from railsim.assessment.assess import Assessment, assess
+from railsim.assessment.assess import assess
+from railsim.assessment.assessment import Assessment
 
 __all__ = ["Assessment", "assess"]

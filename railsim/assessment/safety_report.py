@@ -1,6 +1,7 @@
 """Derailment and overturning over a whole run, wheel by wheel and bogie by bogie, unfiltered."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,10 +30,6 @@ class WheelSafety:
     climb_begin: float
     rise: float
 
-    def record(self) -> dict[str, object]:
-        """Return it as plain numbers and strings, SI."""
-        return dict(self.__dict__)
-
 
 @dataclass(frozen=True)
 class SafetyReport:
@@ -44,10 +41,9 @@ class SafetyReport:
     wheels: tuple[WheelSafety, ...]
     overturning: dict[str, float]
 
-    def record(self) -> dict[str, object]:
+    def record(self) -> dict[str, Any]:
         """Return it as plain numbers and strings, SI."""
-        wheels = [wheel.record() for wheel in self.wheels]
-        return {"wheels": wheels, "overturning": self.overturning}
+        return {"wheels": [*map(asdict, self.wheels)], "overturning": self.overturning}
 
 
 def safety_report(record: Record) -> SafetyReport:
@@ -58,28 +54,21 @@ def safety_report(record: Record) -> SafetyReport:
     needed = ["Q", "Y_over_Q", "wheelset_distance"]
     record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
     result = record.result
-    track, names = result.track(), result.wheelsets
+    track, wheels = result.track(), []
     flat = flatten(result.vehicle())
     wheelsets = [w.wheelset for w in flat.of_kind("wheelset") if w.wheelset]
-    wheels = []
     quotient, s = result["Y_over_Q"], result["wheelset_distance"]
     for w, wheelset in enumerate(wheelsets):
         for k, side in enumerate(SIDES):
             angle = flange_angle(result.profiles[wheelset.profile[k]])
             limit = nadal(angle, track.friction[k])
             climb = climb_distance(s[:, w], quotient[:, w, k], limit, _height(record, w, k))
-            lifted = bool(np.isnan(quotient[:, w, k]).any())
-            largest = float("nan") if lifted else float(np.max(quotient[:, w, k]))
-            own = f"wheelset {w + 1} {side}", limit, largest
+            # nan where the wheel was lifted
+            own = f"wheelset {w + 1} {side}", limit, float(np.max(quotient[:, w, k]))
             wheels.append(WheelSafety(*own, climb.length, climb.begin, climb.rise))
-    bogies: dict[str, list[int]] = {}
-    for w, name in enumerate(names):
-        bogies.setdefault(name.split(".")[0], []).append(w)
     Q = result["Q"]
-    largest_of = {
-        bogie: float(np.max(np.abs(overturning(Q[:, own])))) for bogie, own in bogies.items()
-    }
-    return SafetyReport(tuple(wheels), largest_of)
+    tilt = {name: np.abs(overturning(Q[:, own])) for name, own in record.bogies.items()}
+    return SafetyReport(tuple(wheels), {name: float(np.max(x)) for name, x in tilt.items()})
 
 
 def _height(record: Record, w: int, side: int) -> np.ndarray:
