@@ -22,8 +22,7 @@
 `wear.py`              laws of wear and rolling contact fatigue
 `wear_depth.py`        depth over the profiles of wheels and rails, worn profiles
 `wear_report.py`       wear and fatigue at all wheels of a run
-`safety.py`            Nadal, climb distance, overturning
-`safety_report.py`     the same over a run
+`safety.py`            Nadal, climb distance, overturning: formulas, and over a run
 `tables.py`            assessments as tables
 =====================  =====================================================================
 

@@ -7,7 +7,7 @@ from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import caused_by_hunting, comfort_report, short_of_blocks
 from railsim.assessment.record import Record
 from railsim.assessment.running import assess_running, by_vehicle
-from railsim.assessment.safety_report import safety_report
+from railsim.assessment.safety import safety_report
 from railsim.assessment.wear_report import wear_report
 from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.conditions import Condition, SectionRow
 from railsim.assessment.influences import Influence
-from railsim.assessment.safety_report import SafetyReport
+from railsim.assessment.safety import SafetyReport
 from railsim.assessment.verdict import DERAILED, FAIL, Verdict
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport

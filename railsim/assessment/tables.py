@@ -8,7 +8,7 @@ from typing import Any
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.criteria import WORDS
-from railsim.assessment.safety_report import SafetyReport
+from railsim.assessment.safety import SafetyReport
 from railsim.assessment.wear import LAWS
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
