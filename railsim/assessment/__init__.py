@@ -2,6 +2,7 @@
 
 =====================  =====================================================================
 `assess.py`            `assess`: all runs of a vehicle to one `Assessment`
+`assessment.py`        `Assessment`: what was found
 `running.py`           running tests: runs, populations, zones, verdicts
 `record.py`            a result read as a measured record, part by part
 `sections.py`          test sections and zones of the track that a run covers
@@ -21,8 +22,7 @@
 `wear.py`              laws of wear and rolling contact fatigue
 `wear_depth.py`        depth over the profiles of wheels and rails, worn profiles
 `wear_report.py`       wear and fatigue at all wheels of a run
-`safety.py`            Nadal, climb distance, overturning
-`safety_report.py`     the same over a run
+`safety.py`            Nadal, climb distance, overturning: formulas, and over a run
 `tables.py`            assessments as tables
 =====================  =====================================================================
 
@@ -30,6 +30,7 @@ The package only reads results; it starts no runs.  Limits are data files, ``lim
 Begin reading in `assess.py`.
 """
 
-from railsim.assessment.assess import Assessment, assess
+from railsim.assessment.assess import assess
+from railsim.assessment.assessment import Assessment
 
 __all__ = ["Assessment", "assess"]

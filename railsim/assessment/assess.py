@@ -1,142 +1,21 @@
 """`assess`: results against limits; the function that the command line and studies call."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 
-from railsim.assessment.comfort_report import (
-    PointComfort,
-    caused_by_hunting,
-    comfort_report,
-    short_of_blocks,
-)
-from railsim.assessment.conditions import Condition, SectionRow
-from railsim.assessment.influences import Influence
+from railsim.assessment.assessment import Assessment
+from railsim.assessment.comfort_report import caused_by_hunting, comfort_report, short_of_blocks
 from railsim.assessment.record import Record
-from railsim.assessment.running import Options, Running, assessed_runs, by_vehicle, limits_checked
-from railsim.assessment.safety_report import SafetyReport, safety_report
-from railsim.assessment.verdict import DERAILED, FAIL, Verdict, overall
-from railsim.assessment.wear_report import WheelWear, wear_report
-from railsim.assessment.zones import Assessed, ZoneReport
-from railsim.definitions.limits import ComfortLimits, RunningLimits
-from railsim.definitions.loading import load_comfort_limits, load_running_limits
+from railsim.assessment.running import assess_running, by_vehicle
+from railsim.assessment.safety import safety_report
+from railsim.assessment.wear_report import wear_report
+from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_error
+from railsim.errors import argument_error
 from railsim.result import Result
 
 RUNNING = ("en14363", "uic518")
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
-
-
-@dataclass(frozen=True)
-class Assessment:
-    """Assessment of all runs of one vehicle.
-
-    Attributes
-    ----------
-    vehicle : str
-        Name of the vehicle.
-    standard : str
-    runs : tuple of str
-        Names of the runs.
-    verdict : str
-        ``pass``, ``fail``, ``incomplete``, ``not assessed`` or ``derailed``: the worst of the
-        verdicts that decide; empty where the standard has none.
-    verdicts : dict
-        Verdicts on ``safety``, ``loading`` and ``ride``.
-    zones : tuple of ZoneReport
-        For each population its zones.
-    conditions : tuple of Condition
-        Conditions of the test.
-    sections : tuple of SectionRow
-        Sections of all runs.
-    hunting_frequency : float or None
-        Frequency at which the instability is judged [Hz].
-    influences : tuple of Influence
-        Regressions over several influences, for information.
-    comfort : dict
-        Comfort at the measuring points, by run.
-    driven : dict
-        Speed [m/s], track and what displaces its rails in words, by run, for comfort.
-    wear : dict
-        Wear of the wheels, by run.
-    safety : dict
-        `SafetyReport` by run.
-    remarks : tuple of str
-        Notes for the reader.
-    limits : RunningLimits or ComfortLimits or None
-    """
-
-    vehicle: str
-    standard: str
-    runs: tuple[str, ...]
-    verdict: str = ""
-    verdicts: Mapping[str, Verdict] = field(default_factory=dict)
-    zones: tuple[ZoneReport, ...] = ()
-    conditions: tuple[Condition, ...] = ()
-    sections: tuple[SectionRow, ...] = ()
-    hunting_frequency: float | None = None
-    influences: tuple[Influence, ...] = ()
-    comfort: Mapping[str, Sequence[PointComfort]] = field(default_factory=dict)
-    driven: Mapping[str, tuple[float, str, str]] = field(default_factory=dict)
-    wear: Mapping[str, Sequence[WheelWear]] = field(default_factory=dict)
-    safety: Mapping[str, SafetyReport] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-    limits: RunningLimits | ComfortLimits | None = None
-
-    @property
-    def exceeded(self) -> bool:
-        """Whether a limit is exceeded or a run derailed."""
-        return self.verdict in (FAIL, DERAILED)
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """Reasons why it is not a pass, of all verdicts."""
-        found = [why for verdict in self.verdicts.values() for why in verdict.reasons]
-        return tuple(dict.fromkeys(found))
-
-    @property
-    def quality(self) -> tuple[SectionRow, ...]:
-        """Sections that count."""
-        return tuple(row for row in self.sections if row.counts)
-
-    @property
-    def worst(self) -> tuple[Assessed, ...]:
-        """For each zone and quantity, the value with the largest share of its limit."""
-        names = sorted({zone.zone for zone in self.zones})
-        return tuple(row for name in names for _, row in self.worst_in(name).values())
-
-    def worst_in(self, zone: str) -> dict[str, tuple[ZoneReport, Assessed]]:
-        """By quantity, the value with the largest share of its limit in a zone, and where it is."""
-        found: dict[str, tuple[ZoneReport, Assessed]] = {}
-        for report in self.zones:
-            for row in report.rows if report.zone == zone else ():
-                before = found.get(row.criterion.name)
-                if before is None or not row.rank <= before[1].rank:
-                    found[row.criterion.name] = report, row
-        return found
-
-    def record(self) -> dict[str, object]:
-        """Return the assessment as plain numbers and strings, SI."""
-        limits = self.limits
-        comfort = {}
-        if isinstance(limits, ComfortLimits):
-            comfort = {run: [p.record(limits) for p in own] for run, own in self.comfort.items()}
-        return {
-            "vehicle": self.vehicle, "standard": self.standard,
-            "edition": limits.edition if limits else None, "runs": list(self.runs),
-            "verdict": self.verdict or None, "reasons": list(self.reasons),
-            "verdicts": {name: verdict.record() for name, verdict in self.verdicts.items()},
-            "deciding": list(getattr(limits, "deciding", ())),
-            "conditions": [condition.record() for condition in self.conditions],
-            "zones": [zone.record() for zone in self.zones],
-            "hunting_frequency": self.hunting_frequency,
-            "regression": [one.record() for one in self.influences],
-            "sections": [row.record() for row in self.sections], "comfort": comfort,
-            "wear": {run: [w.record() for w in wheels] for run, wheels in self.wear.items()},
-            "safety": {run: report.record() for run, report in self.safety.items()},
-            "remarks": list(self.remarks),
-        }  # fmt: skip
 
 
 def assess(
@@ -196,31 +75,19 @@ def assess(
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
-    found = []
-    for runs in by_vehicle(results):
-        if standard in RUNNING:
-            name = str(limits or standard)
-            known = limits_checked(load_running_limits(limits or standard), name)
-            if known.standard != standard:
-                fault = Fault(name, "standard", repr(known.standard), f"wanted: '{standard}'")
-                raise InputError([fault])
-            options = Options(method, causal, coarse, all_sections)
-            found.append(_running(runs, known, assessed_runs(runs, known, service, options)))
-        else:
-            found.append(_other(runs, standard, limits, law, coarse))
-    return found
+    groups = by_vehicle(results)
+    if standard in RUNNING:
+        return [
+            assess_running(
+                runs, standard, limits, service,
+                method=method, causal=causal, coarse=coarse, all_sections=all_sections,
+            )
+            for runs in groups
+        ]  # fmt: skip
+    return [_by_runs(runs, standard, limits, law, coarse) for runs in groups]
 
 
-def _running(runs: Mapping[str, Result], limits: RunningLimits, done: Running) -> Assessment:
-    vehicle, verdict = (
-        next(iter(runs.values())).vehicle().name,
-        overall(done.verdicts, limits.deciding),
-    )
-    found = {"verdict": verdict, "limits": limits, **vars(done)}
-    return Assessment(vehicle, limits.standard, tuple(runs), **found)
-
-
-def _other(
+def _by_runs(
     runs: Mapping[str, Result],
     standard: str,
     limits: str | Path | None,
@@ -235,7 +102,7 @@ def _other(
     remarks += [f"{n}: {end}, only the part before that is assessed" for n, end in ended.items()]
     about = vehicle, standard, tuple(runs)
     if standard == "wear":
-        wear = {name: wear_report(record, law=law) for name, record in records.items()}
+        wear = {name: wear_report(record, law) for name, record in records.items()}
         return Assessment(*about, wear=wear, remarks=tuple(remarks))
     if standard == "safety":
         safety = {name: safety_report(record) for name, record in records.items()}
@@ -247,10 +114,8 @@ def _other(
         remarks += [f"{name}: {sentence}" for sentence in said if sentence]
     if not classes.mean_comfort.checked:
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
-    said_once, driven = (
-        tuple(dict.fromkeys(remarks)),
-        {n: (r.speed, *_rails(r)) for n, r in runs.items()},
-    )
+    said_once = tuple(dict.fromkeys(remarks))
+    driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
     return Assessment(*about, comfort=comfort, remarks=said_once, limits=classes, driven=driven)
 
 

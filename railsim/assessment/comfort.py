@@ -185,18 +185,18 @@ def p_ct(acceleration: float, jerk: float, roll_rate: float, posture: str) -> fl
     return float(max(A * acceleration + B * jerk - C, 0.0) + D * roll_rate**E)
 
 
-def p_de(peak_to_peak: float, mean: float, posture: str) -> float:
+def p_de(peak_to_peak: float | Floats, mean: float | Floats, posture: str) -> Floats:
     """Percentage of dissatisfied passengers on a discrete event, P_DE (EN 12299).
 
     P_DE = max(a yp + b ym - c, 0), yp and ym over 2 s.
 
     Examples
     --------
-    >>> round(p_de(1.2, 1.0, "seated"), 2)
+    >>> round(float(p_de(1.2, 1.0, "seated")), 2)
     1.5
     """
     a, b, c = EVENT[posture]
-    return max(a * peak_to_peak + b * mean - c, 0.0)
+    return np.maximum(a * peak_to_peak + b * mean - c, 0.0)
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,4 @@ def event_comfort(lateral: Floats, rate: float) -> dict[str, float]:
     whole = slice(half, len(low) - half)
     spread = maximum_filter1d(low, 2 * half + 1)[whole] - minimum_filter1d(low, 2 * half + 1)[whole]
     mean = np.abs(running_mean(low, rate, 2 * half / rate))
-    return {
-        p: float(np.max(np.maximum(a * spread + b * mean - c, 0.0)))
-        for p, (a, b, c) in EVENT.items()
-    }
+    return {posture: float(np.max(p_de(spread, mean, posture))) for posture in EVENT}

@@ -10,9 +10,8 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.assessment.criteria import FORCES, RIDE_BAND, both_ends, ends, middle, rms
 from railsim.assessment.signals import Band
+from railsim.assessment.verdict import FAIL, INCOMPLETE, PASS
 from railsim.table import Amount, Column, Table
-
-PASS, FAIL, INCOMPLETE = "pass", "fail", "incomplete"
 
 
 def _outwards(x: Floats, turn: int) -> list[float]:

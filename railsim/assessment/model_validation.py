@@ -45,6 +45,8 @@ START = 3.0  # s after the start of a run that are not compared
 UNKNOWN = 0.01  # share of a section that a gap may take
 ALONG = 30.0  # m
 SAME_SPEED = 0.02  # share by which the speeds of one run may differ
+RIGHT = {"sum_Y": -1, "bodyy": 1}
+"""Sense of what is positive outwards in right-hand curves: -1 for forces on the rails."""
 SERVICE = Service(admissible_speed=60.0, cant_deficiency=0.15)
 """Where the vehicle states none: only the length of the sections depends on the speed."""
 
@@ -176,15 +178,32 @@ def _alike(first: Track, second: Track) -> bool:
 
 
 @dataclass(eq=False)
+class _Channel:
+    """A measured channel and its simulated counterpart, at the places of the measured values."""
+
+    name: str
+    quantity: str  # with its labels, such as ``Q:1:left``
+    ahead: float  # arc length of its place relative to the reference body [m]
+    measured: Floats
+    simulated: Floats
+    unknown: Flags  # gaps of the measurement
+
+
+@dataclass(eq=False)
+class _Place:
+    """A quantity at one place of the vehicle: what it is formed of, measured and simulated."""
+
+    channels: list[_Channel]
+    both: list[Signal]
+
+
+@dataclass(eq=False)
 class _Run:
     """A measured run and its simulation; values at the places of the measured ones."""
 
     measurement: Measurement
     result: Result
-    measured: dict[str, Floats]
-    simulated: dict[str, Floats]
-    unknown: dict[str, Flags]
-    s: Floats
+    channels: list[_Channel]
     remarks: list[str]
 
     @classmethod
@@ -215,43 +234,46 @@ class _Run:
             allowed = f"measured between {begin:.0f} and {distance[-1]:.0f} m, as simulated"
             raise input_error(run.name, found, allowed, "distance")
         rising = np.concatenate([[True], np.diff(distance) > 0.0])
-        unknown = {name: np.isnan(part[name]) for name in selections}
-        row = np.arange(len(part.time))
-        simulated: dict[str, Floats] = {}
-        measured: dict[str, Floats] = dict.fromkeys(selections, np.zeros(len(row)))
-        for name, x in simulated_there.items():
-            simulated[name] = np.interp(part.distance, distance[rising], x[rising])
-            known = ~unknown[name]
+        row, channels = np.arange(len(part.time)), []
+        for name, selection in selections.items():
+            known = ~np.isnan(part[name])
+            measured = np.zeros(len(row))
             if known.any():
-                measured[name] = np.interp(row, row[known], part[name][known])
+                measured = np.interp(row, row[known], part[name][known])
+            x = np.interp(part.distance, distance[rising], simulated_there[name][rising])
+            where = _ahead(result, selection)
+            channels.append(_Channel(name, selection, where, measured, x, ~known))
         every = max(1, round(part.rate / LIKE))
 
-        def thin(values: Mapping[str, Floats]) -> dict[str, Floats]:
-            return {n: low_passed(x, part.rate, 0.4 * LIKE)[::every] for n, x in values.items()}
+        def thin(x: Floats) -> Floats:
+            return low_passed(x, part.rate, 0.4 * LIKE)[::every]
 
-        remarks += suspicions(thin(measured), thin(simulated), every / part.rate)
+        measured_thin = {channel.name: thin(channel.measured) for channel in channels}
+        simulated_thin = {channel.name: thin(channel.simulated) for channel in channels}
+        remarks += suspicions(measured_thin, simulated_thin, every / part.rate)
         said = [f"{run.name}: {words}" for words in (*run.remarks, *remarks)]
-        return cls(part, result, measured, simulated, unknown, part.distance, said)
+        return cls(part, result, channels, said)
 
     def overlays(self) -> list[Overlay]:
-        rate = self.measurement.rate
-        found = []
-        for name, quantity in compared(self.measurement).items():
-            read, made = (passed(x[name], rate, FORCES) for x in (self.measured, self.simulated))
-            read = np.where(self.unknown[name], np.nan, read)
-            found.append(Overlay(self.measurement.name, name, quantity, self.s, rate, read, made))
+        run, found = self.measurement, []
+        for one in self.channels:
+            read, made = (passed(x, run.rate, FORCES) for x in (one.measured, one.simulated))
+            read = np.where(one.unknown, np.nan, read)
+            about = run.name, one.name, one.quantity, run.distance, run.rate
+            found.append(Overlay(*about, read, made))
         return found
 
     def pairs(self, tests: RunningLimits, limits: ValidationLimits) -> list[Pair]:
-        vehicle, track = self.result.vehicle(), self.result.track()
-        covered = float(self.s[0]), float(self.s[-1])
-        offsets = self._offsets()
-        covered = covered[0] + max(0.0, *offsets.values()), covered[1] + min(0.0, *offsets.values())
+        run, track = self.measurement, self.result.track()
+        s, ahead = run.distance, [channel.ahead for channel in self.channels]
+        covered = float(s[0]) + max(0.0, *ahead), float(s[-1]) + min(0.0, *ahead)
 
-        def speed_at(s: float) -> float:
-            return float(np.interp(s, self.s, self.measurement.speed))
+        def speed_at(at: float) -> float:
+            return float(np.interp(at, s, run.speed))
 
-        service = vehicle.service or SERVICE
+        service = self.result.vehicle().service or SERVICE
+        judged = [one for one in QUANTITIES.values() if one.name in limits.limits]
+        places = {quantity.name: self._places(quantity) for quantity in judged}
         found: list[Pair] = []
         for section in track_sections(track, tests, service, covered, speed_at):
             if not section.zone:
@@ -259,97 +281,84 @@ class _Run:
             length = section_length(tests.zones[section.zone], section.speed)
             if section.end - section.begin < length - 1e-6:
                 continue
-            for quantity in QUANTITIES.values():
-                if quantity.name in limits.limits and (section.turn or not quantity.curves):
-                    found += self._in_section(quantity, section, offsets)
+            for quantity in judged:
+                if section.turn or not quantity.curves:
+                    for place in places[quantity.name]:
+                        found += self._in_section(quantity, section, place)
         return found
 
-    def _offsets(self) -> dict[str, float]:
-        """Arc lengths of the channels' places relative to the reference body [m]."""
-        vehicle = self.result.vehicle()
-        sensors, flat = all_sensors(vehicle), flatten(vehicle)
-        origin = {body.name: body.position[0] for body in flat.bodies}[flat.reference]
-        ahead = [body.position[0] - origin for body in flat.of_kind("wheelset")]
-        names = list(self.result.wheelsets)
-        found = {}
-        for name, selection in compared(self.measurement).items():
-            base, *labels = selection.split(":")
-            if base.startswith("sensor_"):
-                found[name] = sensors[labels[0]].offset + sensors[labels[0]].arm[0]
-            elif labels and (labels[0] in names or labels[0].isdecimal()):
-                k = names.index(labels[0]) if labels[0] in names else int(labels[0]) - 1
-                found[name] = float(ahead[k])
-            else:
-                found[name] = 0.0
-        return found
-
-    def _signals(self, base: str) -> list[tuple[str, int | None, str, list[str]]]:
-        """Return place, side, and what to do with which channels for a quantity."""
-        by = {quantity: name for name, quantity in compared(self.measurement).items()}
-        found: list[tuple[str, int | None, str, list[str]]] = []
-        for quantity, name in by.items():
-            kind, *labels = quantity.split(":")
-            if base.startswith("body"):
-                elsewhere = ("frame", "axlebox")
-                at_floor = kind == "sensor_acceleration" and not labels[0].startswith(elsewhere)
-                if at_floor and labels[1] == base[-1]:
-                    found.append((labels[0], None, base[-1], [name]))
-            elif kind == base:
+    def _places(self, quantity: Compared) -> list[_Place]:
+        """Return a quantity at all places where it, or what it follows from, was measured."""
+        by = {channel.quantity: channel for channel in self.channels}
+        base, found = quantity.base, []
+        for selection, channel in by.items():
+            kind, *labels = selection.split(":")
+            used, side = [channel], None
+            if kind == base:
                 side = SIDES.index(labels[1]) if len(labels) > 1 else None
-                found.append((f"wheelset {labels[0]}", side, base, [name]))
             elif base == "Y_over_Q" and kind == "Y" and f"Q:{labels[0]}:{labels[1]}" in by:
-                load = by[f"Q:{labels[0]}:{labels[1]}"]
                 side = SIDES.index(labels[1])
-                found.append((f"wheelset {labels[0]}", side, "ratio", [name, load]))
+                used.append(by[f"Q:{labels[0]}:{labels[1]}"])
             elif base == "sum_Y" and kind == "Y" and labels[1] == "left":
-                other = by.get(f"Y:{labels[0]}:right")
-                if other and f"sum_Y:{labels[0]}" not in by:
-                    found.append((f"wheelset {labels[0]}", None, "sum", [name, other]))
+                if f"Y:{labels[0]}:right" not in by or f"sum_Y:{labels[0]}" in by:
+                    continue
+                used.append(by[f"Y:{labels[0]}:right"])
+            elif kind != "sensor_acceleration" or not _on_floor(base, *labels):
+                continue
+            label = labels[0] if base.startswith("body") else f"wheelset {labels[0]}"
+            s = self.measurement.distance + channel.ahead
+            sources = [[c.measured for c in used], [c.simulated for c in used]]
+            formed = [_formed(quantity, self.measurement.rate, x, side) for x in sources]
+            both = [Signal(x[:, None], s[:, None], [(label, side)]) for x in formed]
+            found.append(_Place(used, both))
         return found
 
-    def _in_section(
-        self, quantity: Compared, section: TestSection, offsets: Mapping[str, float]
-    ) -> list[Pair]:
-        found = []
-        for place, side, how, names in self._signals(quantity.base):
-            wheel = section.wheel(side)
-            if wheel == "inner" and quantity.base != "Q":
-                continue
-            s = self.s + offsets[names[0]]
-            inside = slice(*np.searchsorted(s, [section.begin, section.end]))
-            if any(np.mean(self.unknown[name][inside]) > UNKNOWN for name in names):
-                continue
-            both = []
-            for source in (self.measured, self.simulated):
-                values = self._signal(source, quantity, how, side, names, section)
-                signal = Signal(values[:, None], s[:, None], [(place, side)])
-                x = signal.in_section(0, section, quantity.window)
-                both.append(quantity.value(x, section.turn) if len(x) else [])
-            label = f"{place} {wheel}".rstrip()
-            names_of = quantity.name, self.measurement.name, label
-            where = section.begin, section.end, section.radius
-            found += [Pair(*names_of, *where, m, v) for m, v in zip(*both, strict=False)]
-        return found
+    def _in_section(self, quantity: Compared, section: TestSection, place: _Place) -> list[Pair]:
+        """Return the values of a quantity at a place in a section."""
+        ((label, side),) = place.both[0].places
+        wheel = section.wheel(side)
+        inside = slice(*np.searchsorted(place.both[0].s[:, 0], [section.begin, section.end]))
+        gaps = (np.mean(channel.unknown[inside]) for channel in place.channels)
+        if (wheel == "inner" and quantity.base != "Q") or any(gap > UNKNOWN for gap in gaps):
+            return []
+        outwards, values = RIGHT.get(quantity.base, 0) * section.turn or 1.0, []
+        for signal in place.both:
+            x = outwards * signal.in_section(0, section, quantity.window)
+            values.append(quantity.value(x, section.turn) if len(x) else [])
+        names_of = quantity.name, self.measurement.name, f"{label} {wheel}".rstrip()
+        where = section.begin, section.end, section.radius
+        return [Pair(*names_of, *where, m, v) for m, v in zip(*values, strict=False)]
 
-    def _signal(
-        self, source: Mapping[str, Floats], quantity: Compared, how: str, side: int | None,
-        names: list[str], section: TestSection,
-    ) -> Floats:  # fmt: skip
-        rate = self.measurement.rate
-        first, *rest = [passed(source[name], rate, quantity.band) for name in names]
-        outwards = 1.0 if side is None else float(OUTWARDS[side])
-        if how == "sum":
-            first = first + rest[0]
-        if how == "ratio":
-            with np.errstate(divide="ignore", invalid="ignore"):
-                return np.asarray(np.where(rest[0] > 0.0, outwards * first / rest[0], np.nan))
-        if how == "Y":
-            return outwards * first
-        if how in ("sum", "sum_Y"):
-            return (-section.turn or 1.0) * first  # outwards
-        if how == "y":
-            return (section.turn or 1.0) * first
-        return first
+
+def _on_floor(base: str, sensor: str, axis: str) -> bool:
+    return base == f"body{axis}" and not sensor.startswith(("frame", "axlebox"))
+
+
+def _formed(quantity: Compared, rate: float, channels: list[Floats], side: int | None) -> Floats:
+    """Return a quantity over time, of a wheel outwards positive, of one channel or two."""
+    first, *second = [passed(x, rate, quantity.band) for x in channels]
+    outwards = 1.0 if side is None else float(OUTWARDS[side])
+    if quantity.base == "Y":
+        return outwards * first
+    if second and quantity.base == "Y_over_Q":
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(second[0] > 0.0, outwards * first / second[0], np.nan))
+    return first + second[0] if second else first
+
+
+def _ahead(result: Result, selection: str) -> float:
+    """Arc length of a channel's place relative to the reference body [m]."""
+    base, *labels = selection.split(":")
+    if base.startswith("sensor_"):
+        sensor = all_sensors(result.vehicle())[labels[0]]
+        return sensor.offset + sensor.arm[0]
+    names = list(result.wheelsets)
+    if not labels or not (labels[0] in names or labels[0].isdecimal()):
+        return 0.0
+    flat = flatten(result.vehicle())
+    origin = next(body.position[0] for body in flat.bodies if body.name == flat.reference)
+    k = names.index(labels[0]) if labels[0] in names else int(labels[0]) - 1
+    return float(flat.of_kind("wheelset")[k].position[0] - origin)
 
 
 def _placed(

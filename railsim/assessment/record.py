@@ -94,10 +94,8 @@ class Record:
         """
         missing = [name for name in names if name not in self.result]
         if missing:
-            raise InputError(
-                [Fault(self.name, name, "is not in the result", f"run it with {output}")
-                 for name in missing]
-            )  # fmt: skip
+            words = "is not in the result", f"run it with {output}"
+            raise InputError(Fault(self.name, name, *words) for name in missing)
 
     @cached_property
     def alignment(self) -> Alignment:
@@ -126,6 +124,14 @@ class Record:
     def offsets(self) -> Floats:
         """Arc length of each wheelset relative to the reference body [m]."""
         return np.asarray(self.result.part("wheelset_distance", slice(0, 1))[0] - self.distance[0])
+
+    @property
+    def bogies(self) -> dict[str, list[int]]:
+        """Numbers of the wheelsets of each bogie."""
+        found: dict[str, list[int]] = {}
+        for w, name in enumerate(self.result.wheelsets):
+            found.setdefault(name.split(".")[0], []).append(w)
+        return found
 
     @cached_property
     def sensors(self) -> Mapping[str, Sensor]:

@@ -3,7 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from railsim.assessment.assessment import Assessment
 from railsim.assessment.conditions import (
     Condition,
     SectionRow,
@@ -19,46 +21,23 @@ from railsim.assessment.en14363 import (
     hunting_spectrum,
     section_values,
 )
-from railsim.assessment.influences import Influence, influences
+from railsim.assessment.influences import influences
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality, quality_class
-from railsim.assessment.verdict import Verdict, all_verdicts
+from railsim.assessment.verdict import all_verdicts, overall
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.limits import RunningLimits
+from railsim.definitions.loading import load_running_limits
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.result import Result
 
 
-@dataclass(frozen=True)
-class Options:
-    """How runs are assessed; the arguments of `railsim.assessment.assess`."""
-
-    method: str = "normal"
-    causal: bool = False
-    coarse: bool = False
-    all_sections: bool = False
-
-
-@dataclass(frozen=True)
-class Running:
-    """What the runs of a vehicle give; attributes as of `Assessment`."""
-
-    verdicts: Mapping[str, Verdict]
-    zones: tuple[ZoneReport, ...]
-    conditions: tuple[Condition, ...]
-    sections: tuple[SectionRow, ...]
-    hunting_frequency: float | None
-    influences: tuple[Influence, ...]
-    remarks: tuple[str, ...]
-
-
 @dataclass
 class _Run:
-    """A run that reached its end."""
+    """A run that reached its end: its sections, those that count, and the values of these."""
 
-    name: str
     record: Record
     population: str
     sections: list[TestSection]
@@ -106,22 +85,38 @@ def _populations(runs: Mapping[str, Result]) -> dict[str, str]:
     return {name: ", ".join(filter(None, (kind[k] for k in shown))) for name, kind in kinds.items()}
 
 
-def assessed_runs(
-    runs: Mapping[str, Result], limits: RunningLimits, replacement: Service | None, options: Options
-) -> Running:
-    """Assess all runs of a vehicle.
+def assess_running(
+    runs: Mapping[str, Result],
+    standard: str,
+    file: str | Path | None,
+    service: Service | None,
+    *,
+    method: str,
+    causal: bool,
+    coarse: bool,
+    all_sections: bool,
+) -> Assessment:
+    """Assess all runs of a vehicle; arguments as of `railsim.assessment.assess`.
 
     Raises InputError: no service table; a run lacks a quantity, is sampled too coarsely or too
-    short.
+    short; limits of another standard, or not those of the assessed quantities.
     """
-    service = replacement or _service(runs)
-    done = _read(runs, limits, service, options)
+    limits = _limits(standard, file)
+    service = service or _service(runs)
+    done = []
+    populations = _populations(runs)
+    for name, result in runs.items():
+        if result.status == "complete":
+            record = Record(result, name, coarse=coarse)
+            sections = _sections(record, limits, service)
+            counting = [s for s in sections if s.zone and (all_sections or not s.reason)]
+            done.append(_Run(record, populations[name], sections, counting))
     if done and not any(run.sections for run in done):
         allowed = "a longer run, or other sections in the limits file (--limits)"
-        raise input_error(done[0].name, "too short for one section", allowed, "distance")
+        raise input_error(done[0].record.name, "too short for one section", allowed, "distance")
     f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
     for run in done:
-        run.values = section_values(run.record, run.counting, f0=f0, causal=options.causal)
+        run.values = section_values(run.record, run.counting, f0=f0, causal=causal)
     rows = [row for run in done for row in _section_rows(run, service)]
     counted = [row for row in rows if row.counts]
     zones: list[ZoneReport] = []
@@ -132,7 +127,7 @@ def assessed_runs(
         population = Population(name, result.vehicle(), result["Q0"])
         values = [v for run in members for v in run.values]
         sections = [s for run in members for s in run.sections]
-        reports = zone_reports(population, values, sections, service, limits, options.method)
+        reports = zone_reports(population, values, sections, service, limits, method)
         zones += reports
         conditions += missing_zones(population, reports, limits)
         for report in reports if not population.fault else ():
@@ -142,23 +137,31 @@ def assessed_runs(
     if done:
         conditions += vehicle_conditions(zones, counted, results, limits, service)
     verdicts = all_verdicts(runs, zones, conditions)
-    parts = tuple(zones), tuple(conditions), tuple(rows), f0, tuple(influences(zones, service))
-    return Running(verdicts, *parts, _remarks(done, zones, limits))
+    return Assessment(
+        next(iter(runs.values())).vehicle().name, standard, tuple(runs),
+        overall(verdicts, limits.deciding), verdicts, tuple(zones), tuple(conditions), tuple(rows),
+        f0, tuple(influences(zones, service)), remarks=_remarks(done, zones, limits), limits=limits,
+    )  # fmt: skip
 
 
-def limits_checked(limits: RunningLimits, file: str) -> RunningLimits:
-    """Return the limits, each of a known quantity.
+def _limits(standard: str, file: str | Path | None) -> RunningLimits:
+    """Return the limits of a standard, each of a known quantity, from a file or those shipped.
 
     Raises InputError: the limit of a quantity that decides is missing; the limit of an unknown
-    one.
+    one; limits of another standard.
     """
+    file = file or standard
+    limits = load_running_limits(file)
     needed = [name for name, one in CRITERIA.items() if one.group != INFORMATION]
     found = {
         n: ("unknown quantity", nearest(n, CRITERIA)) for n in limits.limits if n not in CRITERIA
     }
     found |= {n: ("missing", "needed for its verdict") for n in needed if n not in limits.limits}
     if found:
-        raise InputError(Fault(file, f"limits.{name}", *words) for name, words in found.items())
+        faults = (Fault(str(file), f"limits.{name}", *words) for name, words in found.items())
+        raise InputError(faults)
+    if limits.standard != standard:
+        raise input_error(str(file), repr(limits.standard), f"wanted: '{standard}'", "standard")
     return limits
 
 
@@ -175,24 +178,16 @@ def _service(runs: Mapping[str, Result]) -> Service:
     return service
 
 
-def _read(
-    runs: Mapping[str, Result], limits: RunningLimits, service: Service, options: Options
-) -> list[_Run]:
-    """Runs that reached their end, with their sections."""
-    populations = _populations(runs)
-    found = []
-    for name, result in runs.items():
-        if result.status != "complete":
-            continue
-        record = Record(result, name, coarse=options.coarse)
-        record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
-        if "Q0" not in result:
-            raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
-        covered = record.covered()
-        sections = track_sections(result.track(), limits, service, covered, record.speed_at)
-        counting = [s for s in sections if s.zone and (options.all_sections or not s.reason)]
-        found.append(_Run(name, record, populations[name], sections, counting))
-    return found
+def _sections(record: Record, limits: RunningLimits, service: Service) -> list[TestSection]:
+    """Return the sections of a run that has all that is needed.
+
+    Raises InputError: it lacks a quantity.
+    """
+    record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
+    if "Q0" not in record.result:
+        raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
+    covered, track = record.covered(), record.result.track()
+    return track_sections(track, limits, service, covered, record.speed_at)
 
 
 def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
@@ -208,7 +203,7 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
         alignment, level = quality.deviations(s.begin, s.end) if quality else (0.0, 0.0)
         name = quality_class(min(s.speed, service.admissible_speed), alignment, level)
         found = alignment, level, name, conicity, realisation, s in run.counting
-        rows.append(SectionRow(run.name, run.population, s, *found))
+        rows.append(SectionRow(run.record.name, run.population, s, *found))
     return rows
 
 

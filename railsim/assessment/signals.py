@@ -172,9 +172,7 @@ def wear_number(signals: Signals, band: Band | None) -> Signal | None:
 
 def load_transfer(signals: Signals, band: Band | None) -> Signal:
     """(sum Q_left - sum Q_right)/(sum Q) of each bogie: positive outside right-hand curves [1]."""
-    bogies: dict[str, list[int]] = {}
-    for w, name in enumerate(signals.record.result.wheelsets):
-        bogies.setdefault(name.split(".")[0], []).append(w)
+    bogies = signals.record.bogies
     Q, s = signals.filtered("Q", band), signals.s_wheelset(band)
     values = np.stack([overturning(Q[:, columns]) for columns in bogies.values()], axis=-1)
     middles = np.stack([s[:, columns].mean(axis=1) for columns in bogies.values()], axis=-1)

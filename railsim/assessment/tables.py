@@ -5,10 +5,10 @@ import io
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from railsim.assessment.assess import Assessment
+from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.criteria import WORDS
-from railsim.assessment.safety_report import SafetyReport
+from railsim.assessment.safety import SafetyReport
 from railsim.assessment.wear import LAWS
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
@@ -102,7 +102,7 @@ def _safety(run: str, report: SafetyReport) -> list[Table]:
         Column("climb_distance", "climb", "m", ".2f"), Column("rise", unit="mm", format=".2f"),
     ]  # fmt: skip
     rows = [
-        w.record() | ({} if w.Y_over_Q == w.Y_over_Q else {"Y_over_Q": "lifted"})
+        vars(w) | ({} if w.Y_over_Q == w.Y_over_Q else {"Y_over_Q": "lifted"})
         for w in report.wheels
     ]
     bogies = [Column("bogie"), Column("overturning", format=".3f")]

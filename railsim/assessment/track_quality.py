@@ -1,19 +1,18 @@
 """Track geometry quality along a run: standard deviations of alignment and longitudinal level.
 
-Zero-phase Butterworth band-pass filter of order 4 over the wavelengths D1 = 3 to 25 m, D2 = 25 to
-70 m, D3 = 70 to 150 m (EN 13848-1; EN 14363 annex M); per section, the worse of the two rails.
+Zero-phase Butterworth band-pass filter of order 4 over the wavelengths D1 = 3 to 25 m (EN 13848-1;
+EN 14363 annex M); per section, the worse of the two rails.
 """
 
 import math
 
 import numpy as np
 
-from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.result.filters import butterworth, filtered
 from railsim.track.irregularity import displacement
 
-RANGES = {"D1": (3.0, 25.0), "D2": (25.0, 70.0), "D3": (70.0, 150.0)}
+D1 = (3.0, 25.0)  # m, shortest and longest wavelength
 SPACING = 0.25  # m
 AT_ONCE = 20_000  # positions that are evaluated at once, to limit the memory for long tracks
 
@@ -29,30 +28,23 @@ QN = (
 class TrackQuality:
     """Standard deviations over any part of a track.
 
-    `begin`, `end`: Part of the track that is evaluated [m]. `ranges`: Of `RANGES`.
+    `begin`, `end`: Part of the track that is evaluated [m].
     """
 
-    def __init__(
-        self, track: Track, begin: float, end: float, ranges: tuple[str, ...] = ("D1",)
-    ) -> None:
-        function = displacement(track)
-        margin = 6.0 * max(RANGES[name][1] for name in ranges)
+    def __init__(self, track: Track, begin: float, end: float) -> None:
+        short, long = D1
+        margin = 6.0 * long
         self._s = np.arange(begin - margin, end + margin, SPACING)
-        self._bands: dict[str, Floats] = {}
-        if function is None:
-            return
-        parts = np.array_split(self._s, math.ceil(len(self._s) / AT_ONCE))
-        rails = np.concatenate([np.asarray(function(part)[0]).reshape(4, -1).T for part in parts])
-        for name in ranges:
-            short, long = RANGES[name]
+        self._rails = np.zeros((len(self._s), 4))
+        if (function := displacement(track)) is not None:
+            parts = np.array_split(self._s, math.ceil(len(self._s) / AT_ONCE))
+            at = [np.asarray(function(part)[0]).reshape(4, -1).T for part in parts]
             response = butterworth(1.0 / long, 1.0 / short)
-            self._bands[name] = filtered(rails, 1.0 / SPACING, response, margin)
+            self._rails = filtered(np.concatenate(at), 1.0 / SPACING, response, margin)
 
-    def deviations(self, begin: float, end: float, name: str = "D1") -> tuple[float, float]:
+    def deviations(self, begin: float, end: float) -> tuple[float, float]:
         """Standard deviations of alignment and level between two arc lengths, worse rail [m]."""
-        if name not in self._bands:
-            return 0.0, 0.0
-        there = self._bands[name][(self._s >= begin) & (self._s <= end)]
+        there = self._rails[(self._s >= begin) & (self._s <= end)]
         left_y, left_z, right_y, right_z = np.std(there, axis=0)
         return float(max(left_y, right_y)), float(max(left_z, right_z))
 

@@ -12,7 +12,6 @@ from railsim.notation import SIDES
 from railsim.result.filters import StreamingPercentiles
 
 CELL = 0.5  # N, initial bin width for the percentiles of the wear number
-OF_PATCHES = ("fatigue_index", "utilised_friction", "pressure_ratio")
 PATCHES = ("patch_N", "patch_a", "patch_b", "patch_T_x", "patch_T_y")
 
 
@@ -46,27 +45,19 @@ class WheelWear:
         return plain | self.worn_area
 
 
-def wear_report(
-    record: Record,
-    *,
-    law: str | None = None,
-    model: wear.WholeLifeRailModel | None = None,
-    all_forces: bool = False,
-    yield_in_shear: float = wear.YIELD_IN_SHEAR,
-) -> list[WheelWear]:
+def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
     """Wear and fatigue at all wheels.
 
     `record`: Run with `T_gamma`, `xi_x`; with `contact_patches` also USFD and the fatigue index.
     `law`: Only this law of `LAWS`, or that of a file, which needs `contact_patches`; by default
-    all. `all_forces`: Include forces on the rail in the direction of travel. `yield_in_shear`: k
-    [Pa].
+    all.
     """
     record.need(["T_gamma", "xi_x"], "settings.outputs.quantities with T_gamma, xi_x")
-    model = model or wear.WholeLifeRailModel()
+    model = wear.WholeLifeRailModel()
     flat = flatten(record.result.vehicle())
     radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])
     shape = radii.shape
-    streams = [[StreamingPercentiles(CELL) for _ in SIDES] for _ in radii]
+    streams = {wheel: StreamingPercentiles(CELL) for wheel in np.ndindex(shape)}
     mean = np.zeros(shape)
     damage: Floats = np.zeros((*shape, 1))
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
@@ -85,21 +76,19 @@ def wear_report(
         ways = way[rows, None, None]
         mean += np.sum(T_gamma * ways, axis=0)
         length += float(np.sum(ways))
-        for w, sides in enumerate(streams):
-            for side, stream in enumerate(sides):
-                stream.add(T_gamma[:, w, side])
+        for (w, k), stream in streams.items():
+            stream.add(T_gamma[:, w, k])
         # the force on the rail has the sign of the creepage
         area = np.zeros_like(T_gamma)[..., None]
         load = mu = np.full_like(area, np.nan)
         each, along = T_gamma[..., None], record.result.part("xi_x", rows)[..., None]
         if patches:
             each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
-            area, fatigue = _patches(record, rows, yield_in_shear)
+            area, fatigue = _patches(record, rows)
             load = record.result.part("patch_N", rows)
             mu = record.result.part("patch_friction", rows) if of_file else mu
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
-        against = np.ones_like(each, dtype=bool) if all_forces else along < 0.0
-        passes = np.where(against, model(each), 0.0) * ways[..., None]
+        passes = np.where(along < 0.0, model(each), 0.0) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
         speed = (way / np.gradient(record.time))[rows, None, None, None]
         of_patches = wear.Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
@@ -109,29 +98,27 @@ def wear_report(
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
         raise record.fault("time", found, f"more than the first {START:g} s, which do not count")
-    return [
-        WheelWear(
-            place=f"wheelset {w + 1} {side}",
-            T_gamma=float(mean[w, k] / length),
-            percentiles={f"{p:g}": streams[w][k].percentile(p) for p in (50.0, 95.0, 99.85)},
-            bound=streams[w][k].width,
-            worn_area={n: float(worn[n][w, k] / length) if n in worn else None for n in laws},
-            rail_damage=float(damage[w, k, np.argmax(np.abs(damage[w, k]))] / length),
-            **dict(
-                zip(OF_PATCHES, worst[:, w, k].tolist() if patches else [None] * 3, strict=True)
-            ),
-        )
-        for w in range(len(radii))
-        for k, side in enumerate(SIDES)
-    ]
+    wheels = []
+    for w, k in np.ndindex(shape):
+        stream, worst_damage = streams[w, k], np.argmax(np.abs(damage[w, k]))
+        wheels.append(
+            WheelWear(
+                f"wheelset {w + 1} {SIDES[k]}", float(mean[w, k] / length),
+                {f"{p:g}": stream.percentile(p) for p in (50.0, 95.0, 99.85)}, stream.width,
+                {n: float(worn[n][w, k] / length) if n in worn else None for n in laws},
+                float(damage[w, k, worst_damage] / length),
+                *(worst[:, w, k].tolist() if patches else [None] * 3),
+            )
+        )  # fmt: skip
+    return wheels
 
 
-def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
+def _patches(record: Record, rows: slice) -> tuple[Floats, Floats]:
     """Area of each patch [m2]; largest fatigue index of each wheel, with T/N and p0/k."""
     N, a, b, T_x, T_y = (record.result.part(name, rows) for name in PATCHES)
     loaded = N > 0.0
     safe = np.where(loaded, N, 1.0)
-    index = wear.surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b, k)
+    index = wear.surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b)
     ratio = np.hypot(T_x, T_y) / safe
     # k/p0 is T/N less the index
     pressure = 1.0 / np.where(loaded & (ratio > index), ratio - index, np.inf)

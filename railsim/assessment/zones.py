@@ -73,16 +73,6 @@ class Assessed:
         }  # fmt: skip
 
 
-def nearest(rows: Sequence[Assessed]) -> list[Assessed]:
-    """Of each quantity the row that is nearest to its limit, or has the extreme value."""
-    found: dict[str, Assessed] = {}
-    for row in rows:
-        before = found.get(row.criterion.name)
-        if before is None or not row.rank <= before.rank:
-            found[row.criterion.name] = row
-    return list(found.values())
-
-
 @dataclass(frozen=True)
 class Population:
     """Runs whose section values may be pooled."""
@@ -117,7 +107,12 @@ class ZoneReport:
     @property
     def nearest(self) -> list[Assessed]:
         """Of each quantity the row that is nearest to its limit, or has the extreme value."""
-        return nearest((*self.rows, *self.information))
+        found: dict[str, Assessed] = {}
+        for row in (*self.rows, *self.information):
+            before = found.get(row.criterion.name)
+            if before is None or not row.rank <= before.rank:
+                found[row.criterion.name] = row
+        return list(found.values())
 
     @property
     def exceeded(self) -> tuple[Assessed, ...]:

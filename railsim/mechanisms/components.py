@@ -74,12 +74,6 @@ def lid_force(weight: float, D: float, b: float, n: float, alpha: float) -> floa
     return weight * D / (b * n) * 9.8 * alpha
 
 
-def cylinder_area(bore: Any, rod: Any, count: Any, acts: str) -> Any:
-    """Effective area of cylinders side by side, less the rods where they pull [m2]."""
-    free = bore * bore - (rod * rod if acts == "pull" else 0.0)
-    return count * 0.25 * np.pi * free
-
-
 def next_size(sizes: list[float], wanted: float) -> float | None:
     """Smallest of the made sizes that is not below the wanted one; None where none is.
 

@@ -202,8 +202,3 @@ def free_motion(
         raise model.refusal("release", "the motion has no solution", found.message)
     generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is reported here
     return FreeMotion(found.t, found.y[0], found.y[1], found.status == 1)
-
-
-def energy(motion: Motion, speed: Any) -> Any:
-    """Kinetic energy at given rates of the driver, shape (position,) [J]."""
-    return 0.5 * inertia(motion)[0] * np.asarray(speed) ** 2

@@ -352,8 +352,9 @@ def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
 
 def chamber_area(model: Model, cylinder: Cylinder, acts: str) -> Any:
     """Area of the chamber that pushes or pulls, of all cylinders side by side [m2]."""
-    n = model.number
-    return components.cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), acts)
+    bore, rod, count = map(model.number, (cylinder.bore, cylinder.rod, cylinder.count))
+    free = bore * bore - (rod * rod if acts == "pull" else 0.0)
+    return count * 0.25 * np.pi * free
 
 
 def applied(motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST) -> Any:

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from railsim.arrays import Floats, Integers
 from railsim.definitions.mechanism.expressions import atan2
-from railsim.definitions.mechanism.parts import Angle
 from railsim.errors import Fault, InputError, input_error
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel
@@ -81,24 +80,20 @@ class Motion:
         return length, rate, (dot(d1, d1) + dot(d, d2) - rate * rate) / length
 
     def angle(self, name: str) -> Any:
-        """Body's angle or a named angle, not folded, shape (..., position) [rad]."""
-        return angle_between(self, self.model.definition.angles[name])
+        """Angle of the first line less that of the second, plus the offset, from -pi to pi [rad].
+
+        Of shape (..., position), not folded.
+        """
+        angle = self.model.definition.angles[name]
+        lines = (self.point(second)[0] - self.point(first)[0] for first, second in angle.between)
+        (a, b), (c, d) = (np.moveaxis(line, -1, 0) for line in lines)
+        turned = atan2(b * c - a * d, a * c + b * d) + self.model.number(angle.offset)
+        return turned - 2.0 * np.pi * np.round(np.real(turned) / (2.0 * np.pi))
 
 
 def dot(a: Any, b: Any) -> Any:
     """Scalar product of vectors in the last axis."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
-
-
-def angle_between(motion: Motion, angle: Angle) -> Any:
-    """Angle of the first line less that of the second, plus the offset [rad], from -pi to pi."""
-    lines = []
-    for first, second in angle.between:
-        d = motion.point(second)[0] - motion.point(first)[0]
-        lines.append((d[..., 0], d[..., 1]))
-    (a, b), (c, d) = lines
-    turned = atan2(b * c - a * d, a * c + b * d) + motion.model.number(angle.offset)
-    return turned - 2.0 * np.pi * np.round(np.real(turned) / (2.0 * np.pi))
 
 
 def folded(angle: Any) -> Any:
@@ -161,7 +156,8 @@ def _track(model: Model, s: Floats, pose: Floats, arc_start: Integers) -> _Track
 def _fault(model: Model, tracked: _Tracked, s: Floats, pose: Floats) -> Fault:
     """Why a motion cannot be continued: the loop that cannot close, or is at a dead point."""
     at = float(tracked.failure[0])
-    name = kernel_joint_names(model)[int(tracked.failure[1])]
+    row = model.linkage.joint[int(tracked.failure[1]), 3]
+    name = next(name for name, (a, b) in model.joint_rows.items() if a <= row < b)
     q, arcs = pose, model.linkage.joint[:, 4].copy()
     if tracked.valid:
         q, arcs = tracked.q[tracked.valid - 1], tracked.arcs[tracked.valid - 1]
@@ -189,15 +185,6 @@ def _fault(model: Model, tracked: _Tracked, s: Floats, pose: Floats) -> Fault:
         kernel.BEYOND_CAM: "a longer arc, or another driver.end",
     }.get(status, "another driver.end or other lengths")
     return Fault(model.definition.name, f"joints.{name}", f"{where}: {sentence}", remedy)
-
-
-def kernel_joint_names(model: Model) -> list[str]:
-    """Names of the joints by the kernel's rows of joints: a prismatic joint has two."""
-    names = []
-    for name, (first, last) in model.joint_rows.items():
-        two = last - first == 2 and hasattr(model.definition.joints[name], "prismatic")
-        names += [name] * (2 if two else 1)
-    return names
 
 
 def driver_words(model: Model, value: float) -> str:

@@ -13,8 +13,15 @@ from numpy.typing import NDArray
 
 from railsim.arrays import Complexes, Floats
 from railsim.definitions.mechanism.definition import Mechanism
-from railsim.definitions.mechanism.parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
-from railsim.definitions.mechanism.values import coordinates, number, parameter_values, point_names
+from railsim.definitions.mechanism.parts import AUTO, Cam, Link, Prismatic, Revolute
+from railsim.definitions.mechanism.values import (
+    body_name,
+    coordinates,
+    number,
+    parameter_values,
+    point_names,
+    points_of,
+)
 from railsim.errors import InputError, input_error
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
@@ -124,7 +131,7 @@ class _Arrays:
         self.definition, self.values, self.lanes, self.dtype = definition, values, lanes, dtype
         self.bodies = {"ground": 0, **{name: i + 1 for i, name in enumerate(definition.bodies)}}
         self.points = {name: i for i, name in enumerate(point_names(definition))}
-        self.body_of = [self.bodies[name.partition(".")[0]] for name in self.points]
+        self.body_of = [self.bodies[body_name(name)] for name in self.points]
         positions = list(definition.ground.points.values())
         positions += [w for body in definition.bodies.values() for w in body.points.values()]
         self.position = [self._filled(coordinates(where, values)) for where in positions]
@@ -133,9 +140,9 @@ class _Arrays:
         self.arc_point: list[int] = []
         self.arc_radius: list[Any] = []
         self.arc_ends: list[list[float]] = []
-        row = 0
+        self.row = 0
         for joint in definition.joints.values():
-            row = self._add(joint, row)
+            self._add(joint)
 
     def _filled(self, numbers: Sequence[Any]) -> NDArray[Any]:
         """Numbers as an array, shape (lane, number)."""
@@ -147,33 +154,28 @@ class _Arrays:
     def _number(self, quantity: float | str) -> Any:
         return number(quantity, self.values)
 
-    def _add(self, joint: Any, row: int) -> int:
+    def _add(self, joint: Any) -> None:
         def rows(kind: int, pair: Sequence[int], values: Sequence[Any], arcs: Any = (0, 0)) -> None:
-            self.joint.append([kind, *pair, row, *arcs])
+            self.joint.append([kind, *pair, self.row, *arcs])
             self.value.append(self._filled(values))
+            self.row += 2 if kind == kernel.REVOLUTE else 1
 
         if isinstance(joint, Cam):
             first = len(self.arc_point)
             body = self._add_arcs(joint)
             arcs = (first, len(joint.arcs))
             rows(kernel.CAM, (self.points[joint.cam], self.arc_point[first]), (1.0, body), arcs)
-            return row + 1
+            return
+        pair = [self.points[p] for p in points_of(joint)]
         if isinstance(joint, Revolute):
-            rows(kernel.REVOLUTE, [self.points[p] for p in joint.revolute], (0.0, 0.0))
-            return row + 2
-        if isinstance(joint, Link):
-            pair = [self.points[p] for p in joint.link]
+            rows(kernel.REVOLUTE, pair, (0.0, 0.0))
+        elif isinstance(joint, Link):
             rows(kernel.LINK, pair, (self._number(joint.length), 0.0))
-            return row + 1
-        names = joint.slot if isinstance(joint, Slot) else joint.prismatic
-        line = (self._number(joint.angle), self._number(joint.offset))
-        rows(kernel.SLOT, [self.points[p] for p in names], line)
-        if isinstance(joint, Slot):
-            return row + 1
-        row += 1
-        pair = [self.body_of[self.points[p]] for p in names]
-        rows(kernel.PARALLEL, pair, (self._number(joint.turned), 0.0))
-        return row + 1
+        else:
+            rows(kernel.SLOT, pair, (self._number(joint.angle), self._number(joint.offset)))
+        if isinstance(joint, Prismatic):
+            bodies = [self.body_of[k] for k in pair]
+            rows(kernel.PARALLEL, bodies, (self._number(joint.turned), 0.0))
 
     def _add_arcs(self, cam: Cam) -> int:
         """Add the arcs' centres as points of the cam's body, whose number is returned."""
@@ -296,7 +298,7 @@ def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> 
             if not isinstance(joint, Revolute):
                 continue
             for known, new in (joint.revolute, joint.revolute[::-1]):
-                body, other = known.partition(".")[0], new.partition(".")[0]
+                body, other = body_name(known), body_name(new)
                 if body in placed and other not in placed:
                     k = arrays.bodies[other]
                     at = _world(pose[arrays.bodies[body]], arrays.position[arrays.points[known]])

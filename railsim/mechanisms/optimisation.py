@@ -8,7 +8,9 @@ updates then begin with the right curvature.
 
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from multiprocessing import get_context
 from typing import Any
@@ -79,9 +81,7 @@ def optimise(
         raise InputError([fault])
     chosen_seed = wanted.seed if seed is None else seed
     judge = Judge(definition)
-    begins = first_points(judge, count, chosen_seed)
-    jobs = [(definition, i, begin, choice) for i, (begin, choice) in enumerate(begins)]
-    found = _search(definition, judge, jobs, workers)
+    found = _search(judge, first_points(judge, count, chosen_seed), workers)
     usable = [start for start in found if np.isfinite(start.objective)]
     if not usable:
         bounds = "bounds within which the links can be assembled over the whole travel"
@@ -98,7 +98,9 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
     turns.
     """
     generator = np.random.default_rng(seed)
-    choices = _choices(judge)
+    assemblies = judge.wanted.assemblies
+    values = ([float(number(v, judge.values)) for v in each] for each in assemblies.values())
+    choices = [dict(zip(assemblies, members, strict=True)) for members in product(*values)]
     written, choice = judge.point_of(judge.values)
     found = [(np.clip(written, judge.lower, judge.upper), choice)]
     for i in range(1, count):
@@ -111,12 +113,6 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
     return found
 
 
-def _choices(judge: Judge) -> list[dict[str, float]]:
-    assemblies = judge.wanted.assemblies
-    values = ([float(number(v, judge.values)) for v in each] for each in assemblies.values())
-    return [dict(zip(assemblies, members, strict=True)) for members in product(*values)]
-
-
 def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
     try:
         model = judge.real_model(x, choice)
@@ -127,28 +123,19 @@ def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
     return bool(np.all(rate * rate[0] > 0.0))
 
 
-def _search(definition: Mechanism, judge: Judge, jobs: Sequence[Any], workers: int) -> list[Start]:
+def _search(judge: Judge, begins: Sequence[Any], workers: int) -> list[Start]:
     """All starts, the most promising ones to the end; over processes where there are many."""
-    if workers <= 1 or len(jobs) < 4:
-        rough = Judge(definition, EVERY)
-        found = [_run(rough, index, begin, choice, SEARCH) for _, index, begin, choice in jobs]
-        return _finished(judge, found, [_run(judge, *job) for job in _finals(judge, found)])
-    context = get_context("forkserver" if FORKSERVER else "spawn")
-    with workers_begin(), ProcessPoolExecutor(workers, mp_context=context) as pool:
-        found = list(pool.map(_run_job, [(*job, SEARCH, EVERY) for job in jobs], chunksize=1))
-        finals = [(definition, *job, 1) for job in _finals(judge, found)]
-        return _finished(judge, found, list(pool.map(_run_job, finals, chunksize=1)))
-
-
-_JUDGES: dict[tuple[str, int], Judge] = {}
-
-
-def _run_job(job: Any) -> Start:
-    definition, index, begin, choice, effort, every = job
-    key = definition.model_dump_json(), every
-    if key not in _JUDGES:
-        _JUDGES[key] = Judge(definition, every)
-    return _run(_JUDGES[key], index, begin, choice, effort)
+    rough = Judge(judge.definition, EVERY)
+    jobs = [(index, *begin) for index, begin in enumerate(begins)]
+    each: Any = map
+    with ExitStack() as stack:
+        if workers > 1 and len(jobs) >= 4:
+            context = get_context("forkserver" if FORKSERVER else "spawn")
+            stack.enter_context(workers_begin())
+            each = stack.enter_context(ProcessPoolExecutor(workers, mp_context=context)).map
+        found = list(each(partial(_run, rough, SEARCH), jobs))
+        finals = list(each(partial(_run, judge, FINISH), _finals(judge, found)))
+    return _finished(judge, found, finals)
 
 
 def _finals(judge: Judge, starts: Sequence[Start]) -> list[Any]:
@@ -157,7 +144,7 @@ def _finals(judge: Judge, starts: Sequence[Start]) -> list[Any]:
     ranked = sorted(usable, key=lambda start: (max(start.violation, FEASIBLE), start.objective))
     written = [start for start in ranked[FINALISTS:] if start.number == 0]
     finalists = [*ranked[:FINALISTS], *written]
-    return [(start.number, *judge.point_of(start.end), FINISH) for start in finalists]
+    return [(start.number, *judge.point_of(start.end)) for start in finalists]
 
 
 def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) -> list[Start]:
@@ -165,18 +152,15 @@ def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) ->
     ends = {start.number: start for start in finals}
     found = []
     for start in starts:
-        if not np.isfinite(start.objective):
-            found.append(start)
-            continue
-        if start.number in ends:
-            end = ends[start.number]
+        if (end := ends.get(start.number)) is not None:
             count = start.evaluations + end.evaluations
-            found.append(replace(end, begin=start.begin, evaluations=count))
-        else:
+            start = replace(end, begin=start.begin, evaluations=count)
+        elif np.isfinite(start.objective):
             x, choice = judge.point_of(start.end)
             judged = judge(x, choice)
             violation = max(judged.violation, _between(judge, x, choice)[0])
-            found.append(replace(start, objective=judged.objective, violation=violation))
+            start = replace(start, objective=judged.objective, violation=violation)
+        found.append(start)
     return found
 
 
@@ -217,10 +201,9 @@ def _between(judge: Judge, x: Floats, choice: dict[str, float]) -> tuple[float, 
     return breach, [share for margin, share in found.values() if margin < -0.1 * FEASIBLE]
 
 
-def _run(
-    judge: Judge, index: int, begin: Floats, choice: dict[str, float], effort: Effort
-) -> Start:
-    """One start from begin to end."""
+def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]) -> Start:
+    """One start, of a number, from begin to end."""
+    index, begin, choice = job
     problem = _Problem(judge, choice)
     u = np.clip((begin - judge.lower) / problem.span, 0.0, 1.0)
     named = judge.named(begin) | choice

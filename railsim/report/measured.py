@@ -9,7 +9,8 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from railsim.assessment.model_comparison import FAIL, INCOMPLETE, ModelValidation
+from railsim.assessment.model_comparison import ModelValidation
+from railsim.assessment.verdict import FAIL, INCOMPLETE
 from railsim.errors import input_error
 from railsim.files.access import read_bytes
 from railsim.identification import Identified

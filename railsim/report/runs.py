@@ -13,7 +13,8 @@ from typing import Any
 
 from markupsafe import Markup
 
-from railsim.assessment.assess import RUNNING, Assessment
+from railsim.assessment.assess import RUNNING
+from railsim.assessment.assessment import Assessment
 from railsim.assessment.tables import tables
 from railsim.notation import QUANTITIES
 from railsim.page import rendered

@@ -104,8 +104,8 @@ def nest(
 
 
 def poisson_ratio(suspension: TrailingArmSuspension) -> float:
-    """Poisson's ratio of a file's material."""
-    return float(helical.poisson_number(suspension.material.E, suspension.material.G))
+    """Poisson's ratio of a file's material, isotropic: `nu = E / (2 G) - 1`."""
+    return suspension.material.E / (2.0 * suspension.material.G) - 1.0
 
 
 def displacement(length: Values, seat: Values, phi: Values) -> tuple[Values, Values]:
@@ -126,11 +126,8 @@ def rotation_of_rise(length: Values, seat: Values, rise: Values) -> Values:
 
 def coil_state(arm: Arm, coil: Coil, phi: Values) -> CoilState:
     """One spring of the arm at rotation `phi` [rad]."""
-    rise, lateral = displacement(arm.length, coil.seat, phi)
-    travel = coil.start + rise
-    deflection = np.where(travel.real > 0.0, travel, 0.0)
-    beam = (coil.K_V, coil.D, coil.H0, deflection, arm.nu)
-    K_L, K_C = (_flush(deflection, coil.D) * K for K in helical.lateral_and_tilting(*beam))
+    deflection, lateral, *beam = _deformed(arm, coil, phi)
+    K_L, K_C = (_flush(deflection, coil.D) * K for K in beam)
     height, force = coil.H0 - deflection, coil.K_V * deflection
     return CoilState(deflection, lateral, height, K_L, K_C, force)
 
@@ -224,14 +221,18 @@ def mounting_deflection(P: float, stiffnesses: Sequence[Values], engagement: flo
 
 def _unit_energy(arm: Arm, coil: Coil, phi: Values) -> Values:
     """Stored energy of one spring over its vertical stiffness, at a real or complex rotation."""
-    rise, dx = displacement(arm.length, coil.seat, phi)
-    travel = coil.start + rise
-    dz = np.where(travel.real > 0.0, travel, 0.0)
-    beam = (1.0, coil.D, coil.H0, dz, arm.nu)
-    K_L, K_C = helical.lateral_and_tilting(*beam)
+    dz, dx, K_L, K_C = _deformed(arm, replace(coil, K_V=1.0), phi)
     coupling = helical.seat_moment(dz, K_L, coil.H0 - dz)
     sheared = 0.5 * (K_L * dx**2 + K_C * phi**2) + coupling * dx * phi
     return 0.5 * dz**2 + _flush(dz, coil.D) * sheared
+
+
+def _deformed(arm: Arm, coil: Coil, phi: Values) -> tuple[Values, Values, Values, Values]:
+    """Deflection, sideways displacement, lateral and tilting stiffness of a flush spring."""
+    rise, dx = displacement(arm.length, coil.seat, phi)
+    travel = coil.start + rise
+    dz = np.where(travel.real > 0.0, travel, 0.0)
+    return dz, dx, *helical.lateral_and_tilting(coil.K_V, coil.D, coil.H0, dz, arm.nu)
 
 
 def _flush(deflection: Values, D: Values) -> Values:

@@ -51,7 +51,7 @@ def data_sheets(suspension: TrailingArmSuspension, result: Verification) -> dict
             state = case.springs[name]
             force = float(state.force)
             at = (coil.K_V, D, H0, state.deflection, result.arm.nu)
-            beam, wahl = helical.beam_lateral_stiffness(*at), helical.lateral_stiffness_wahl(*at)
+            beam, wahl = helical.beam_stiffnesses(*at)[0], helical.lateral_stiffness_wahl(*at)
             methods = zip(LATERAL, map(float, (state.K_L, beam, wahl)), strict=True)
             stresses = checks.shear_stress(force, d, D), stress(spring, state)
             lateral = dict(methods) if force > 0.0 else {}

@@ -56,11 +56,6 @@ def active_coils(G: Values, d: Values, D: Values, K_V: Values) -> Values:
     return G * d**4 / (8.0 * K_V * D**3)
 
 
-def poisson_number(E: Values, G: Values) -> Values:
-    """Poisson's ratio of an isotropic material, `nu = E / (2 G) - 1`."""
-    return E / (2.0 * G) - 1.0
-
-
 def beam_rigidities(K_V: Values, D: Values, height: Values, nu: Values) -> tuple[Values, Values]:
     """Bending [N m^2] and shear rigidity [N] of the beam that replaces the coil column.
 
@@ -87,6 +82,11 @@ def beam_stiffnesses(
 
     Source: Krettek and Sobczak, as quoted by Grossi (2025), ch. 2; C_q is the same as EN 13906-1's
     transverse spring rate R_Q.
+
+    Examples
+    --------
+    >>> [round(float(C)) for C in beam_stiffnesses(632875.4, 0.230, 0.338, 0.0734697, 0.3125)]
+    [676538, 23250]
     """
     if np.any(np.real(dz) < 0.0) or np.any(np.real(dz) >= np.real(H0)):
         raise ModelError(
@@ -104,17 +104,6 @@ def beam_stiffnesses(
     bending = (1.0 + load_ratio) * Hs**3 * remainder / (4.0 * B)
     C_q = 1.0 / (shear + bending)
     return C_q, C_q * (B / S + (1.0 + load_ratio) * Hs**2 * _cotangent_remainder(4.0 * y))
-
-
-def beam_lateral_stiffness(K_V: Values, D: Values, H0: Values, dz: Values, nu: Values) -> Values:
-    """Lateral stiffness `C_q` of the loaded beam, seats parallel [N/m]: `beam_stiffnesses`.
-
-    Examples
-    --------
-    >>> round(float(beam_lateral_stiffness(632875.4, 0.230, 0.338, 0.0734697, 0.3125)))
-    676538
-    """
-    return beam_stiffnesses(K_V, D, H0, dz, nu)[0]
 
 
 def lateral_and_tilting(
@@ -174,7 +163,7 @@ def buckling_deflection(H0: Values, D: Values, nu: Values, seating: Values = 1.0
     `s_k = H0 0.5/(1 - G/E) (1 - sqrt(1 - (1 - G/E)/(0.5 + G/E) (pi D/(seating H0))^2))` with
     `G/E = 1/(2 (1 + nu))` and the seating coefficient of EN 13906-1: 0.5 both seats held; 0.7 one
     held, one hinged; 1 both hinged, or parallel with one free to move sideways; 2 one held, one
-    free.  For 1 this is exactly where `beam_lateral_stiffness` vanishes.
+    free.  For 1 this is exactly where `C_q` of `beam_stiffnesses` vanishes.
     Source: EN 13906-1:2013, buckling.
 
     Examples

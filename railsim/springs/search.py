@@ -33,21 +33,18 @@ LIMITS = {
     "radial_clearance": ("search.clearance_min", "reduce it"),
     "free_height_min": ("search.free_height", "reduce the smallest free height"),
     "free_height_max": ("search.free_height", "raise the largest free height"),
-    "index_outer": ("search.spring_index", "widen it"),
-    "index_inner": ("search.spring_index", "widen it"),
-    "coils_outer": ("search.active_coils_min", "reduce it, or allow thicker wire"),
-    "coils_inner": ("search.active_coils_min", "reduce it, or allow thicker wire"),
     "stiffness": ("target", "bring load and deflection to what two springs can do; see design"),
-    "height_outer": ("search.free_height", "raise it, or allow thinner wire"),
-    "height_inner": ("search.free_height", "raise it, or allow thinner wire"),
-    "yield_outer": ("search.stress_ratio_max", "raise it or material.tau_allowable"),
-    "yield_inner": ("search.stress_ratio_max", "raise it or material.tau_allowable"),
-    "fatigue_outer": ("search.fatigue_margin_min", "reduce it, or allow more space"),
-    "fatigue_inner": ("search.fatigue_margin_min", "reduce it, or allow more space"),
-    "buckling_outer": ("search.buckling_ratio_max", "raise it, or reduce search.free_height"),
-    "buckling_inner": ("search.buckling_ratio_max", "raise it, or reduce search.free_height"),
     "equilibrium": ("loads", "reduce the highest load"),
 }
+OF_EACH = {
+    "index": ("search.spring_index", "widen it"),
+    "coils": ("search.active_coils_min", "reduce it, or allow thicker wire"),
+    "height": ("search.free_height", "raise it, or allow thinner wire"),
+    "yield": ("search.stress_ratio_max", "raise it or material.tau_allowable"),
+    "fatigue": ("search.fatigue_margin_min", "reduce it, or allow more space"),
+    "buckling": ("search.buckling_ratio_max", "raise it, or reduce search.free_height"),
+}
+LIMITS |= {f"{limit}_{s}": how for limit, how in OF_EACH.items() for s in ("outer", "inner")}
 ACTIVE = 2e-3  # relative slack below which a limit counts as active at an optimum
 _SEED = 20260
 _ROUNDS, _AROUND, _CLOSER = 8, 32, 0.65  # samples around the best nest of each pair of wires
@@ -133,7 +130,7 @@ def candidates(limits: Search, wires: Floats) -> Dimensions:
     unit = qmc.Sobol(d=5, seed=np.random.default_rng(_SEED)).random_base2(power)
     unit = unit[: limits.candidates]
     index = np.minimum((unit[:, :2] * len(wires)).astype(int), len(wires) - 1)
-    d_outer, d_inner = wires[index[:, 0]], wires[index[:, 1]]
+    d = d_outer, d_inner = wires[index.T]
     w_min, w_max = limits.spring_index
     gap = d_outer + d_inner + 2.0 * limits.clearance_min
     low_inner = np.maximum(w_min * d_inner, limits.inner_diameter_min + d_inner)
@@ -144,7 +141,7 @@ def candidates(limits: Search, wires: Floats) -> Dimensions:
     D_inner = low_inner + unit[:, 3] * (high - low_inner)
     shortest, longest = limits.free_height
     H0 = shortest + unit[:, 4] * (longest - shortest)
-    return Dimensions(d_outer, d_inner, D_outer, D_inner, H0)
+    return Dimensions(d, np.stack([D_outer, D_inner]), H0)
 
 
 @dataclass(frozen=True)
@@ -184,11 +181,11 @@ def _merit(task: Task, found: Evaluation) -> Floats:
 def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions, Floats]:
     """The best nest of each pair of wires, bettered by samples drawn closer and closer around."""
     random = np.random.default_rng(_SEED)
-    pairs = np.stack([sample.d_outer, sample.d_inner], axis=-1)
+    pairs = sample.d.T
     order = np.argsort(merit, kind="stable")
     _, first = np.unique(pairs[order], axis=0, return_index=True)
     chosen = order[first]
-    x = np.stack([sample.D_outer, sample.D_inner, sample.H0], axis=-1)[chosen]
+    x = np.stack([*sample.D, sample.H0], axis=-1)[chosen]
     d, merit = pairs[chosen], merit[chosen]
     shortest, longest = task.limits.free_height
     widest = task.limits.outer_diameter_max
@@ -199,8 +196,8 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
             x, d, merit = x[kept], d[kept], merit[kept]
         tried = x[:, None, :] + reach * random.uniform(-1.0, 1.0, (len(x), _AROUND, 3))
         tried[..., 2] = np.clip(tried[..., 2], shortest, longest)
-        wires = np.repeat(d, _AROUND, axis=0).T
-        found = evaluate(task, Dimensions(*wires, *tried.reshape(-1, 3).T))
+        *D, H0 = tried.reshape(-1, 3).T
+        found = evaluate(task, Dimensions(np.repeat(d, _AROUND, axis=0).T, np.stack(D), H0))
         merits = _merit(task, found).reshape(len(x), _AROUND)
         best = np.argmin(merits, axis=1)
         rows = np.arange(len(x))
@@ -208,7 +205,7 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
         x = np.where(better[:, None], tried[rows, best], x)
         merit = np.where(better, merits[rows, best], merit)
         reach = _CLOSER * reach
-    return Dimensions(*d.T, *x.T), merit
+    return Dimensions(d.T, x[:, :2].T, x[:, 2]), merit
 
 
 def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
@@ -219,15 +216,14 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
     disappoints (Fletcher and Maza 1989).  As a rule as many limits are active as there are
     variables, and at such a corner the method converges quadratically.
     """
-    d_outer, d_inner = float(sample.d_outer[start]), float(sample.d_inner[start])
+    d = sample.d[:, start, None]
     largest, longest = task.limits.outer_diameter_max, task.limits.free_height[1]
     scale = np.array([largest, largest, longest])
     neighbours = np.vstack([np.zeros(3), _DIFFERENCE * np.eye(3)])
 
     def at(points: Floats) -> Dimensions:
-        D_outer, D_inner, H0 = (points * scale).T
-        ones = np.ones_like(H0)
-        return Dimensions(d_outer * ones, d_inner * ones, D_outer, D_inner, H0)
+        *D, H0 = (points * scale).T
+        return Dimensions(np.repeat(d, len(points), axis=1), np.stack(D), H0)
 
     def linearised(x: Floats) -> _Linearised:
         found = evaluate(task, at(x + neighbours))
@@ -240,9 +236,9 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
         return _Linearised(aims[0], slack[0], slopes[0], slopes[1], tuple(found.slack))
 
     w_min, w_max = task.limits.spring_index
-    low = np.array([w_min * d_outer, w_min * d_inner, task.limits.free_height[0]]) / scale
-    high = np.array([w_max * d_outer, w_max * d_inner, longest]) / scale
-    x = np.array([sample.D_outer[start], sample.D_inner[start], sample.H0[start]]) / scale
+    low = np.append(w_min * d, task.limits.free_height[0]) / scale
+    high = np.append(w_max * d, longest) / scale
+    x = np.append(sample.D[:, start], sample.H0[start]) / scale
     here, reach = linearised(x), _FIRST_BOX
     for _ in range(_PROGRAMS):
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
@@ -295,7 +291,7 @@ def _aims(task: Task, found: Evaluation) -> list[Floats]:
     """What is to be made small, of order one: the mass, or both springs' inverse margins."""
     if task.limits.objective == "mass":
         return [found.mass / _MASS]
-    return [1.0 / margin for margin in found.margin]
+    return [*(1.0 / found.margin)]
 
 
 def _built(task: Task, found: _Optimum) -> Nest | None:
@@ -304,17 +300,15 @@ def _built(task: Task, found: _Optimum) -> Nest | None:
         return None
     optimum = found.dimensions
     step, coil_step = task.limits.diameter_step, task.limits.coil_step
-    sizes = (optimum.D_outer, optimum.D_inner, optimum.H0)
+    sizes = (*optimum.D, optimum.H0)
     axes = [[np.floor(v[0] / step) * step + k * step for k in (-1, 0, 1, 2)] for v in sizes]
-    D_outer, D_inner, H0 = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
-    ones = np.ones_like(H0)
-    rounded = Dimensions(optimum.d_outer * ones, optimum.d_inner * ones, D_outer, D_inner, H0)
+    *D, H0 = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
+    rounded = Dimensions(np.repeat(optimum.d, len(H0), axis=1), np.stack(D), H0)
     exact = evaluate(task, rounded).n
-    x = Dimensions(*(np.repeat(value, 4) for value in vars(rounded).values()))
-    up = np.tile([[0, 0], [0, 1], [1, 0], [1, 1]], (len(H0), 1))
-    below = (np.floor(np.repeat(n, 4) / coil_step) for n in exact)
-    n_outer, n_inner = ((n + up[:, i]) * coil_step for i, n in enumerate(below))
-    result = evaluate(task, x, (n_outer, n_inner))
+    x = Dimensions(*(np.repeat(value, 4, axis=-1) for value in vars(rounded).values()))
+    up = np.tile([[0, 0, 1, 1], [0, 1, 0, 1]], len(H0))
+    n = (np.floor(np.repeat(exact, 4, axis=1) / coil_step) + up) * coil_step
+    result = evaluate(task, x, n)
     error = np.max(np.abs(result.deflection_error), axis=0)
     fits = result.feasible & (error <= task.limits.height_error_max)
     if not np.any(fits):
@@ -326,12 +320,12 @@ def _built(task: Task, found: _Optimum) -> Nest | None:
         aim = -margin / np.max(margin[fits])
     best = int(np.argmin(np.where(fits, aim + 3.0 * error, np.inf)))
 
-    def spring(d: Floats, D: Floats, n: Floats, H: Floats) -> BuiltSpring:
-        return BuiltSpring(*(round(float(value[best]), 9) for value in (D, d, n, H)))
+    def spring(i: int, free_height: Floats) -> BuiltSpring:
+        sizes = x.D[i], x.d[i], n[i], free_height
+        return BuiltSpring(*(round(float(value[best]), 9) for value in sizes))
 
     return Nest(
-        outer=spring(x.d_outer, x.D_outer, n_outer, x.H0),
-        inner=spring(x.d_inner, x.D_inner, n_inner, x.H0 - task.height_difference),
+        outer=spring(0, x.H0), inner=spring(1, x.H0 - task.height_difference),
         mass=float(result.mass[best]), fatigue_margin=float(margin[best]),
         mounting_error=float(result.deflection_error[0][best]),
         target_error=float(result.deflection_error[1][best]), active=found.active,
@@ -345,7 +339,7 @@ def _nothing_fits(
     """The limits that the least broken nest breaks; without one, those that most candidates do."""
     nearest = max(optima, key=lambda optimum: optimum.worst)
     x = nearest.dimensions
-    wires = f"wires {x.d_outer[0] * 1e3:.6g} and {x.d_inner[0] * 1e3:.6g} mm"
+    wires = f"wires {x.d[0, 0] * 1e3:.6g} and {x.d[1, 0] * 1e3:.6g} mm"
     if nearest.worst >= _NEARLY:
         found = "no nest fits once its dimensions and coils are rounded"
         mend = "reduce search.diameter_step or search.coil_step, or raise search.height_error_max"

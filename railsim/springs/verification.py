@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension, radial_clearance
 from railsim.design_checks import Check
-from railsim.errors import Fault, Faults, InputError, input_error
+from railsim.errors import Fault, Faults, input_error
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
 from railsim.springs.arm import Arm, Coil, CoilState
@@ -144,8 +144,11 @@ def load_cases(
         deflection = float(states["outer"].deflection)
         rate = _rate(frame, phi)
         cases.append(Case(name, load, phi, deflection, load / deflection, rate, states))
-    if obstacles:
-        raise InputError([_grouped(suspension, key, found) for found in obstacles.values()])
+    faults = Faults()
+    for (name, found, remedy), *others in obstacles.values():
+        also = f" (also {', '.join(other for other, _, _ in others)})" if others else ""
+        faults.append(Fault(suspension.name, f"{key}.{name}", found + also, remedy))
+    faults.check()
     return frame, tuple(cases)
 
 
@@ -266,15 +269,6 @@ def _obstacle(
         found = f"{under}: no equilibrium of the arm up to {np.degrees(highest_phi):.1f} degrees"
         return "no equilibrium", found, "reduce this load or stiffen the springs"
     return None
-
-
-def _grouped(
-    suspension: TrailingArmSuspension, key: str, obstacles: list[tuple[str, str, str]]
-) -> Fault:
-    """One fault for loads with the same obstacle, at the first that meets it."""
-    (name, found, remedy), *others = obstacles
-    also = f" (also {', '.join(other for other, _, _ in others)})" if others else ""
-    return Fault(suspension.name, f"{key}.{name}", found + also, remedy)
 
 
 def _checks(

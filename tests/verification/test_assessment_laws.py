@@ -470,7 +470,7 @@ def test_worst_patch_stands_on_the_shakedown_map_where_its_index_says():
     forces = {"patch_T_x": 0.1 * N + 5.0, "patch_T_y": 0.2 * N * np.array([1.0, 1.5])}
     record = Mock()
     record.result.part = lambda name, rows: {"patch_N": N, **size, **forces}[name][rows]
-    area, (index, friction, pressure) = _patches(record, slice(0, 2), 300e6)
+    area, (index, friction, pressure) = _patches(record, slice(0, 2))
     p0 = 1.5 * 80e3 / (np.pi * 6e-3 * 4e-3)
     assert pressure.item() == pytest.approx(p0 / 300e6)
     assert friction.item() == pytest.approx(np.hypot(0.1 * 80e3 + 5.0, 0.3 * 80e3) / 80e3)

@@ -1,0 +1,124 @@
+"""What an assessment of all runs of a vehicle has found."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from railsim.assessment.comfort_report import PointComfort
+from railsim.assessment.conditions import Condition, SectionRow
+from railsim.assessment.influences import Influence
+from railsim.assessment.safety import SafetyReport
+from railsim.assessment.verdict import DERAILED, FAIL, Verdict
+from railsim.assessment.wear_report import WheelWear
+from railsim.assessment.zones import Assessed, ZoneReport
+from railsim.definitions.limits import ComfortLimits, RunningLimits
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Assessment of all runs of one vehicle.
+
+    Attributes
+    ----------
+    vehicle : str
+        Name of the vehicle.
+    standard : str
+    runs : tuple of str
+        Names of the runs.
+    verdict : str
+        ``pass``, ``fail``, ``incomplete``, ``not assessed`` or ``derailed``: the worst of the
+        verdicts that decide; empty where the standard has none.
+    verdicts : dict
+        Verdicts on ``safety``, ``loading`` and ``ride``.
+    zones : tuple of ZoneReport
+        For each population its zones.
+    conditions : tuple of Condition
+        Conditions of the test.
+    sections : tuple of SectionRow
+        Sections of all runs.
+    hunting_frequency : float or None
+        Frequency at which the instability is judged [Hz].
+    influences : tuple of Influence
+        Regressions over several influences, for information.
+    comfort : dict
+        Comfort at the measuring points, by run.
+    driven : dict
+        Speed [m/s], track and what displaces its rails in words, by run, for comfort.
+    wear : dict
+        Wear of the wheels, by run.
+    safety : dict
+        `SafetyReport` by run.
+    remarks : tuple of str
+        Notes for the reader.
+    limits : RunningLimits or ComfortLimits or None
+    """
+
+    vehicle: str
+    standard: str
+    runs: tuple[str, ...]
+    verdict: str = ""
+    verdicts: Mapping[str, Verdict] = field(default_factory=dict)
+    zones: tuple[ZoneReport, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+    sections: tuple[SectionRow, ...] = ()
+    hunting_frequency: float | None = None
+    influences: tuple[Influence, ...] = ()
+    comfort: Mapping[str, Sequence[PointComfort]] = field(default_factory=dict)
+    driven: Mapping[str, tuple[float, str, str]] = field(default_factory=dict)
+    wear: Mapping[str, Sequence[WheelWear]] = field(default_factory=dict)
+    safety: Mapping[str, SafetyReport] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    limits: RunningLimits | ComfortLimits | None = None
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether a limit is exceeded or a run derailed."""
+        return self.verdict in (FAIL, DERAILED)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Reasons why it is not a pass, of all verdicts."""
+        found = [why for verdict in self.verdicts.values() for why in verdict.reasons]
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def quality(self) -> tuple[SectionRow, ...]:
+        """Sections that count."""
+        return tuple(row for row in self.sections if row.counts)
+
+    @property
+    def worst(self) -> tuple[Assessed, ...]:
+        """For each zone and quantity, the value with the largest share of its limit."""
+        names = sorted({zone.zone for zone in self.zones})
+        return tuple(row for name in names for _, row in self.worst_in(name).values())
+
+    def worst_in(self, zone: str) -> dict[str, tuple[ZoneReport, Assessed]]:
+        """By quantity, the value with the largest share of its limit in a zone, and where it is."""
+        found: dict[str, tuple[ZoneReport, Assessed]] = {}
+        for report in self.zones:
+            for row in report.rows if report.zone == zone else ():
+                before = found.get(row.criterion.name)
+                if before is None or not row.rank <= before[1].rank:
+                    found[row.criterion.name] = report, row
+        return found
+
+    def record(self) -> dict[str, object]:
+        """Return the assessment as plain numbers and strings, SI."""
+        limits = self.limits
+        comfort = {}
+        if isinstance(limits, ComfortLimits):
+            comfort = {run: [p.record(limits) for p in own] for run, own in self.comfort.items()}
+        return {
+            "vehicle": self.vehicle, "standard": self.standard,
+            "edition": limits.edition if limits else None, "runs": list(self.runs),
+            "verdict": self.verdict or None, "reasons": list(self.reasons),
+            "verdicts": {name: verdict.record() for name, verdict in self.verdicts.items()},
+            "deciding": list(getattr(limits, "deciding", ())),
+            "conditions": [condition.record() for condition in self.conditions],
+            "zones": [zone.record() for zone in self.zones],
+            "hunting_frequency": self.hunting_frequency,
+            "regression": [one.record() for one in self.influences],
+            "sections": [row.record() for row in self.sections], "comfort": comfort,
+            "wear": {run: [w.record() for w in wheels] for run, wheels in self.wear.items()},
+            "safety": {run: report.record() for run, report in self.safety.items()},
+            "remarks": list(self.remarks),
+        }  # fmt: skip
