@@ -3,19 +3,16 @@
 =================== ========================================================================
 `spec.py`           `RunSpec`, `StudySpec`, `Execution`: what is asked for, by whomever
 `case.py`           `Case`: all inputs of one run, loaded, with its name and its key
-`points.py`         inputs of each run, with a key, before anything is loaded
 `rows.py`           values of grids, linked keys and samples
 `plan.py`           `Plan`: from a study to points and cases; all faults are reported together
 `run.py`            run of a case, to a file
 `execute.py`        cases over processes or a dask cluster
 `records.py`        records of finished work as JSON, with checksums
 `journal.py`        finished runs, one line per run, appended
-`retention.py`      parts of each result that are kept
 `user_function.py`  user-defined quantities by a Python function
 `summary.py`        ``summary.csv`` and ``study.json``
 `study.py`          `study`: from inputs, files or definitions, to a plan, which is carried out
-`state.py`          which runs of a plan are done, and which are to be computed
-`carry_out.py`      `carry_out`: computes the missing runs, with the journal of the folder
+`carry_out.py`      `carry_out`: which runs are done; computes the missing ones, with the journal
 `outcome.py`        `Outcome`: summary and results of a folder
 `analyses.py`       analyses at a point besides a run: curving, critical speed, modes
 `optimise.py`       `optimise`: objectives, constraints, the design that is chosen

@@ -31,11 +31,10 @@ from railsim.errors import Fault, Faults, InputError, argument_error, input_erro
 from railsim.files.access import check_folder, write_text
 from railsim.result import Result, open_result
 from railsim.result.hunting import HUNTS
-from railsim.studies.carry_out import carry_out
+from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, Flags, RecordedGeometry
-from railsim.studies.plan import Cases
-from railsim.studies.spec import Execution, StudySpec
+from railsim.studies.spec import StudySpec
 from railsim.table import Column, Table
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
@@ -187,7 +186,7 @@ def assess_track(
         vehicles=[str(v) for v in vehicles], tracks=[str(recording)], speeds=list(speeds),
         single=True, keep="Q,Y,Y_over_Q,sum_Y,wheelset_distance,sensor_acceleration",
     )  # fmt: skip
-    outcome = carry_out(Cases(cases), spec, folder, Execution(longest_first=True, **how))
+    outcome = carry_out_cases(cases, spec, folder, **how)
     remarks = [
         f"{record['name']}: {record['status']}, {record['status_reason']}"
         for record in outcome.records

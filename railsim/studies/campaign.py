@@ -4,6 +4,7 @@ It is carried out as a study: with journal, index and summary, and a run whose f
 same inputs is not computed again.
 """
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,13 +21,12 @@ from railsim.errors import Fault, Faults, InputError, RailsimError
 from railsim.files.access import check_folder
 from railsim.processes import available_cores
 from railsim.result import Result, open_result
-from railsim.studies.carry_out import carry_out
+from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.in_conditions import in_condition, repeated, scaled_radii
-from railsim.studies.plan import Cases
-from railsim.studies.points import ROUGH_DURATION, check_number
+from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
-from railsim.studies.spec import Execution, RunSpec, StudySpec
+from railsim.studies.spec import RunSpec, StudySpec
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def campaign(
         single=plan.single,
         assignments=list(assignments),
     )
-    outcome = carry_out(Cases(cases), spec, folder, Execution(longest_first=True, **how))
+    outcome = carry_out_cases(cases, spec, folder, **how)
     if outcome.failed:
         words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in outcome.failed)
         raise RailsimError(f"{len(outcome.failed)} of {len(cases)} runs failed: {words}")
@@ -97,8 +97,8 @@ def scenario_cases(
     """
     faults = Faults()
     cases: list[Case] = []
-    axes = [vehicles, _conditions(scenario), list(scenario.parts), *scenario.grid.values()]
-    check_number(axes, available_cores(), lambda: ROUGH_DURATION)
+    axes = (vehicles, _conditions(scenario), scenario.parts, *scenario.grid.values())
+    check_number(math.prod(map(len, axes)), available_cores(), lambda: ROUGH_DURATION)
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:

@@ -21,6 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from itertools import pairwise
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -34,16 +35,17 @@ from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
+from railsim.result.hdf5 import PLAIN, Storage, write
 from railsim.simulation import simulate
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.records import Record
-from railsim.studies.retention import EVERYTHING, Retention
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
+ALWAYS_KEPT = ("time", "distance", "Q0")
 
 Progress = Callable[[float], None]
 
@@ -53,15 +55,18 @@ class Job:
     """A case and the paths of its files.
 
     `path`, `picture`: files of result and figure; existing ones are replaced; `function`: function
-    for user-defined quantities, see `railsim.studies.user_function`; `exists`: whether the run
-    exists, and only its analyses are to be computed.
+    for user-defined quantities, see `railsim.studies.user_function`; `keep`, `storage`: quantities
+    of the result that are kept, see `railsim.studies.spec.kept_quantities`, compression and
+    precision of its file; `exists`: whether the run exists, and only its analyses are to be
+    computed.
     """
 
     case: Case
     path: Path
     picture: Path | None = None
     function: str | None = None
-    retention: Retention = EVERYTHING
+    keep: tuple[str, ...] = ("*",)
+    storage: Storage = PLAIN
     exists: bool = False
 
 
@@ -103,7 +108,7 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         return [_analysed(job) for job in batch]
     if first.exists and (record := _existing(first)) is not None:
         return [record]
-    files = [None if job.retention.summary else job.path for job in batch]
+    files = [job.path if job.keep else None for job in batch]
     found: list[Result | Exception]
     try:
         if len(batch) == 1:
@@ -124,7 +129,7 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
 def _quantities(job: Job) -> Collection[str] | None:
     """Return the quantities that the record of a job needs; None for all."""
     wants_all = job.function is not None or job.case.analyses or job.picture is not None
-    return None if wants_all or not job.retention.summary else OF_FACTS
+    return None if wants_all or job.keep else OF_FACTS
 
 
 def _existing(job: Job) -> Record | None:
@@ -161,9 +166,21 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
 
             save(histories(outcome), job.picture, overwrite=True)
         record = finished_record(job.case, outcome, job.function)
-        return {**record, "file": job.retention.applied(job.path, outcome)}
+        return {**record, "file": _reduced(job, outcome)}
     except Exception as error:
         return failed_record(job.case, error)
+
+
+def _reduced(job: Job, result: Result) -> str:
+    """Reduce a result file to what is kept; return its name, empty without a file."""
+    if not job.keep:
+        job.path.unlink(missing_ok=True)  # kept by an earlier run
+        return ""
+    if job.keep != ("*",) or job.storage != PLAIN:
+        wanted = (*job.keep, *ALWAYS_KEPT)
+        names = [name for name in result if any(fnmatchcase(name, one) for one in wanted)]
+        write(result, job.path, overwrite=True, names=names, storage=job.storage)
+    return job.path.name
 
 
 def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:

@@ -34,7 +34,7 @@ class Entry(NamedTuple):
     """Data of a run that are available without reading its record.
 
     `name`, `status`: name of the run, and how it ended: as in its result, or ``failed``; `key`:
-    hash of the inputs of the run, see `railsim.studies.points`; `size`, `changed`: size of its
+    hash of the inputs of the run, see `railsim.studies.plan`; `size`, `changed`: size of its
     result file [bytes] and time of its last change [ns]; 0 without a file; `offset`, `length`:
     position and length of its record in the journal [bytes].
     """

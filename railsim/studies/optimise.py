@@ -34,7 +34,7 @@ from railsim.studies.designs import (
     values_by_name,
     with_unit,
 )
-from railsim.studies.points import ROUGH_DURATION, check_number
+from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.records import finite
 from railsim.studies.search import Task, hypervolume, knee, non_dominated, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
@@ -179,7 +179,7 @@ def optimise(
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
     replaced = {name: value for name, value in changes.items() if value is not None}
     wanted = _changed(definition.optimise, replaced)
-    runs = (range(wanted.evaluations), range(definition.runs))
+    runs = wanted.evaluations * definition.runs
     check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
     folder = Path(out)
     check_folder(folder)

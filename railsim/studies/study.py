@@ -19,7 +19,6 @@ from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Plan
 from railsim.studies.records import Record
-from railsim.studies.retention import ALL, retention
 from railsim.studies.spec import Execution, StudySpec, checked
 from railsim.studies.summary import read_index, refuse_too_many
 from railsim.studies.user_function import Function, full_name
@@ -48,7 +47,7 @@ def study(
     resume: bool = False,
     overwrite: bool = False,
     plots: bool = False,
-    keep: str = ALL,
+    keep: str = "all",
     compress: bool = False,
     single: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -168,14 +167,12 @@ def study(
 def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
     """Carry out a study in its folder; see `study`."""
     check_folder(folder)
-    retention(spec)  # refuses unknown quantities
     if spec.quantities and not needs_run(spec.analyses):
         raise argument_error("quantities", "no analysis computes a run", 'add one of kind = "run"')
     plan = Plan(spec, execution.workers or available_cores())
     base = os.path.relpath(Path.cwd(), folder)
-    outcome = carry_out(
-        plan, spec.changed(railsim_version=__version__, folder=base), folder, execution
-    )
+    spec = spec.changed(railsim_version=__version__, folder=base)
+    outcome = carry_out(plan.points, plan.cases, spec, folder, execution)
     if execution.plots:
         from railsim.studies.pictures import draw
 
