@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.files.access import check_file, whole_file
@@ -20,7 +20,6 @@ from railsim.profiles import save_profile
 from railsim.profiles.used import used_profiles
 from railsim.table import Column, Table
 
-Floats = NDArray[np.float64]
 NORMAL = 1.959964  # of a normal distribution: 95 % within
 UNKNOWN = 0.5  # standard deviation of a combination (as a share) from which the data do not tell it
 PART = 0.25  # share of the largest part of a combination that is named
