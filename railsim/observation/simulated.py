@@ -80,7 +80,6 @@ class SimulatedRun:
         self._moved = float(s[0]) - LEAD if self._straight else 0.0
         self._track = track
         self._start = max(0.0, float(s[0]) - LEAD - self._moved)
-
         self._constant = bool(np.ptp(piece.speeds) < STEADY * np.mean(piece.speeds))
 
     @property
