@@ -95,7 +95,6 @@ def carry_out(
         for text in state.settle(journal):
             remark(text)
         jobs = _jobs(state, spec, keep, folder, execution)
-        status = "interrupted"
         try:
             if jobs:
                 with suppress(FileNotFoundError):  # it would be out of date
@@ -108,14 +107,13 @@ def carry_out(
                     execution.on_record(record)
                 if record.get("errno") in NOTHING_MORE:
                     raise OSError(record["errno"], os.strerror(record["errno"]), str(folder))
-            status = "complete"
         except BaseException:
             with suppress(OSError):  # the disk may be full
-                write_index(folder, inputs, status, state.records(journal))
+                write_index(folder, inputs, "interrupted", state.records(journal))
             raise
         whole = len(points) > MANY and _is_newer(folder / "study.json", journal.path)
         if jobs or state.found or not whole:
-            write_index(folder, inputs, status, state.records(journal))
+            write_index(folder, inputs, "complete", state.records(journal))
         return Outcome(folder, state.records(journal), len(jobs))
 
 

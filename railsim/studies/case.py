@@ -56,6 +56,12 @@ class Case:
         """Name of the result file; empty if there is no run in the time domain."""
         return f"{self.name}.h5" if needs_run(self.analyses) else ""
 
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """Speed, beginning, end and settings, as arguments of `railsim.simulate`."""
+        names = ("speed", "start", "duration", "until", "settings")
+        return {name: getattr(self, name) for name in names}
+
     @cached_property
     def key(self) -> str:
         """Hash of everything that the results of the run depend on.

@@ -16,10 +16,10 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import pairwise
@@ -91,9 +91,9 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
             continue
         group = next((some for some in alike if can_share_a_call(some[0].case, job.case)), None)
         if group is None:
-            alike.append([job])
-        else:
-            group.append(job)
+            group = []
+            alike.append(group)
+        group.append(job)
     for group in alike:
         parts = math.ceil(len(group) / size)
         ends = [len(group) * part // parts for part in range(parts + 1)]
@@ -106,13 +106,16 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     first = batch[0]
     if not first.case.file_name:
         return [_analysed(job) for job in batch]
-    if first.exists and (record := _existing(first)) is not None:
-        return [record]
+    if first.exists:
+        with suppress(RailsimError):  # its file lacks required quantities: it is run again
+            return [finished_record(first.case, open_result(first.path), first.function)]
     files = [job.path if job.keep else None for job in batch]
     found: list[Result | Exception]
     try:
         if len(batch) == 1:
-            only = _quantities(first)
+            # the quantities that the record needs; None for all
+            wants_all = first.function or first.case.analyses or first.picture or first.keep
+            only = None if wants_all else OF_FACTS
             result = run_case(first.case, files[0], overwrite=True, progress=progress, only=only)
             found = [result]
         else:
@@ -124,20 +127,6 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         found = [error] * len(batch)
     found.reverse()  # each result is released after its record: it holds data read from its file
     return [_record(job, found.pop()) for job in batch]
-
-
-def _quantities(job: Job) -> Collection[str] | None:
-    """Return the quantities that the record of a job needs; None for all."""
-    wants_all = job.function is not None or job.case.analyses or job.picture is not None
-    return None if wants_all or job.keep else OF_FACTS
-
-
-def _existing(job: Job) -> Record | None:
-    """Return the record of an existing run; None if its file lacks required quantities."""
-    try:
-        return finished_record(job.case, open_result(job.path), job.function)
-    except RailsimError:
-        return None
 
 
 def _analysed(job: Job) -> Record:
@@ -185,13 +174,14 @@ def _reduced(job: Job, result: Result) -> str:
 
 def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:
     """Carry out batches one after the other."""
-    shares = _shares(batches)
-    for index, batch in enumerate(batches):
+    done = 0.0
+    for batch, share in zip(batches, _shares(batches), strict=True):
 
-        def share(fraction: float, index: int = index) -> None:
-            progress(sum(shares[:index]) + fraction * shares[index])
+        def tell(fraction: float, before: float = done, of: float = share) -> None:
+            progress(before + fraction * of)
 
-        yield from perform(batch, share)
+        yield from perform(batch, tell)
+        done += share
 
 
 def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> Iterator[Record]:
@@ -232,52 +222,46 @@ class _Pool:
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
         context: Any = worker_context()
         self._batches, self._indices = batches, indices
-        self._shares = _shares(batches)
         self._fractions = context.Array("d", len(batches), lock=False)
         self._holders = context.Array("l", len(batches), lock=False)  # process of each batch
         self._stop = context.Event()
         self._others = set(multiprocessing.active_children())
         self._processes: set[BaseProcess] = set()
-        self._index_of: dict[Future[list[Record]], int] = {}
+        self._running: dict[Future[list[Record]], int] = {}
         shared = self._fractions, self._holders, self._stop
         begun = (*shared, bool(logging.getLogger("railsim").handlers))
         self._pool = ProcessPoolExecutor(min(workers, len(indices)), context, _begin, begun)
         self.lost: set[int] = set()
 
-    def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
-        new = set()
+    def _submit(self, indices: Sequence[int]) -> None:
         with signals_later(), workers_begin():  # inherited by the processes
             for index in indices:
-                future = self._pool.submit(_work, index, self._batches[index])
-                self._index_of[future] = index
-                new.add(future)
+                self._running[self._pool.submit(_work, index, self._batches[index])] = index
             self._processes |= set(multiprocessing.active_children()) - self._others
-        return new
 
     def outcomes(self, progress: Progress) -> Iterator[tuple[int, list[Record]]]:
         """Yield index and records of every batch that ends."""
         first, rest = self._indices[0], list(self._indices[1:])
-        done: set[int] = set()
+        shares = _shares(self._batches)
         broken = False
         try:
-            waiting = self._submit([first])
-            if is_compiled():
-                waiting |= self._submit(rest)
-                rest = []
-            while waiting and not broken:
-                ended, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
-                progress(sum(self._fractions[i] * self._shares[i] for i in self._indices))
-                if rest and (ended or self._fractions[first] > 0.0):
-                    waiting |= self._submit(rest)
+            self._submit([first])
+            compiled = is_compiled()
+            while (rest or self._running) and not broken:
+                if rest and compiled:
+                    self._submit(rest)
                     rest = []
+                ended, _ = wait(self._running, timeout=POLL, return_when=FIRST_COMPLETED)
+                progress(sum(self._fractions[i] * shares[i] for i in self._indices))
+                compiled = bool(ended) or self._fractions[first] > 0.0
                 for future in ended:
-                    index = self._index_of[future]
+                    index = self._running[future]
                     try:
                         records = _outcome(future, self._batches[index])
                     except BrokenProcessPool:
                         broken = True
                         continue
-                    done.add(index)
+                    del self._running[future]
                     yield index, records
         except BrokenProcessPool:  # nothing more can be submitted
             broken = True
@@ -291,15 +275,15 @@ class _Pool:
             for folder in {job.path.parent for batch in self._batches for job in batch}:
                 sweep(folder)  # left by a process that was killed
         if broken:
-            self.lost = self._lost(done)
+            self.lost = self._lost()
 
-    def _lost(self, done: set[int]) -> set[int]:
+    def _lost(self) -> set[int]:
         """Return the batches of the process that died; the pool has terminated the others."""
         for process in self._processes:
             process.join(GRACE)
         ended = (None, 0, -signal.SIGTERM)
         dead = {process.pid for process in self._processes if process.exitcode not in ended}
-        begun = {i for i in self._indices if i not in done and self._holders[i]}
+        begun = {i for i in self._running.values() if self._holders[i]}
         return {i for i in begun if self._holders[i] in dead} or begun or {self._indices[0]}
 
 

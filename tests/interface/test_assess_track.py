@@ -9,7 +9,7 @@ import railsim
 from railsim.cli import main
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
-from railsim.studies.geometry_limits import GEOMETRY, Flags, RecordedGeometry
+from railsim.studies.geometry_limits import GEOMETRY, RecordedGeometry
 from railsim.track.irregularity import displacement
 
 LENGTH, SPEED, DEFECT = 1000.0, 40.0, 640.0
@@ -136,7 +136,7 @@ def test_sections_are_counted_by_hand():
     exceeded[3:12] = exceeded[42] = True  # 75 to 300 m, 1050 to 1060 m
     unknown = np.zeros(43, dtype=bool)
     unknown[25] = True  # 625 to 650 m
-    table, flagged = RecordedGeometry(track, 0.0, 1060.0).sections(Flags(exceeded, unknown), 40.0)
+    table, flagged = RecordedGeometry(track, 0.0, 1060.0).sections(exceeded, unknown, 40.0)
     assert flagged.tolist() == [1, 2, 0, 1, 1]
     records = table.records()
     assert [r["vehicles"] for r in records] == ["flagged", "flagged", "", "not run", "flagged"]
