@@ -12,7 +12,7 @@ least; of a forward difference it is r, from one more run with all parameters ch
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -215,7 +215,8 @@ def sensitivity(
     job = _Job(Model(vehicle, track, profiles), tuple(wanted), tuple(named.values()), how)
     result = job.result(np.zeros(len(wanted)))
     if settings.drive.mode == "constant":
-        how["settings"] = settings.replace(step=float(result.attributes["step"]))
+        fixed = settings.replace(step=float(result.attributes["step"]))
+        job = replace(job, how={**run, "settings": fixed})
     try:
         base = job.read(result)
     except KeyError as error:
