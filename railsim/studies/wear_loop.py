@@ -182,7 +182,7 @@ class Wearing:
 
 def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
     """Run, subtract what has worn, and run again."""
-    _check(wearing.runs, how)
+    _check(wearing, how)
     law, outputs = wear_law(how.law), {"contact_patches": True}
     settings = how.settings or Settings()
     settings = settings.model_copy(update={"outputs": settings.outputs.model_copy(update=outputs)})
@@ -296,15 +296,15 @@ def _wheels(vehicle: Vehicle) -> set[str]:
     return {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
 
 
-def _check(runs: Sequence[Run], how: Loop) -> None:
+def _check(wearing: Wearing, how: Loop) -> None:
     faults = Faults()
-    faults += [Fault("wear", "routes", "no route", "at least one")] * (not runs)
-    for run in runs:
+    faults += [Fault("wear", "routes", "no route", "at least one")] * (not wearing.runs)
+    for run in wearing.runs:
         if not (run.share > 0.0 and math.isfinite(run.share)):
             found = f"found {run.share:g} for {run.track.name}"
             faults.append(Fault("wear", "share", found, "above 0"))
     if not (how.step > 0.0 and math.isfinite(how.step)):
-        faults.append(Fault("wear", "step", f"found {how.step:g} m", "above 0"))
+        faults.append(Fault("wear", "step", f"found {wearing.amount(how.step)}", "above 0"))
     if how.steps < 1:
         faults.append(Fault("wear", "steps", f"found {how.steps}", "1 or more"))
     faults.check()
