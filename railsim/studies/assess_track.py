@@ -25,6 +25,7 @@ from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
+from railsim.definitions.track.layout import is_uniform
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.files.access import check_folder, write_folder
@@ -253,16 +254,11 @@ def _extent(track: Track) -> tuple[float, float]:
 def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
     """Track with the rows between a and b and around them; by how much it begins later [m].
 
-    Of a straight track the part alone, of others the whole plan.
+    Of a track that is the same everywhere the part alone, of others the whole plan.
     """
     low, high = a - RUN_IN - BEYOND, b + BEYOND
-    straight = (
-        all(element.type == "STR" for element in track.plan)
-        and not track.vertical
-        and track.gauge_widening is None
-        and all(isinstance(part, Measured) for part in track.irregularities)
-    )
-    moved = max(0.0, low) if straight else 0.0
+    uniform = is_uniform(track) and all(isinstance(p, Measured) for p in track.irregularities)
+    moved = max(0.0, low) if uniform else 0.0
     parts: list[Any] = []
     for part in track.irregularities:
         if isinstance(part, Measured):
@@ -276,7 +272,7 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
         else:
             parts.append(part)
     changes: dict[str, Any] = {"irregularities": [p.model_dump(exclude_none=True) for p in parts]}
-    if straight:
+    if uniform:
         length = min(high, track.length) - moved
         changes["plan"] = [{"type": "STR", "length": length}]
         changes["cant"] = [{"type": "CST", "length": length, "cant": 0.0}]

@@ -118,6 +118,23 @@ def test_wrong_input(recording, tmp_path, capsys):
     assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"cant": [{"type": "CST", "length": LENGTH, "cant": 0.05}]},
+        {"friction_table": [[0.0, 0.2], [900.0, 0.4]]},
+    ],
+)
+def test_pieces_keep_what_a_straight_track_has_at_its_places(recording, changes):
+    """Only a track that is the same everywhere is cut; cant and friction are not lost or moved."""
+    track = recorded(recording)
+    assert module._part(track, 500.0, 900.0)[1] == 240.0
+    part, moved = module._part(track.replace(**changes), 500.0, 900.0)
+    assert moved == 0.0
+    for name in changes:
+        assert getattr(part, name) == getattr(track.replace(**changes), name)
+
+
 def test_sections_are_counted_by_hand():
     """Five sections: a dip of 20 mm in the first, vehicles flag the first, second and fifth.
 
