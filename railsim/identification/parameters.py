@@ -59,6 +59,11 @@ class Parameter:
         return bool(self.profiles)
 
     @property
+    def of_vehicle(self) -> tuple[str, ...]:
+        """Keys of the vehicle."""
+        return tuple(key for key in self.keys if not key.startswith(TRACK))
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Bounds of the coordinate."""
         return (self.low, self.high) if self.is_share else (math.log(self.low), math.log(self.high))

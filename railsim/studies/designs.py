@@ -129,15 +129,6 @@ class Evaluation:
         self.designs = tuple(designs)
         self._margins = np.array(margins, dtype=float).reshape(len(designs), -1)
 
-    def shares(self) -> Floats:
-        """Return all designs as points of the unit cube."""
-        return np.array(
-            [
-                [share_of(v, design.variables[path]) for path, v in self.variables]
-                for design in self.designs
-            ]
-        )
-
 
 def _written(variable: Variable, share: float) -> str:
     """Return the value at a share of a variable's range as text.

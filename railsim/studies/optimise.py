@@ -263,12 +263,15 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
 def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivity]:
     wanted = evaluation.wanted
     names = [name_of(one) for one in (*wanted.objectives, *wanted.constraints)]
-    shares = evaluation.shares()
+    variables = wanted.variables.items()
+    shares = np.array(
+        [[share_of(v, d.variables[path]) for path, v in variables] for d in evaluation.designs]
+    )  # designs as points of the unit cube
     values = np.array([design.values for design in evaluation.designs])
-    paths = [path for path, _ in evaluation.variables]
     unique = list(dict.fromkeys(names))
-    columns = [names.index(name) for name in unique]
-    return sensitivities(shares, values[:, columns], shares[chosen.number - 1], paths, unique)
+    values = values[:, [names.index(name) for name in unique]]
+    middle = shares[chosen.number - 1]
+    return sensitivities(shares, values, middle, list(wanted.variables), unique)
 
 
 def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:

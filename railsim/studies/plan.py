@@ -88,20 +88,13 @@ class Plan:
             (*spec.assignments, *(f"{key}={value}" for key, value in row.values.items()))
             for row in rows
         ]
+        shared = spec.settings, spec.start, spec.duration, spec.until
         self.points: list[Point] = []
         for vehicle, track, speed in product(spec.vehicles, spec.tracks, spec.speeds):
             for row, assignments in zip(rows, assigned, strict=True):
                 wanted = speed if row.speed is None else row.speed
-                run = RunSpec(
-                    vehicle,
-                    track,
-                    None if isinstance(wanted, str) else wanted,
-                    spec.settings,
-                    spec.start,
-                    spec.duration,
-                    spec.until,
-                    assignments,
-                )
+                given = None if isinstance(wanted, str) else wanted
+                run = RunSpec(vehicle, track, given, *shared, assignments)
                 permitted = isinstance(wanted, str)
                 first = self._permitted(run) if permitted else self._loader.first_speed(run)
                 self.points.append(self._point(replace(run, speed=first), row))
@@ -137,11 +130,10 @@ class Plan:
         vehicle, track = (self._loader.definition(kind, run) for kind in ("vehicle", "track"))
         if vehicle is None or track is None:
             return None  # already reported
-        allowed = f"needed for the speed '{PERMITTED}'"
-        missing = []
+        allowed, missing = f"needed for the speed '{PERMITTED}'", Faults()
         if vehicle.service is None:
-            fault = Fault(str(run.vehicle), "service.admissible_speed", "missing", allowed)
-            missing.append(fault)
+            key = "service.admissible_speed"
+            missing.append(Fault(str(run.vehicle), key, "missing", allowed))
         if track.speed is None:
             missing.append(Fault(str(run.track), "speed", "missing", allowed))
         self._loader.faults += missing
