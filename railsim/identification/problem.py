@@ -43,8 +43,8 @@ class Problem:
     form: Form
     place: bool
     workers: Workers
-    folder: Path | None = None
-    progress: Callable[[int], None] = lambda count: None
+    folder: Path | None
+    progress: Callable[[int], None]
     weights: list[Floats] = field(default_factory=list)
     simulations: int = 0
     _inputs: str = field(init=False)

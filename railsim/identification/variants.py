@@ -17,7 +17,7 @@ class Workers:
     Used as a context manager: the processes end with the block.
     """
 
-    count: int = 1
+    count: int
     _pool: ProcessPoolExecutor | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Self:

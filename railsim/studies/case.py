@@ -74,11 +74,8 @@ class Case:
             "railsim": __version__,
             "vehicle": self.vehicle.to_toml(),
             "track": self.track.to_toml(),
+            **self.conditions,
             "settings": self.settings.to_toml(),
-            "speed": self.speed,
-            "start": self.start,
-            "duration": self.duration,
-            "until": self.until,
             "profiles": {
                 name: hashlib.sha256(load_profile(name).key()).hexdigest()
                 for name in sorted({name for _, name, _ in used})

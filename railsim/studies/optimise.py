@@ -69,8 +69,8 @@ class Optimisation:
     chosen: Design | None
     active: tuple[str, ...]
     sensitivities: tuple[Sensitivity, ...]
-    vehicles: tuple[Path, ...] = ()
-    computed: int = 0
+    vehicles: tuple[Path, ...]
+    computed: int
 
     def hypervolume(self, reference: Sequence[float]) -> float:
         """Return the volume between the front and a reference point, in SI of all objectives."""

@@ -14,7 +14,7 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -51,8 +51,8 @@ class Point:
 
     name: str
     run: RunSpec
-    labels: Mapping[str, str | float] = field(default_factory=dict)
-    key: str = ""
+    labels: Mapping[str, str | float]
+    key: str
     has_run: bool = True
 
 

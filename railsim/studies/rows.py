@@ -28,7 +28,7 @@ class Row:
     speed: float | None = None
 
 
-def made_rows(grid: Grid, linked: Sequence[Grid] = (), sample: Sample | None = None) -> list[Row]:
+def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list[Row]:
     """Return all combinations: the grid outermost, then linked keys, then the sample."""
     combined = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     for table in linked:
@@ -54,14 +54,14 @@ def made_rows(grid: Grid, linked: Sequence[Grid] = (), sample: Sample | None = N
 SPEEDS = "such as 20 or 72km/h"
 
 
-def speed_of(text: str, option: str = "speeds") -> float:
+def speed_of(text: str) -> float:
     """Return the speed of a text, which may have a unit [m/s].
 
     Raises InputError: the text is not a number.
     """
     found = speed_in_si(text)
     if isinstance(found, str):
-        raise argument_error(option, f"'{text}' is not a speed", SPEEDS)
+        raise argument_error("speeds", f"'{text}' is not a speed", SPEEDS)
     return float(found)
 
 

@@ -15,8 +15,8 @@ def run_case(
     case: Case,
     path: str | Path | None,
     *,
-    overwrite: bool = False,
-    progress: Callable[[float], None] | None = None,
+    overwrite: bool,
+    progress: Callable[[float], None] | None,
     resume: Result | None = None,
     only: Collection[str] | None = None,
 ) -> Result:

@@ -6,7 +6,6 @@ command continues an interrupted map.  A damaged point is computed again.
 
 import hashlib
 import json
-import logging
 import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -27,8 +26,6 @@ from railsim.version import __version__
 
 Progress = Callable[[float], None]
 
-_LOG = logging.getLogger(__name__)
-
 
 @dataclass(frozen=True)
 class MapPoint:
@@ -48,18 +45,18 @@ def stability_map(
     points: Sequence[MapPoint],
     options: dict[str, Any],
     *,
-    folder: Path | None = None,
-    workers: int | None = None,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-    on_remark: Callable[[str], None] | None = None,
+    folder: Path | None,
+    workers: int | None,
+    overwrite: bool,
+    progress: Progress,
+    on_remark: Callable[[str], None],
 ) -> list[Record]:
     """Return the record of `critical_speed` at each point, in their order.
 
-    `options`: further arguments of `critical_speed`; `folder`: folder for finished points;
-    `workers`: processes; by default one for each core; `overwrite`: compute everything again;
+    `options`: further arguments of `critical_speed`; `folder`: folder for finished points, if any;
+    `workers`: processes; None: one for each core; `overwrite`: compute everything again;
     `progress`: called repeatedly with the finished fraction; `on_remark`: called with a sentence on
-    every stored point that is damaged and computed again; by default these sentences are logged.
+    every stored point that is damaged and computed again.
     """
     paths = [_stored_path(folder, point, options) for point in points]
     found: dict[int, Record] = {}
@@ -68,9 +65,8 @@ def stability_map(
             try:
                 found[number] = read_record(path)
             except InputError as error:
-                (on_remark or _LOG.warning)(f"{error.faults[0]}: it is computed again")
-    tell = progress or (lambda _: None)
-    tell(len(found) / len(points))
+                on_remark(f"{error.faults[0]}: it is computed again")
+    progress(len(found) / len(points))
     waiting = {number: point for number, point in enumerate(points) if number not in found}
     count = min(workers or available_cores(), max(1, len(waiting)))
     for number, record in _computed(waiting, options, count):
@@ -78,7 +74,7 @@ def stability_map(
         path = paths[number]
         if path is not None:
             write_record(path, record)
-        tell(len(found) / len(points))
+        progress(len(found) / len(points))
     return [found[number] for number in range(len(points))]
 
 
