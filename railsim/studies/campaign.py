@@ -114,7 +114,8 @@ def scenario_cases(
     """
     faults = Faults()
     cases: list[Case] = []
-    axes = (vehicles, _conditions(scenario), scenario.parts, *scenario.grid.values())
+    conditions = _conditions(scenario)
+    axes = (vehicles, conditions, scenario.parts, *scenario.grid.values())
     check_number(math.prod(map(len, axes)), available_cores(), lambda: ROUGH_DURATION)
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
@@ -132,7 +133,7 @@ def scenario_cases(
             allowed = "add [service] with admissible_speed and cant_deficiency"
             faults.append(Fault(str(vehicle), "service", "missing", allowed))
             continue
-        several = product(_conditions(scenario), scenario.parts.items(), points)
+        several = product(conditions, scenario.parts.items(), points)
         for (number, state, condition), (name, part), point in several:
             texts = [*scenario.assignments, *(f"{key}={v}" for key, v in point.items())]
             speed = part_speed(part.speed, service)

@@ -116,8 +116,7 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
             # the quantities that the record needs; None for all
             wants_all = first.function or first.case.analyses or first.picture or first.keep
             only = None if wants_all else OF_FACTS
-            result = run_case(first.case, files[0], overwrite=True, progress=progress, only=only)
-            found = [result]
+            found = [run_case(first.case, files[0], overwrite=True, progress=progress, only=only)]
         else:
             cases = [job.case for job in batch]
             found = run_cases(cases, files, overwrite=True, progress=progress)
