@@ -29,11 +29,8 @@ def benchmark(
 ) -> dict[str, Any]:
     """Time runs, in turn: what disturbs the machine disturbs all of them.
 
-    Returns
-    -------
-    dict
-        Plain numbers and strings, SI: `hardware`, `versions` and `runs`, each as `speed`, with
-        `error` where asked for.
+    Returns plain numbers and strings, SI: `hardware`, `versions` and `runs`, each as `speed`, with
+    `error` where asked for.
     """
     results: dict[Scenario, list[Result]] = {run: [] for run in runs}
     for _ in range(repetitions):
@@ -56,11 +53,8 @@ def benchmark(
 def speed(results: Sequence[Result]) -> dict[str, Any]:
     """Return step and multiples of real time of equal runs.
 
-    Returns
-    -------
-    dict
-        `real_time_all`: simulated seconds per CPU second of the time loop, their median
-        `real_time` and the best; `cpu_per_step` of the best [s].
+    `real_time_all`: simulated seconds per CPU second of the time loop, their median `real_time` and
+    the best; `cpu_per_step` of the best [s].
     """
     facts = results[0].attributes
     factors = [float(result.attributes["real_time_factor"]) for result in results]
@@ -76,12 +70,9 @@ def speed(results: Sequence[Result]) -> dict[str, Any]:
 def error(result: Result, reference: Result) -> dict[str, float]:
     """Return what a result is off from a reference of the same output instants.
 
-    Returns
-    -------
-    dict
-        `dQ_over_Q0` of the peak, the worse of both signs [1]; `Y` of the peak and `Y_mid_curve`
-        of any wheel [N]; `yaw` of the peak [1, relative]; `peaks`: the largest relative error of
-        all peaks of `RELATIVE` and of both signs of dQ/Q0.
+    `dQ_over_Q0` of the peak, the worse of both signs [1]; `Y` of the peak and `Y_mid_curve` of any
+    wheel [N]; `yaw` of the peak [1, relative]; `peaks`: the largest relative error of all peaks of
+    `RELATIVE` and of both signs of dQ/Q0.
     """
 
     def values(name: str, kind: str = "abs") -> tuple[float, float]:

@@ -15,24 +15,10 @@ REFERENCE_STEP = 0.125e-3  # s, of RK4
 class Scenario:
     """One run.
 
-    Attributes
-    ----------
-    name : str
-        What it is called in tables.
-    vehicle, track : str
-        Names of shipped files.
-    speed : float
-        [m/s]
-    irregularity : str or None
-        Spectrum of random irregularities on the track.
-    settings : tuple of pairs of str and value
-        What differs from the default settings.
-    support : str or None
-        Preset of the track's support, its own if None.
-    until : float or None
-        End of the run [m], the track's end if None.
-    target : float or None
-        Least multiple of real time that this run is to reach.
+    `name`: in tables; `vehicle`, `track`: names of shipped files; `speed`: [m/s]; `irregularity`:
+    spectrum of random irregularities on the track; `settings`: what differs from the default
+    settings; `support`: preset of the track's support, by default its own; `until`: end of the run
+    [m], by default that of the track; `target`: least multiple of real time that it is to reach.
     """
 
     name: str

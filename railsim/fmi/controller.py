@@ -3,7 +3,6 @@
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -110,9 +109,7 @@ class Controller:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: object, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -133,7 +130,5 @@ def _value(simulation: Simulation, at: str) -> float:
     try:
         return float(np.asarray(value)[tuple(int(i) for i in indices)])
     except (IndexError, ValueError, TypeError):
-        shape = np.shape(value)
-        raise argument_error(
-            "inputs", "no such member", f"indices within {shape}", key=at
-        ) from None
+        allowed = f"indices within {np.shape(value)}"
+        raise argument_error("inputs", "no such member", allowed, key=at) from None

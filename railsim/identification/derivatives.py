@@ -12,16 +12,16 @@ least; of a forward difference it is r, from one more run with all parameters ch
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.identification.parameters import Model, Parameter, parsed
 from railsim.identification.variants import Workers
 from railsim.measurement.counterpart import outputs_for, series
@@ -31,7 +31,6 @@ from railsim.result import Result
 from railsim.simulation import simulate
 from railsim.table import Column, Table
 
-Floats = NDArray[np.float64]
 Output = str | Callable[[Result], Any]
 FIRST = 1e-2  # step of a coordinate
 SHORTER = 8.0
@@ -132,26 +131,27 @@ class _Job:
 
     model: Model
     parameters: tuple[Parameter, ...]
-    outputs: tuple[tuple[str, Output], ...]
+    outputs: tuple[Output, ...]
     how: Mapping[str, Any]
 
     def result(self, x: Floats) -> Result:
         own = self.model.with_parameters(self.parameters, x)
         return simulate(own.vehicle, own.track, profiles=own.profiles, **self.how)
 
+    def variants(self, points: Sequence[Floats], pool: Workers) -> list[list[Floats]]:
+        """Return the outputs of variants, which are simulated together."""
+        return pool.run([(self.values, (x,)) for x in points])
+
     def values(self, x: Floats) -> list[Floats]:
         return self.read(self.result(x))
 
     def read(self, result: Result) -> list[Floats]:
         if result.status != "complete":
-            words = f"a variant {result.status}"
-            raise InputError([argument_fault("parameters", "", words, "a run that ends")])
-        return [
-            np.atleast_1d(np.asarray(
-                series(result, one) if isinstance(one, str) else one(result), dtype=np.float64
-            ))
-            for _, one in self.outputs
-        ]  # fmt: skip
+            raise argument_error("parameters", f"a variant {result.status}", "a run that ends")
+        found = [
+            series(result, one) if isinstance(one, str) else one(result) for one in self.outputs
+        ]
+        return [np.atleast_1d(np.asarray(values, dtype=np.float64)) for values in found]
 
 
 def sensitivity(
@@ -207,28 +207,23 @@ def sensitivity(
     True
     """
     if scheme not in ("central", "forward"):
-        raise InputError([argument_fault("scheme", "", scheme, "central or forward")])
+        raise argument_error("scheme", scheme, "central or forward")
     named = dict(outputs) if isinstance(outputs, Mapping) else {one: one for one in outputs}
     wanted = parsed(parameters, vehicle, track)
     settings = _settings(settings, named)
-    model = Model(vehicle, track, profiles)
-    job = _Job(model, tuple(wanted), tuple(named.items()), {**run, "settings": settings})
-    zero = np.zeros(len(wanted))
-    result = job.result(zero)
+    how = {**run, "settings": settings}
+    job = _Job(Model(vehicle, track, profiles), tuple(wanted), tuple(named.values()), how)
+    result = job.result(np.zeros(len(wanted)))
     if settings.drive.mode == "constant":
-        step = float(result.attributes["step"])
-        job = _Job(model, job.parameters, job.outputs,
-                   {**run, "settings": settings.replace(step=step)})  # fmt: skip
+        fixed = settings.replace(step=float(result.attributes["step"]))
+        job = replace(job, how={**run, "settings": fixed})
     try:
         base = job.read(result)
     except KeyError as error:
-        raise InputError([argument_fault("outputs", "", str(error.args[0]), "")]) from None
-    count = len(wanted)
+        raise argument_error("outputs", str(error.args[0])) from None
+    differences = _forward if scheme == "forward" else _central
     with Workers(workers or available_cores()) as pool:
-        if scheme == "forward":
-            found, runs = _forward(job, base, pool), count + 2
-        else:
-            found, runs = _central(job, base, pool)
+        found, runs = differences(job, base, pool)
     derivatives = {
         (output, one.name): found[k][j]
         for k, output in enumerate(named)
@@ -256,7 +251,7 @@ def _settings(settings: Settings | None, named: Mapping[str, Output]) -> Setting
     try:
         wanted = outputs_for(selections)
     except KeyError as error:
-        raise InputError([argument_fault("outputs", "", f"no quantity {error}", "")]) from None
+        raise argument_error("outputs", f"no quantity {error}") from None
     outputs = settings.outputs
     values = {
         key: value
@@ -268,58 +263,50 @@ def _settings(settings: Settings | None, named: Mapping[str, Output]) -> Setting
     return settings.replace(outputs={**outputs.model_dump(exclude_none=True), **values})
 
 
-def _values(job: _Job, x: Floats) -> list[Floats]:
-    return job.values(x)
-
-
-def _runs(job: _Job, points: Sequence[Floats], pool: Workers) -> list[list[Floats]]:
-    return pool.run([(_values, (job, x)) for x in points])
-
-
 def _size(x: Floats) -> float:
     return float(np.linalg.norm(x))
 
 
-def _forward(job: _Job, base: list[Floats], pool: Workers) -> list[list[Derivative]]:
+def _forward(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[Derivative]], int]:
+    """Return derivatives by output and parameter, and the number of runs with that of `base`."""
     count = len(job.parameters)
     step = FIRST / SHORTER
-    points = [*(step * np.eye(count)), np.full(count, -step)]
-    *moved, together = _runs(job, points, pool)
+    *moved, together = job.variants([*(step * np.eye(count)), np.full(count, -step)], pool)
     found = []
     for k, y in enumerate(base):
         values = [(one[k] - y) / step for one in moved]
         linear = -step * np.sum(values, axis=0)
         error = _size(together[k] - y - linear) / max(_size(linear), 1e-300)
         found.append([Derivative(value, error, step) for value in values])
-    return found
+    return found, count + 2
 
 
 def _central(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[Derivative]], int]:
+    """As `_forward`, with steps that are shortened."""
     count, step, runs = len(job.parameters), FIRST, 1
-    found: list[list[Derivative | None]] = [[None] * count for _ in base]
+    found: dict[tuple[int, int], Derivative] = {}
     ratios = np.full((len(base), count), np.nan)
     waiting = list(range(count))
     for _ in range(1 + MOST_TIMES):
         points = [sign * step * np.eye(count)[j] for j in waiting for sign in (1.0, -1.0)]
-        moved = _runs(job, points, pool)
+        moved = job.variants(points, pool)
         runs += len(points)
         again = []
-        for number, j in enumerate(waiting):
+        for j, above, below in zip(waiting, moved[::2], moved[1::2], strict=True):
             shorter = False
             for k, y in enumerate(base):
-                above, below = moved[2 * number][k], moved[2 * number + 1][k]
-                new, ratio = _one(y, above, below, step, found[k][j])
-                if found[k][j] is None or new.error < found[k][j].error:  # type: ignore[union-attr]
-                    found[k][j] = new
-                falls = not ratio > KINK * ratios[k, j]
-                shorter |= ratio > TOLERANCE and falls
+                before = found.get((k, j))
+                new, ratio = _one(y, above[k], below[k], step, before)
+                if before is None or new.error < before.error:
+                    found[k, j] = new
+                shorter |= ratio > TOLERANCE and not ratio > KINK * ratios[k, j]
                 ratios[k, j] = ratio
             again += [j] if shorter else []
         waiting = again
         step /= SHORTER
         if not waiting:
             break
-    return [[one for one in row if one is not None] for row in found], runs
+    return [[found[k, j] for j in range(count)] for k in range(len(base))], runs
 
 
 def _one(

@@ -11,23 +11,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.errors import Faults, argument_error
 from railsim.identification.identified import Channel, Identified, Place
 from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem
 from railsim.identification.residuals import FORMS, Form, whiteness
-from railsim.identification.runs import Prepared, model_of, prepared, track_of
+from railsim.identification.runs import model_of, prepared, track_of
 from railsim.identification.variants import Workers
 from railsim.measurement import Measurement, load_measurement
-from railsim.measurement.alignment import shift_of
+from railsim.measurement.alignment import Shift, shift_of
 from railsim.measurement.likeness import suspicions
 from railsim.processes import available_cores
 
-Floats = NDArray[np.float64]
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 COARSE, FINE = 0.1, 3e-5  # of the sum of squares; of it and of the coordinates
 FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
@@ -100,7 +99,7 @@ def identify(
     files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
     runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
     if not runs:
-        raise InputError([argument_fault("measured", "", "none", "one measured run at least")])
+        raise argument_error("measured", "none", "one measured run at least")
     model = model_of(vehicle, runs, track)
     wanted = parsed(parameters, model.vehicle, model.track)
     ready = [prepared(run, model, band, track or track_of(run)) for run in runs]
@@ -117,15 +116,13 @@ def identify(
 
 
 def _checked(band: tuple[float, float], form: str, loss: str) -> None:
-    faults = []
-    if not 0.0 < band[0] < band[1] < np.inf:
-        found = f"{band[0]:g} to {band[1]:g} Hz"
-        faults.append(argument_fault("band", "", found, "two frequencies above 0 that rise"))
+    faults = Faults()
+    words = f"{band[0]:g} to {band[1]:g} Hz"
+    rising = 0.0 < band[0] < band[1] < np.inf
+    faults.require(rising, "band", words, "two frequencies above 0 that rise")
     for name, value, allowed in (("form", form, FORMS), ("loss", loss, LOSSES)):
-        if value not in allowed:
-            faults.append(argument_fault(name, "", value, "one of " + ", ".join(allowed)))
-    if faults:
-        raise InputError(faults)
+        faults.require(value in allowed, name, value, "one of " + ", ".join(allowed))
+    faults.check()
 
 
 def _solved(problem: Problem, loss: str) -> Identified:
@@ -194,11 +191,7 @@ def _with_own_derivatives(
 ) -> tuple[Floats, float]:
     """Return coordinates found with derivatives at the solution itself.
 
-    Returns
-    -------
-    x : Floats
-    change : float
-        The last change of a parameter in standard deviations; 0 where the derivatives are the same.
+    And the last change of a parameter in standard deviations; 0 where the derivatives are the same.
     """
     change = np.inf
     for _ in range(MOST_TIMES):
@@ -230,7 +223,7 @@ def _at_best_shares(problem: Problem, x: Floats) -> Floats:
     """Return coordinates with each share where it fits best: contacts have more than one valley."""
     for k, one in enumerate(problem.parameters):
         if one.is_share:
-            points = [x.copy() for _ in range(SHARES)]
+            points = list(np.tile(x, (SHARES, 1)))
             for point, share in zip(points, np.linspace(*one.bounds, SHARES), strict=True):
                 point[k] = share
             sums = [float(row @ row) for row in problem.vectors(points)]
@@ -252,28 +245,26 @@ def _places(problem: Problem, x: Floats) -> Floats:
     """Return shift and stretch of each run by its most telling channel."""
     found = []
     for one, values in zip(problem.runs, problem.series(x), strict=True):
-        shifts = [
-            shift
-            for measured, simulated in zip(one.measured, values, strict=True)
-            if (inside := np.isfinite(simulated)).any()
-            and (shift := shift_of(
-                one.run.at, measured, one.run.at[inside], simulated[inside], most=ALONG
-            )) is not None
-        ]  # fmt: skip
-        best = max(shifts, key=lambda one: one.correlation, default=None)
-        found.append([0.0, 0.0] if best is None else [best.shift, best.stretch / STRETCH])
-    return np.array(found).ravel()
+        best = Shift(0.0, 0.0, -np.inf, 0)
+        for measured, simulated in zip(one.measured, values, strict=True):
+            s, inside = one.run.at, np.isfinite(simulated)
+            if inside.any():
+                shift = shift_of(s, measured, s[inside], simulated[inside], most=ALONG)
+                if shift is not None and shift.correlation > best.correlation:
+                    best = shift
+        found += [best.shift, best.stretch / STRETCH]
+    return np.array(found)
 
 
 def _suspicions(problem: Problem, x: Floats, series: list[Floats], *, clocks: bool) -> list[str]:
     remarks: list[str] = []
     for one, values in zip(problem.placed(x), series, strict=True):
         low, high = problem.form.band
-        simulated = {name: row for name, row in zip(one.names, values, strict=True)}
-        measured = {name: row for name, row in zip(one.names, one.measured, strict=True)}
-        cut = {n: _banded(row, one.step, low, high) for n, row in measured.items()}
-        like = {n: _banded(row, one.step, low, high) for n, row in simulated.items()}
-        found = suspicions(cut, like, one.step, clocks=clocks)
+        measured, simulated = (
+            {n: _banded(x, one.step, low, high) for n, x in zip(one.names, rows, strict=True)}
+            for rows in (one.measured, values)
+        )
+        found = suspicions(measured, simulated, one.step, clocks=clocks)
         remarks += [f"{one.run.name}: {words}" for words in found]
     return remarks
 
@@ -290,10 +281,7 @@ def _banded(x: Floats, step: float, low: float, high: float) -> Floats:
 def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
     """Set the weights: by the noise that is stated, else by the residuals of each channel.
 
-    Returns
-    -------
-    bool
-        Whether one of them has changed by more than `SETTLED`.
+    Returns whether one of them has changed by more than `SETTLED`.
     """
     before, problem.weights = problem.weights, []
     for one, rows in zip(problem.placed(x), problem.residuals(x), strict=True):
@@ -321,27 +309,24 @@ def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> 
     covariance, inflation = _covariance(problem, x, jacobian)
     data = len(jacobian) - len(problem.before(x))
     channels = []
-    residuals = problem.residuals(x)
-    after = problem.series(x)
-    placed = problem.placed(x)
-    before = problem.series(start)
-    for k, one in enumerate(placed):
-        for j, name in enumerate(one.names):
-            row = residuals[k][j]
+    series = zip(
+        problem.placed(x), problem.residuals(x), problem.weights, problem.series(start),
+        problem.series(x), strict=True,
+    )  # fmt: skip
+    for one, rows, weights, before, after in series:
+        for j, (name, row) in enumerate(zip(one.names, rows, strict=True)):
             test = whiteness(row) if problem.form.kind == "history" else (np.nan, np.nan)
-            level = float(np.sqrt(np.mean((problem.weights[k][j] * row) ** 2)))
-            channel = Channel(
+            channels.append(Channel(
                 one.run.name, name, one.run.selections[j], one.step, one.run.at,
-                one.measured[j], before[k][j], after[k][j], level, *test,
-            )  # fmt: skip
-            channels.append(channel)
+                one.measured[j], before[j], after[j], _rms(weights[j] * row), *test,
+            ))  # fmt: skip
     # directions of the parameters alone: the places of the runs are eliminated
     own = _without_places(jacobian[:data], count)
     _, values, vectors = np.linalg.svd(own, full_matrices=False)
     places = [
         Place(one.run.name, float(shift), STRETCH * float(stretch))
         for one, (shift, stretch) in zip(
-            problem.runs, np.reshape(x[count:], (-1, 2)) if problem.place else [], strict=False
+            problem.runs if problem.place else (), np.reshape(x[count:], (-1, 2)), strict=True
         )
     ]
     remarks += [
@@ -364,6 +349,3 @@ def _without_places(jacobian: Floats, count: int) -> Floats:
         return own
     basis, _ = np.linalg.qr(places)
     return np.asarray(own - basis @ (basis.T @ own))
-
-
-__all__ = ["Prepared", "identify"]

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.files.access import check_file, whole_file
@@ -20,7 +20,6 @@ from railsim.profiles import save_profile
 from railsim.profiles.used import used_profiles
 from railsim.table import Column, Table
 
-Floats = NDArray[np.float64]
 NORMAL = 1.959964  # of a normal distribution: 95 % within
 UNKNOWN = 0.5  # standard deviation of a combination (as a share) from which the data do not tell it
 PART = 0.25  # share of the largest part of a combination that is named
@@ -148,10 +147,9 @@ class Identified:
         """Return the identified values by key of the vehicle."""
         found = {}
         for parameter, factor in zip(self.parameters, self.factors, strict=True):
-            for key in parameter.keys:
-                if not key.startswith(TRACK):
-                    path, value = present(self.vehicle, key)
-                    found[".".join(path)] = scaled(value, float(factor))
+            for key in parameter.of_vehicle:
+                path, value = present(self.vehicle, key)
+                found[".".join(path)] = scaled(value, float(factor))
         return found
 
     @property
@@ -293,7 +291,7 @@ class Identified:
         head += [
             f"# Of the track: {parameter.name} x {factor:.4g} +- {100 * spread:.2g} %."
             for parameter, factor, spread in shares
-            if any(key.startswith(TRACK) for key in parameter.keys)
+            if parameter.of_vehicle != parameter.keys
         ]
         wheels = _wheels(self.vehicle, files)
         if base is None:
@@ -306,16 +304,13 @@ class Identified:
         lines.insert(len(head), 'format = "railsim-vehicle/1"')
         tables: dict[str, list[str]] = {}
         for parameter, spread in zip(self.parameters, self.deviations, strict=True):
-            for key in parameter.keys:
-                if key.startswith(TRACK):
-                    continue
+            for key in parameter.of_vehicle:
                 keys, _ = present(self.fitted, key)
                 whole = keys[:-1] if keys[-1] in "xyz" or keys[-1].isdecimal() else keys
                 value = present(self.fitted, ".".join(whole))[1]
                 written = tomli_w.dumps({whole[-1]: value}).strip().replace("\n", " ")
-                mark = (
-                    f"{written}  # [I] {keys[-1] if keys != whole else ''} +- {100 * spread:.2g} %"
-                )
+                part = keys[-1] if keys != whole else ""
+                mark = f"{written}  # [I] {part} +- {100 * spread:.2g} %"
                 tables.setdefault(".".join(whole[:-1]), []).append(" ".join(mark.split()))
         marks = "; ".join(mark for _, mark in files.values())
         for key, names in wheels.items():

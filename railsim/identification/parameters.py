@@ -14,17 +14,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import Faults, InputError, argument_fault, nearest
 from railsim.files.key_paths import descend, full_path, key_path
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.used import used_profiles
 
-Floats = NDArray[np.float64]
 TRACK, WHEEL = "track.", "wheel:"
 LOW, HIGH = 0.1, 10.0  # factors that are allowed by default
 
@@ -60,9 +59,9 @@ class Parameter:
         return bool(self.profiles)
 
     @property
-    def start(self) -> float:
-        """Coordinate of the file's value."""
-        return 0.0
+    def of_vehicle(self) -> tuple[str, ...]:
+        """Keys of the vehicle."""
+        return tuple(key for key in self.keys if not key.startswith(TRACK))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -82,11 +81,9 @@ class Model:
     track: Track
     profiles: Mapping[str, Profile] | None = None
 
-    def with_track(self, track: Track) -> "Model":
-        """Return the model on another track."""
-        return replace(self, track=track)
-
-    def with_parameters(self, parameters: Sequence[Parameter], x: Floats) -> "Model":
+    def with_parameters(
+        self, parameters: Sequence[Parameter], x: Sequence[float] | Floats
+    ) -> "Model":
         """Return the model with the parameters at some coordinates."""
         values: dict[str, dict[str, Any]] = {"vehicle": {}, "track": {}}
         profiles = dict(self.profiles or {})
@@ -96,19 +93,11 @@ class Model:
                 profiles[first] = blended(first, second, float(coordinate))
                 continue
             factor = math.exp(float(coordinate))
-            if factor == 1.0:
-                continue
-            for key in parameter.keys:
+            for key in parameter.keys if factor != 1.0 else ():
                 kind, own = _side(key)
                 values[kind][own] = scaled(present(getattr(self, kind), own)[1], factor)
-        return replace(
-            self,
-            vehicle=self.vehicle.with_values(values["vehicle"])
-            if values["vehicle"]
-            else self.vehicle,
-            track=self.track.with_values(values["track"]) if values["track"] else self.track,
-            profiles=profiles or None,
-        )
+        changed = {k: getattr(self, k).with_values(v) for k, v in values.items() if v}
+        return replace(self, profiles=profiles or None, **changed)
 
 
 def _side(key: str) -> tuple[str, str]:
@@ -118,12 +107,11 @@ def _side(key: str) -> tuple[str, str]:
 def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> list[Parameter]:
     """Return parameters from texts ``KEY[+KEY...][:LOW:HIGH[:SPREAD]]``, checked.
 
-    Raises
-    ------
-    InputError : keys that lead nowhere or hold no number, bounds that do not enclose the value.
+    Raises InputError: keys that lead nowhere or hold no number, bounds that do not enclose the
+    value.
     """
     found: list[Parameter] = []
-    faults: list[Fault] = []
+    faults = Faults()
     for text in texts:
         try:
             one = _parsed(text) if isinstance(text, str) else text
@@ -135,9 +123,8 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
                 kind, own = _side(key)
                 path, value = present({"vehicle": vehicle, "track": track}[kind], own)
                 if not _scalable(value):
-                    raise ValueError(
-                        f"{'.'.join(path)} is {value!r}"[:100], "a number that is not 0"
-                    )
+                    words = f"{'.'.join(path)} is {value!r}"[:100]
+                    raise ValueError(words, "a number that is not 0")
             found.append(one)
         except (KeyError, ValueError) as error:
             shown = text if isinstance(text, str) else text.name
@@ -150,8 +137,7 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
         faults.append(argument_fault("parameters", name, "given twice", "each parameter once"))
     if not faults and not found:
         faults.append(argument_fault("parameters", "", "none", "one key at least"))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return found
 
 
@@ -194,11 +180,8 @@ def present(definition: FileDefinition, key: str) -> tuple[list[str], Any]:
 
 def _scalable(value: Any) -> bool:
     if isinstance(value, list):
-        return (
-            bool(value)
-            and all(isinstance(v, int | float | list) for v in value)
-            and any(map(_scalable, value))
-        )
+        numbers = all(isinstance(member, int | float | list) for member in value)
+        return numbers and any(map(_scalable, value))
     return isinstance(value, int | float) and not isinstance(value, bool) and value != 0.0
 
 

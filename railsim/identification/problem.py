@@ -14,16 +14,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.errors import ModelError
+from railsim.arrays import Floats
 from railsim.files.access import read_bytes, whole_file
 from railsim.identification.parameters import Model, Parameter
 from railsim.identification.residuals import Form
 from railsim.identification.runs import Prepared
 from railsim.identification.variants import Task, Workers
 
-Floats = NDArray[np.float64]
 STEP = 0.02  # of a coordinate, for differences: sticking and cells of the contact are not smooth
 STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
 NEAR = 0.03  # change of a coordinate up to which derivatives serve
@@ -34,21 +32,9 @@ LARGEST_KEPT = 2_000_000_000  # bytes
 class Problem:
     """Residuals of some runs.
 
-    Attributes
-    ----------
-    model : Model
-    parameters : sequence of Parameter
-    runs : sequence of Prepared
-    form : Form
-    place : bool
-        Whether shift and stretch of each run are sought.
-    workers : Workers
-    folder : Path or None
-        Where evaluations are kept.
-    weights : list of Floats
-        For each run and channel: one over the standard deviation of the noise.
-    progress : callable
-        Called with the number of simulated runs.
+    `place`: whether shift and stretch of each run are sought; `folder`: where evaluations are kept;
+    `progress`: called with the number of simulated runs; `weights`: for each run and channel one
+    over the standard deviation of the noise.
     """
 
     model: Model
@@ -57,11 +43,11 @@ class Problem:
     form: Form
     place: bool
     workers: Workers
-    folder: Path | None = None
-    progress: Callable[[int], None] = lambda count: None
+    folder: Path | None
+    progress: Callable[[int], None]
     weights: list[Floats] = field(default_factory=list)
     simulations: int = 0
-    _inputs: str = ""
+    _inputs: str = field(init=False)
     _last: dict[str, Floats] = field(default_factory=dict)
     _derived: Floats | None = None  # where the derivatives were taken
     _central: bool = False  # whether those are central
@@ -111,8 +97,8 @@ class Problem:
 
     def series(self, x: Floats) -> list[Floats]:
         """Return the simulated channels of all runs, float64[channel, time] each."""
-        bases = self._bases(x)
-        return [values[: len(one.names)] for values, one in zip(bases, self.runs, strict=True)]
+        bases = zip(self._bases(x), self.runs, strict=True)
+        return [values[: len(one.names)] for values, one in bases]
 
     def _bases(self, x: Floats, *, ahead: bool = False) -> list[Floats]:
         """Return the simulated channels, with their slopes below them where places are sought.
@@ -134,15 +120,15 @@ class Problem:
         return self.vector(x)
 
     def _is_near(self, x: Floats) -> bool:
-        own = slice(self.count)
         at = self._derived
-        return at is not None and bool(np.max(np.abs(x[own] - at[own])) <= NEAR)
+        return at is not None and bool(np.max(np.abs((x - at)[: self.count])) <= NEAR)
 
     def derivatives_near(self, x: Floats) -> Floats:
         """Return derivatives of `vector` at a point near by, if they are known."""
-        if self._derived is None or not self._is_near(x):
+        if not self._is_near(x):
             # levels bend more than histories do
             self._derived, self._central = x.copy(), self.form.kind != "history"
+        assert self._derived is not None  # a point near by
         return self.jacobian(self._derived, central=self._central)
 
     def derivatives_at(self, x: Floats) -> Floats:
@@ -193,8 +179,17 @@ class Problem:
 
     def before(self, x: Floats) -> Floats:
         """Return the weighted residuals of what was known before."""
-        known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
-        return np.array([-x[k] / (self.parameters[k].spread or 1.0) for k in known])
+        return self._known_before @ x
+
+    @property
+    def _known_before(self) -> Floats:
+        """Derivatives of the residuals of what was known before, float64[residual, coordinate]."""
+        rows = [
+            -np.eye(self.size)[k] / one.spread
+            for k, one in enumerate(self.parameters)
+            if one.spread is not None
+        ]
+        return np.reshape(rows, (-1, self.size))
 
     def jacobian(self, x: Floats, *, central: bool) -> Floats:
         """Return the derivatives of `vector`, float64[residual, coordinate]."""
@@ -217,9 +212,8 @@ class Problem:
                 columns[:, self.count + 2 * number + j] = self._difference(
                     placed, base, along_track, 1e-6
                 )
-        known = [k for k, one in enumerate(self.parameters) if one.spread is not None]
-        for row, k in enumerate(known):
-            columns[len(columns) - len(known) + row, k] = -1.0 / (self.parameters[k].spread or 1.0)
+        known = self._known_before
+        columns[len(columns) - len(known) :] = known
         return columns
 
     def _difference(
@@ -228,53 +222,36 @@ class Problem:
         """Derivative of the residuals by a difference of series; zero of what was known before."""
         rows = []
         for one, weights, before, after in zip(placed, self.weights, base, moved, strict=True):
-            pairs = zip(
-                weights,
-                self.form.features(one, before),
-                self.form.features(one, after),
-                strict=True,
-            )
-            rows += [-weight * (b - a) / step for weight, a, b in pairs]
-        return np.concatenate([*rows, np.zeros(len(self.before(np.zeros(self.size))))])
+            features = (self.form.features(one, values) for values in (before, after))
+            rows += [-w * (b - a) / step for w, a, b in zip(weights, *features, strict=True)]
+        return np.concatenate([*rows, np.zeros(len(self._known_before))])
 
     def _evaluated(self, wanted: Sequence[tuple[Floats, int, bool]]) -> list[Floats]:
         """Return series of (coordinates, number of the run, slope or not)."""
-        found: dict[int, Floats] = {}
+        found = [self._kept(*one) for one in wanted]
+        missing = [number for number, kept in enumerate(found) if kept is None]
         tasks: list[Task] = []
-        missing: list[int] = []
-        for number, (x, k, slope) in enumerate(wanted):
-            kept = self._kept(x, k, slope)
-            if kept is not None:
-                found[number] = kept
-                continue
-            one = self.placed(x)[k]
-            tasks.append(
-                (_simulated, (one.run, self.model, self.parameters, x[: self.count], slope))
-            )
-            missing.append(number)
+        for x, k, slope in (wanted[number] for number in missing):
+            run = self.placed(x)[k].run
+            tasks.append((run.simulated, (self.model, self.parameters, x[: self.count], slope)))
         for number, outcome in zip(missing, self.workers.run(tasks), strict=True):
             found[number] = outcome
             self._keep(*wanted[number], outcome)
         self.simulations += len(missing)
         if missing:
             self.progress(self.simulations)
-        return [found[number] for number in range(len(wanted))]
+        return [values for values in found if values is not None]
 
     def _name(self, x: Floats, k: int, slope: bool) -> str:
         text = f"{self._inputs} {x.tolist()!r} {k} {slope}"
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
-    def _path(self, x: Floats, k: int, slope: bool) -> Path | None:
-        if self.folder is None:
-            return None
-        return self.folder / f"{self._name(x, k, slope)}.bin"
-
     def _kept(self, x: Floats, k: int, slope: bool) -> Floats | None:
         name = self._name(x, k, slope)
-        path = self._path(x, k, slope)
         if name in self._last:
             self._last[name] = self._last.pop(name)  # the last one that is forgotten
             return self._last[name]
+        path = self.folder and self.folder / f"{name}.bin"
         if path is None or not path.is_file():
             return None
         rows, instants = self.runs[k].measured.shape
@@ -287,22 +264,8 @@ class Problem:
     def _keep(self, x: Floats, k: int, slope: bool, values: Floats) -> None:
         while len(self._last) >= 3 * (self.count + 2) * len(self.runs):
             del self._last[next(iter(self._last))]
-        self._last[self._name(x, k, slope)] = values
-        path = self._path(x, k, slope)
-        if path is not None:
-            with whole_file(path) as partial:
+        name = self._name(x, k, slope)
+        self._last[name] = values
+        if self.folder is not None:
+            with whole_file(self.folder / f"{name}.bin") as partial:
                 partial.write_bytes(np.ascontiguousarray(values).tobytes())
-
-
-def _simulated(
-    run: "object", model: Model, parameters: Sequence[Parameter], x: Floats, slope: bool
-) -> Floats:
-    from railsim.identification.runs import Run
-    from railsim.simulation.remarks import silent
-
-    assert isinstance(run, Run)
-    try:
-        with silent():
-            return run.simulated(model, parameters, x, slope=slope)
-    except ModelError as error:
-        raise ModelError(f"{run.name}: {error}") from None

@@ -14,11 +14,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Floats
 from railsim.identification.runs import Prepared
 
-Floats = NDArray[np.float64]
 FORMS = ("history", "spectra", "sections")
 FADE = 1.0  # s
 SECTION = 50.0  # m
@@ -28,18 +27,10 @@ FEWEST = 6  # coefficients of a third-octave band
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """How series become residuals.
+    """How series become residuals."""
 
-    Attributes
-    ----------
-    kind : str
-        One of `FORMS`.
-    band : (float, float)
-        [Hz]
-    """
-
-    kind: str
-    band: tuple[float, float]
+    kind: str  # one of `FORMS`
+    band: tuple[float, float]  # [Hz]
 
     def features(
         self, prepared: Prepared, values: Floats, *, measured: bool = False
@@ -73,7 +64,7 @@ class Form:
             rows.append(0.5 * np.log(np.maximum(means, 1e-300)))
         return rows
 
-    def _sections(self, prepared: Prepared, x: Floats, known: NDArray[np.bool_]) -> list[Floats]:
+    def _sections(self, prepared: Prepared, x: Floats, known: Flags) -> list[Floats]:
         at = prepared.run.at
         number = ((at - at[0]) / SECTION).astype(int)
         rows = []

@@ -9,16 +9,17 @@ spline of degree five over five values for the shortest period in the band: its 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.measurement import Channel
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import InputError, ModelError, argument_error, input_error
 from railsim.identification.parameters import Model, Parameter
 from railsim.measurement import Measurement
 from railsim.measurement.counterpart import amplified, check_channels, compared, outputs_for, series
@@ -26,7 +27,6 @@ from railsim.result import Result
 from railsim.simulation import simulate
 from railsim.simulation.remarks import silent
 
-Floats = NDArray[np.float64]
 OVERSAMPLED = 5.0  # simulated values for the shortest period of the band
 MOST_SAMPLED = 25.0  # measured ones; more are low-passed and left out
 STEADY = 0.01  # change of the speed over its mean up to which it is constant
@@ -44,21 +44,9 @@ VARYING_RATE, FAR_ABOVE = 400.0, 10.0  # 1/s at least; times the end of the band
 class Run:
     """A measured run as it is simulated; small enough to be sent to a worker.
 
-    Attributes
-    ----------
-    name : str
-    track : Track
-    load : str or None
-        Load case of the vehicle.
-    settings : Settings
-    speed, start, until : float
-        [m/s], [m]
-    selections : tuple of str
-        Quantities with labels.
-    amplifiers : tuple of Channel
-        What each channel has been through.
-    at : float64[time]
-        Arc lengths of the measured values [m].
+    `load`: load case of the vehicle; `speed`, `start`, `until`: [m/s], [m]; `selections`:
+    quantities with labels; `amplifiers`: what each channel has been through; `at`: arc lengths of
+    the measured values [m].
     """
 
     name: str
@@ -73,32 +61,33 @@ class Run:
     at: Floats = field(repr=False)
 
     def simulated(
-        self, model: Model, parameters: Sequence[Parameter], x: Floats, *, slope: bool = False
+        self, model: Model, parameters: Sequence[Parameter], x: Floats, slope: bool
     ) -> Floats:
         """Return the simulated channels at the measured places, float64[channel, time].
 
         NaN where the run does not get.  With `slope` their derivatives to the arc length below
-        them.
+        them.  Nothing is remarked.
 
-        Raises
-        ------
-        ModelError, InputError : as `simulate`; the run does not reach its end.
+        Raises ModelError, InputError: as `simulate`; the run does not reach its end.
         """
         from scipy.interpolate import make_interp_spline
 
-        own = model.with_track(self.track).with_parameters(parameters, x)
-        if self.load is not None:
-            own = replace(own, vehicle=own.vehicle.with_values({"load": self.load}))
+        own = self.model(model, parameters, x)
         try:
-            result = self._result(own, self.settings)
-        except InputError:
-            if self.settings.step is None:
-                raise
-            # a stiffer variant needs a shorter step than the others
-            result = self._result(own, self.settings.replace(step=None))
+            with silent():
+                try:
+                    result = self.result(own)
+                except InputError:
+                    if self.settings.step is None:
+                        raise
+                    # a stiffer variant needs a shorter step than the others
+                    freely = replace(self, settings=self.settings.replace(step=None))
+                    result = freely.result(own)
+        except ModelError as error:
+            raise ModelError(f"{self.name}: {error}") from None
         if result.status != "complete":
             found = f"{result.status}: {result.attributes.get('status_reason', '')}"
-            raise InputError([Fault(self.name, "", found, "parameters with which the run ends")])
+            raise input_error(self.name, found, "parameters with which the run ends")
         time, distance = result["time"], result["distance"]
         rows = np.concatenate([[True], np.diff(distance) > 0.0])
         rate = 1.0 / float(np.median(np.diff(time)))
@@ -113,14 +102,24 @@ class Run:
         values[:, (self.at < distance[0]) | (self.at > distance[-1])] = np.nan
         return values
 
-    def _result(self, model: Model, settings: Settings) -> Result:
+    def model(
+        self, model: Model, parameters: Sequence[Parameter] = (), x: Sequence[float] | Floats = ()
+    ) -> Model:
+        """Return a model on the track and in the load of the run, at some coordinates."""
+        own = replace(model, track=self.track).with_parameters(parameters, x)
+        if self.load is None:
+            return own
+        return replace(own, vehicle=own.vehicle.with_values({"load": self.load}))
+
+    def result(self, model: Model) -> Result:
+        """Simulate the run with a model."""
         return simulate(
             model.vehicle,
             model.track,
             speed=self.speed,
             start=self.start,
             until=self.until,
-            settings=settings,
+            settings=self.settings,
             profiles=model.profiles,
         )
 
@@ -129,37 +128,26 @@ class Run:
         if self.settings.drive.mode != "constant":
             return self
         interval = 1.0 / self.settings.output_rate
-        short = self.settings
         probe = replace(self, until=self.start + max(1.0, self.speed * 0.1))
         with silent():
-            step = float(probe._result(model.with_track(self.track), short).attributes["step"])
-        count = int(np.ceil(interval / (MARGIN * step) - 1e-9))
-        return replace(self, settings=short.replace(step=interval / count))
+            result = probe.result(replace(model, track=self.track))
+        count = int(np.ceil(interval / (MARGIN * float(result.attributes["step"])) - 1e-9))
+        return replace(self, settings=self.settings.replace(step=interval / count))
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """A run, and what was measured at the same places.
 
-    Attributes
-    ----------
-    run : Run
-    measured : float64[channel, time]
-        NaN where there is no value.
-    names : tuple of str
-        Channels.
-    noise : float64[channel]
-        Standard deviation of white noise in the band, NaN where it is not known.
-    step : float
-        Time between two values [s].
-    measurement : Measurement
+    `measured`: float64[channel, time], NaN where there is no value; `names`: of the channels;
+    `noise`: standard deviation of white noise in the band for each, NaN where it is not known.
     """
 
     run: Run
     measured: Floats
     names: tuple[str, ...]
     noise: Floats
-    step: float
+    step: float  # time between two values [s]
     measurement: Measurement
 
     def moved(self, shift: float, stretch: float) -> "Prepared":
@@ -178,8 +166,8 @@ def model_of(
     if vehicle is None:
         vehicle = measurements[0].definition.vehicle
     if vehicle is None:
-        raise InputError([argument_fault("vehicle", "", "none", "a vehicle file; or the key "
-                                         "'vehicle' of the measurement")])  # fmt: skip
+        allowed = "a vehicle file; or the key 'vehicle' of the measurement"
+        raise argument_error("vehicle", "none", allowed)
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle)
     return Model(vehicle, track or track_of(measurements[0]))
@@ -190,7 +178,7 @@ def track_of(measurement: Measurement) -> Track:
     name = measurement.definition.track
     if name is None:
         found, allowed = "no track", "the key 'track' of the measurement, or a track given"
-        raise InputError([Fault(measurement.name, "track", found, allowed)])
+        raise input_error(measurement.name, found, allowed, key="track")
     return load_track(name)
 
 
@@ -199,24 +187,20 @@ def prepared(
 ) -> Prepared:
     """Return a measured run ready for comparison in a band of frequencies [Hz].
 
-    Raises
-    ------
-    InputError : channels that the vehicle does not have, a band above what was sampled, a run too
-        short or beyond the track.
+    Raises InputError: channels that the vehicle does not have, a band above what was sampled, a run
+    too short or beyond the track.
     """
     track = track or track_of(measurement)
     check_channels(measurement.name, measurement, model.vehicle)
     high = band[1]
-    rate = OVERSAMPLED * high
     if measurement.rate < 2.5 * high:
         found = f"{measurement.rate:.4g} values per second"
         allowed = f"{2.5 * high:g} at least for a band up to {high:g} Hz"
-        raise InputError([Fault(measurement.name, "rate", found, allowed)])
+        raise input_error(measurement.name, found, allowed, key="rate")
     many = measurement.rate > MOST_SAMPLED * high
     thinner = measurement.resampled(MOST_SAMPLED * high) if many else measurement
-    speeds = thinner.speed
-    mean = float(np.mean(speeds))
-    steady = float(np.ptp(speeds)) < STEADY * mean
+    mean = float(np.mean(thinner.speed))
+    steady = float(np.ptp(thinner.speed)) < STEADY * mean
     start = max(0.0, float(thinner.distance[0]) - LEAD)
     begin = max(start + FORGET * mean, float(thinner.distance[0]))
     end = min(track.length, float(thinner.distance[-1]))
@@ -224,20 +208,17 @@ def prepared(
     if len(thinner.time) < SHORTEST * thinner.rate:
         found = f"{max(0.0, end - begin):.0f} m on the track of {track.length:.0f} m"
         allowed = f"{SHORTEST * mean:.0f} m at least, {FORGET:g} s after the start of the run"
-        raise InputError([Fault(measurement.name, "distance", found, allowed)])
+        raise input_error(measurement.name, found, allowed, key="distance")
     names = tuple(compared(measurement))
     channels = tuple(measurement.definition.channels[name] for name in names)
     outputs = outputs_for([channel.quantity for channel in channels])
-    low_pass = {"frequency": 2.0 * high}
-    settings = Settings.model_validate(
-        {"output_rate": rate, "outputs": {**outputs, "low_pass": low_pass}}
-    )
-    if not steady:
-        rows = [[float(s), float(v)] for s, v in _profile(measurement, mean)]
-        drive = {"mode": "table", "speed_table": rows}
-        settings = Settings.model_validate(
-            {"output_rate": max(VARYING_RATE, FAR_ABOVE * high), "outputs": outputs, "drive": drive}
-        )
+    how: dict[str, Any] = {"output_rate": OVERSAMPLED * high, "outputs": outputs}
+    if steady:
+        outputs["low_pass"] = {"frequency": 2.0 * high}
+    else:
+        how["output_rate"] = max(VARYING_RATE, FAR_ABOVE * high)
+        how["drive"] = {"mode": "table", "speed_table": _profile(measurement).tolist()}
+    settings = Settings.model_validate(how)
     run = Run(
         measurement.name, track, measurement.definition.load, settings, mean, start,
         min(end + 0.05 * mean, track.length), tuple(c.quantity for c in channels), channels,
@@ -250,34 +231,23 @@ def prepared(
     return Prepared(run, values, names, noise, step, measurement)
 
 
-def _profile(measurement: Measurement, mean: float) -> Floats:
+def _profile(measurement: Measurement) -> Floats:
     """Return rows [s, v] of the measured speed, one for each second."""
     step = max(1, round(measurement.rate))
     s, v = measurement.distance, measurement.speed
     kernel = np.ones(step) / step
     smooth = np.convolve(np.pad(v, (step // 2, step - 1 - step // 2), mode="edge"), kernel, "valid")
     rows: Floats = np.stack([s, smooth], axis=1)[::step]
-    rising: Floats = rows[np.concatenate([[True], np.diff(rows[:, 0]) > 0.1])]
-    return rising
+    return rows[np.diff(rows[:, 0], prepend=-np.inf) > 0.1]
 
 
 def simulated_run(measurement: Measurement, vehicle: Vehicle | str | Path | None = None) -> Result:
     """Simulate the run of a measurement, with the outputs that its channels are compared with.
 
-    Parameters
-    ----------
-    measurement : Measurement
-        It names the track, and the vehicle where none is given.
-    vehicle : Vehicle, str or Path, optional
-
-    Raises
-    ------
-    InputError, ModelError : as `simulate`; channels that the vehicle does not have.
+    `measurement`: names the track, and the vehicle where none is given. Raises InputError,
+    ModelError: as `simulate`; channels that the vehicle does not have.
     """
     model = model_of(vehicle, [measurement])
     check_channels(measurement.name, measurement, model.vehicle)
     run = prepared(measurement, model, (0.1, min(ALIKE, 0.4 * measurement.rate))).run
-    own = model.with_track(run.track)
-    if run.load is not None:
-        own = replace(own, vehicle=own.vehicle.with_values({"load": run.load}))
-    return run._result(own, run.settings)
+    return run.result(run.model(model))

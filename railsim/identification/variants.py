@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Any, Self
 
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
@@ -18,26 +17,19 @@ class Workers:
     Used as a context manager: the processes end with the block.
     """
 
-    count: int = 1
+    count: int
     _pool: ProcessPoolExecutor | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if self._pool is not None:
-            self._pool.shutdown(wait=error is None, cancel_futures=True)
+            self._pool.shutdown(wait=kind is None, cancel_futures=True)
             self._pool = None
 
     def run(self, tasks: Sequence[Task]) -> list[Any]:
-        """Return what the tasks return, in their order.
-
-        Raises
-        ------
-        Exception : the first error of a task.
-        """
+        """Return what the tasks return, in their order; raise the first error of a task."""
         if self.count <= 1 or len(tasks) <= 1:
             return [function(*arguments) for function, arguments in tasks]
         with signals_later(), workers_begin():  # inherited by the processes

@@ -14,6 +14,8 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
 from numbers import Real
 from types import FunctionType
 from typing import Any
@@ -23,12 +25,11 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import InputError, input_error
-from railsim.laws.permission import check_laws, digest
+from railsim.laws.permission import check_laws
 
 MEMORY = "memory"
 KIND = "railsim_law"
 _LOG = logging.getLogger(__name__)
-_bound: dict[tuple[str, ...], "Bound"] = {}
 
 
 @dataclass(frozen=True)
@@ -119,20 +120,24 @@ def bind(name: str, law: Law, takes: Takes, gives: int | None = None, memory: in
     compiled.
     """
     check_laws([(name, law)])
-    kept = (
-        name,
-        digest(law.source or ""),
-        str(law.function),
-        str(law.compiled),
-        repr((takes, gives, memory)),
-    )
-    if kept not in _bound:
-        _bound[kept] = _Binding(name, law, takes, gives, memory).bound()
-    return _bound[kept]
+    return _bound(name, law, takes, gives, memory)
+
+
+@cache
+def _bound(name: str, law: Law, takes: Takes, gives: int | None, memory: int) -> Bound:
+    return _Binding(name, law, takes, gives, memory).bound()
 
 
 class _Binding:
-    """One law on its way from text to address."""
+    """One law on its way from text to address.
+
+    `names`: of its arguments; `place`: where each stands in the block; `allowed`: how many values
+    it may return.
+    """
+
+    names: list[str]
+    place: dict[str, int]
+    allowed: tuple[int, ...]
 
     def __init__(self, name: str, law: Law, takes: Takes, gives: int | None, memory: int) -> None:
         self.name, self.law, self.takes, self.gives, self.memory = name, law, takes, gives, memory
@@ -142,10 +147,9 @@ class _Binding:
     def bound(self) -> Bound:
         function = self._function()
         arguments = inspect.signature(function).parameters
-        names = list(arguments)
+        names = self.names = list(arguments)
         states = [n for n in names if self.takes.states and n.startswith("state")]
-        taken = [n for n in names if n in self.takes.given]
-        special = {*states, *taken, *self.takes.named, MEMORY}
+        special = {*states, *self.takes.given, *self.takes.named, MEMORY}
         further = [n for n in names if n not in special]
         missing = [n for n in self.takes.named if n not in names]
         if missing:
@@ -158,21 +162,15 @@ class _Binding:
         for n, value in defaults.items():
             if not isinstance(value, Real) or not math.isfinite(value):
                 self._refuse(f"has '{n}' = {value!r}", "a finite number")
-        allowed = (1 + len(states),) if states else self.takes.gives
+        self.allowed = (1 + len(states),) if states else self.takes.gives
         if self.gives is not None:  # one value may be for all
-            allowed = (self.gives,) if self.gives == 1 else (1, self.gives)
-        place = self._places(allowed[-1], states, further)
-        if self.law.compiled and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
-            address, kept = self._compiled(function, names, place, allowed)
-        else:
-            address, kept = self._plain(function, names, place, allowed)
-        return Bound(self.name, address, len(states), tuple(further), defaults, kept)
-
-    def _places(self, gives: int, states: Sequence[str], further: Sequence[str]) -> dict[str, int]:
-        """Where each argument stands in the block."""
+            self.allowed = (self.gives,) if self.gives == 1 else (1, self.gives)
         named = [n for n in self.takes.named if n not in self.takes.given]
-        order = [*self.takes.given, *named, *states, *further]
-        return {name: gives + k for k, name in enumerate(order)} | {MEMORY: gives + len(order)}
+        order = [*self.takes.given, *named, *states, *further, MEMORY]
+        self.place = {n: self.allowed[-1] + k for k, n in enumerate(order)}
+        compiles = self.law.compiled and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+        address, kept = self._compiled(function) if compiles else self._plain(function)
+        return Bound(self.name, address, len(states), tuple(further), defaults, kept)
 
     def _refuse(self, found: str, allowed: str, line: int | None = None) -> None:
         where = f"line {line}" if line else self.name
@@ -186,12 +184,8 @@ class _Binding:
         except SyntaxError as error:
             self._refuse(f"is no Python: {error.msg}", "", error.lineno)
         self._check_raises(tree, name)
-        linecache.cache[self.file] = (
-            len(self.source),
-            None,
-            self.source.splitlines(True),
-            self.file,
-        )
+        lines = self.source.splitlines(True)
+        linecache.cache[self.file] = (len(self.source), None, lines, self.file)
         space: dict[str, Any] = {"__name__": f"railsim_law_{self.name}"}
         try:
             exec(compile(tree, self.file, "exec"), space)
@@ -224,37 +218,31 @@ class _Binding:
                 if isinstance(node, ast.Name):
                     waiting.append(node.id)
 
-    def _compiled(
-        self,
-        function: FunctionType,
-        names: list[str],
-        place: dict[str, int],
-        allowed: tuple[int, ...],
-    ) -> tuple[int, tuple[Any, ...]]:
+    def _compiled(self, function: FunctionType) -> tuple[int, tuple[Any, ...]]:
         """Compile it with an entry that takes its block apart."""
-        import numba as compiler
-
-        numba: Any = compiler
+        numba: Any = import_module("numba")
         types = numba.types
-
         space = function.__globals__
         for other, helper in list(space.items()):
             own = isinstance(helper, FunctionType) and helper.__code__.co_filename == self.file
             if own and helper is not function:
                 space[other] = numba.njit(error_model="numpy", boundscheck=True)(helper)
         compiled = numba.njit(error_model="numpy", boundscheck=True)(function)
-        kinds = [types.float64[::1] if n == MEMORY else types.float64 for n in names]
+        kinds = [types.float64[::1] if n == MEMORY else types.float64 for n in self.names]
         try:
             compiled.compile(tuple(kinds))
             given = compiled.overloads[tuple(kinds)].signature.return_type
-            number = self._returned(given, types)
-            self._check_number(number, allowed)
-            text = _entry_text(names, place, number, self.memory, allowed[-1])
+            members = list(given.types) if isinstance(given, types.BaseTuple) else [given]
+            if not all(isinstance(m, types.Number | types.Boolean) for m in members):
+                self._refuse(f"returns {given}", "a number, or several as a tuple")
+            number = len(members)
+            if number not in self.allowed:
+                words = " or ".join(map(str, self.allowed))
+                self._refuse(f"returns {number} values", f"{words} as {self.takes.words}")
             scope: dict[str, Any] = {"law": compiled, "carray": numba.carray, "nan": math.nan}
-            exec(text, scope)
-            entry = numba.cfunc(types.void(types.CPointer(types.float64)), error_model="numpy")(
-                scope["entry"]
-            )
+            exec(self._entry_text(number), scope)
+            takes_block = types.void(types.CPointer(types.float64))
+            entry = numba.cfunc(takes_block, error_model="numpy")(scope["entry"])
         except InputError:
             raise
         except Exception as error:  # numba's own are of several kinds
@@ -262,62 +250,44 @@ class _Binding:
             self._refuse(f"cannot be compiled: {_short(error)}", "floats, math, if and for", line)
         return entry.address, (entry, compiled)
 
-    def _returned(self, given: Any, types: Any) -> int:
-        members = list(given.types) if isinstance(given, types.BaseTuple) else [given]
-        if not all(isinstance(m, types.Number | types.Boolean) for m in members):
-            self._refuse(f"returns {given}", "a number, or several as a tuple")
-        return len(members)
-
-    def _check_number(self, number: int, allowed: tuple[int, ...]) -> None:
-        if number not in allowed:
-            words = " or ".join(str(n) for n in allowed)
-            self._refuse(f"returns {number} values", f"{words} as {self.takes.words}")
-
-    def _plain(
-        self,
-        function: FunctionType,
-        names: list[str],
-        place: dict[str, int],
-        allowed: tuple[int, ...],
-    ) -> tuple[int, tuple[Any, ...]]:
+    def _plain(self, function: FunctionType) -> tuple[int, tuple[Any, ...]]:
         """Python itself, called back from the loop; an error ends the run as not finite."""
+        place, most = self.place, self.allowed[-1]
         length = place[MEMORY] + self.memory
 
         def entry(address: int) -> None:
             x = np.ctypeslib.as_array((ctypes.c_double * length).from_address(address))
             try:
-                values = [x[place[MEMORY] :] if n == MEMORY else float(x[place[n]]) for n in names]
-                given = function(*values)
+                given = function(
+                    *(x[place[n] :] if n == MEMORY else float(x[place[n]]) for n in self.names)
+                )
                 members = given if isinstance(given, tuple) else (given,)
-                if len(members) not in allowed:
+                if len(members) not in self.allowed:
                     raise TypeError(f"it returns {len(members)} values")
-                x[: allowed[-1]] = members[0] if len(members) == 1 else 0.0
+                x[:most] = members[0] if len(members) == 1 else 0.0
                 x[: len(members)] = members
             except Exception as error:
                 _LOG.error(f"law '{self.name}': {type(error).__name__}: {error}")
-                x[: allowed[-1]] = math.nan
+                x[:most] = math.nan
 
         callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(entry)
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), (callback,)
 
-
-def _entry_text(
-    names: Sequence[str], place: Mapping[str, int], number: int, memory: int, most: int
-) -> str:
-    """Source of the function that takes a block apart and calls the law."""
-    first = place[MEMORY]
-    view = f"v[{first}:{first + memory}]"
-    given = ", ".join(view if n == MEMORY else f"x[{place[n]}]" for n in names)
-    lines = ["def entry(x):", "    x[0] = nan"]  # it stays where an index is out of bounds
-    if memory:
-        lines.append(f"    v = carray(x, ({first + memory},))")
-    results = ", ".join(f"y{k}" for k in range(number))
-    lines += ["    try:", f"        {results} = law({given})"]
-    lines += [f"        x[{k}] = y{k}" for k in range(number)]
-    rest = "y0" if number == 1 else "0.0"
-    lines += [f"        x[{k}] = {rest}" for k in range(number, most)]
-    lines += ["    except Exception:", "        pass"]
-    return "\n".join(lines) + "\n"
+    def _entry_text(self, number: int) -> str:
+        """Source of the function that takes a block apart and calls the law of so many values."""
+        first = self.place[MEMORY]
+        view = f"v[{first}:{first + self.memory}]"
+        given = ", ".join(view if n == MEMORY else f"x[{self.place[n]}]" for n in self.names)
+        lines = ["def entry(x):", "    x[0] = nan"]  # it stays where an index is out of bounds
+        if self.memory:
+            lines.append(f"    v = carray(x, ({first + self.memory},))")
+        results = ", ".join(f"y{k}" for k in range(number))
+        lines += ["    try:", f"        {results} = law({given})"]
+        lines += [f"        x[{k}] = y{k}" for k in range(number)]
+        rest = "y0" if number == 1 else "0.0"
+        lines += [f"        x[{k}] = {rest}" for k in range(number, self.allowed[-1])]
+        lines += ["    except Exception:", "        pass"]
+        return "\n".join(lines) + "\n"
 
 
 def _line_of(error: BaseException, file: str) -> int | None:

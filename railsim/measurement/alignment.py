@@ -8,19 +8,18 @@ shifts of all windows gives the whole shift and the drift of the mileage.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.loading import load_vehicle
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.measurement.data import Measurement
 from railsim.result.filters import band_passed
 from railsim.result.sensors import all_sensors
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement
 
-Floats = NDArray[np.float64]
 STEP = 0.1  # m, grid of the comparison
 WINDOW = 250.0  # m
 CLEAR = 0.6  # correlation from which a window counts
@@ -30,24 +29,12 @@ CURVATURES = ("curvature", "yaw_rate")
 
 @dataclass(frozen=True)
 class Shift:
-    """How the arc length of a run has to be changed.
+    """How the arc length of a run has to be changed."""
 
-    Attributes
-    ----------
-    shift : float
-        At its first value [m].
-    stretch : float
-        Change per metre [1].
-    correlation : float
-        Median over the windows that count [1].
-    windows : int
-        How many count.
-    """
-
-    shift: float
-    stretch: float
-    correlation: float
-    windows: int
+    shift: float  # at its first value [m]
+    stretch: float  # change per metre [1]
+    correlation: float  # median over the windows that count [1]
+    windows: int  # that count
 
 
 def shift_of(
@@ -55,19 +42,9 @@ def shift_of(
 ) -> Shift | None:
     """Return by how much the arc lengths of one signal must be changed to match another.
 
-    Parameters
-    ----------
-    s, x : float64[n]
-        Signal over its own arc length [m]; NaN in gaps.
-    s_reference, reference : float64[m]
-        Signal at the right place.
-    most : float
-        Largest shift that is looked for [m].
-
-    Returns
-    -------
-    Shift or None
-        None where no window of the signals is alike.
+    `s`, `x` (float64[n]): signal over its own arc length [m]; NaN in gaps; `s_reference`,
+    `reference` (float64[m]): signal at the right place; `most`: largest shift that is looked for
+    [m]. Returns: None where no window of the signals is alike.
     """
     known = np.isfinite(x)
     if known.sum() < 10:
@@ -80,22 +57,20 @@ def shift_of(
     grid = np.arange(low, high, STEP)
     a, b = np.interp(grid, s[known], x[known]), np.interp(grid, s_reference, reference)
     size, reach = int(length / STEP), int(most / STEP)
-    centres, shifts, clear = [], [], []
+    clear = []  # middle, shift and correlation of windows
     for begin in range(reach, len(grid) - size - reach + 1, max(1, size // 2)):
         rows = slice(begin, begin + size)
-        found = _lag(a[rows], b[begin - reach : begin + size + reach])
-        if found[1] > CLEAR:
-            centres.append(grid[rows].mean())
-            shifts.append((found[0] - reach) * STEP)
-            clear.append(found[1])
-    if not shifts:
+        place, correlation = _lag(a[rows], b[begin - reach : begin + size + reach])
+        if correlation > CLEAR:
+            clear.append([grid[rows].mean() - s[0], (place - reach) * STEP, correlation])
+    if not clear:
         return None
-    stretch, at_zero = 0.0, float(np.median(shifts))
+    middles, shifts, correlations = np.transpose(clear)
+    stretch, at_zero = 0.0, np.median(shifts)
     if len(shifts) > 2:
-        x0 = np.array(centres) - s[0]
-        near = np.abs(np.array(shifts) - np.median(shifts)) < max(10 * STEP, 0.01 * np.ptp(x0))
-        stretch, at_zero = np.polyfit(x0[near], np.array(shifts)[near], 1)
-    return Shift(float(at_zero), float(stretch), float(np.median(clear)), len(shifts))
+        near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
+        stretch, at_zero = np.polyfit(middles[near], shifts[near], 1)
+    return Shift(float(at_zero), float(stretch), float(np.median(correlations)), len(shifts))
 
 
 def _lag(a: Floats, b: Floats) -> tuple[float, float]:
@@ -123,9 +98,7 @@ def aligned(
     vertical acceleration of an axlebox against v^2 d2z/ds2 of the rails' mean level, waves of 3 to
     40 m, where the vehicle (given, or named by the file) says how far ahead the axlebox is.
 
-    Raises
-    ------
-    InputError : no such channel, a track without curves and irregularities, nothing alike.
+    Raises InputError: no such channel, a track without curves and irregularities, nothing alike.
     """
     s = measurement.distance
     grid = np.arange(s[0] - most, s[-1] + most, STEP)
@@ -136,21 +109,18 @@ def aligned(
         reference, at = Alignment(track).curvature(grid), s
         words = "curvature"
     else:
-        box = next(
-            (
-                quantity
-                for quantity in measurement.quantities.values()
-                if quantity.startswith("sensor_acceleration:axlebox_1") and quantity.endswith(":z")
-            ),
-            None,
+        boxes = (
+            quantity
+            for quantity in measurement.quantities.values()
+            if quantity.startswith("sensor_acceleration:axlebox_1") and quantity.endswith(":z")
         )
-        moved = displacement(track)
+        box, moved = next(boxes, None), displacement(track)
         if box is None or moved is None:
-            raise InputError([argument_fault(
-                "track", "", "nothing to align by",
+            allowed = (
                 "a channel of curvature, yaw_rate or axlebox_1's vertical acceleration with "
-                "irregularities",
-            )])  # fmt: skip
+                "irregularities"
+            )
+            raise argument_error("track", "nothing to align by", allowed)
         level = moved(grid)[0][[1, 3]].mean(axis=0)
         reference = np.gradient(np.gradient(level, STEP), STEP)
         at = s + _ahead(measurement, vehicle, box.split(":")[1])
@@ -164,14 +134,12 @@ def aligned(
     found = shift_of(at, x, grid, reference, most=most)
     if found is None:
         allowed = f"a place known within {most:g} m; the right track; signs and units"
-        raise InputError([argument_fault("track", "", f"the {words} matches nowhere", allowed)])
-    moved_run = measurement.moved(found.shift, found.stretch)
-    remark = (
+        raise argument_error("track", f"the {words} matches nowhere", allowed)
+    return measurement.moved(found.shift, found.stretch).with_remarks(
         f"Aligned by the {words}: {found.shift:+.2f} m at the beginning, "
         f"{1e3 * found.stretch:+.2f} m/km (correlation {found.correlation:.2f} in "
         f"{found.windows} windows)."
     )
-    return moved_run.with_remarks(remark)
 
 
 def _ahead(measurement: Measurement, vehicle: Vehicle | None, point: str) -> float:
@@ -180,7 +148,7 @@ def _ahead(measurement: Measurement, vehicle: Vehicle | None, point: str) -> flo
         name = measurement.definition.vehicle
         if name is None:
             allowed = "give it, or the key 'vehicle' of the measurement"
-            raise InputError([argument_fault("vehicle", "", "none", allowed)])
+            raise argument_error("vehicle", "none", allowed)
         vehicle = load_vehicle(name)
     sensor = all_sensors(vehicle)[point]
     return sensor.offset + sensor.arm[0]

@@ -8,11 +8,10 @@ anew on the same grid.  Other records are interpolated linearly onto the median 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.errors import Fault, InputError
+from railsim.arrays import Floats, Integers, stretches
+from railsim.errors import input_error
 
-Floats = NDArray[np.float64]
 JUMP = 1.5  # steps, from which on a time step is a gap
 ROUNDED = 0.25  # steps
 MOST_LOST = 50.0  # times the values that there are
@@ -22,22 +21,13 @@ MOST_LOST = 50.0  # times the values that there are
 class Clock:
     """Equal time steps, and where the values of a record lie on them.
 
-    Attributes
-    ----------
-    time : float64[time]
-        Equal steps [s].
-    rate : float
-        Values per second [1/s].
-    places : int64[value] or None
-        Instant of each value; None where values are interpolated.
-    written : float64[value]
-        Times as the file has them [s].
-    remarks : tuple of str
+    `time`: equal steps [s]; `rate`: values per second [1/s]; `places`: instant of each value; None
+    where values are interpolated; `written`: times of the values as the file has them [s].
     """
 
     time: Floats
     rate: float
-    places: NDArray[np.int64] | None
+    places: Integers | None
     written: Floats
     remarks: tuple[str, ...] = ()
 
@@ -62,16 +52,14 @@ class Clock:
 def clock_of(file: str, written: Floats) -> Clock:
     """Return the clock of a record from the times that it holds [s].
 
-    Raises
-    ------
-    InputError : a time that is missing or does not rise; gaps much longer than the record.
+    Raises InputError: a time that is missing or does not rise; gaps much longer than the record.
     """
     steps = np.diff(written)
     wrong = np.flatnonzero(~(steps > 0.0))
     if not np.isfinite(written).all() or len(wrong):
         row = int(wrong[0]) + 2 if len(wrong) else 1
         found = f"time {written[row - 1]:g} s of value {row} does not rise"
-        raise InputError([Fault(file, "time", found, "times that rise from value to value")])
+        raise input_error(file, found, "times that rise from value to value", key="time")
     median = float(np.median(steps))
     ends = np.flatnonzero(steps > JUMP * median)
     smooth = steps[steps <= JUMP * median]
@@ -79,7 +67,7 @@ def clock_of(file: str, written: Floats) -> Clock:
     span = float(written[-1] - written[0])
     if span / step > MOST_LOST * len(written):
         found = f"a gap of {steps.max():g} s"
-        raise InputError([Fault(file, "time", found, "a record in one piece, or two files")])
+        raise input_error(file, found, "a record in one piece, or two files", key="time")
     places, begin = np.zeros(len(written), dtype=np.int64), 0
     off = 0.0
     for end in [*ends.tolist(), len(written) - 1]:
@@ -91,19 +79,18 @@ def clock_of(file: str, written: Floats) -> Clock:
         off = max(off, float(np.abs(own - written[0] - (first + count) * step).max()))
         begin = end + 1
     rising = bool((np.diff(places) > 0).all())
-    lost = f"{len(ends)} gaps, together {steps[ends].sum():.3g} s" if len(ends) else ""
-    remarks = [f"The record has {lost}."] if lost else []
-    exact = rising and off < (ROUNDED + 0.5 * bool(len(ends))) * step
-    if not exact:
-        step = median
-        remarks.append(
-            f"The time steps are unequal ({steps.min():.3g} to {steps.max():.3g} s); the channels "
-            f"are interpolated to {1.0 / step:.6g} values per second."
-        )
-        grid = np.arange(round(span / step) + 1)
-        return Clock(written[0] + step * grid, 1.0 / step, None, written, tuple(remarks))
-    time = written[0] + step * np.arange(places[-1] - places[0] + 1)
-    return Clock(time, 1.0 / step, places - places[0], written, tuple(remarks))
+    remarks = []
+    if len(ends):
+        remarks.append(f"The record has {len(ends)} gaps, together {steps[ends].sum():.3g} s.")
+    if rising and off < (ROUNDED + 0.5 * bool(len(ends))) * step:
+        time = written[0] + step * np.arange(places[-1] - places[0] + 1)
+        return Clock(time, 1.0 / step, places - places[0], written, tuple(remarks))
+    remarks.append(
+        f"The time steps are unequal ({steps.min():.3g} to {steps.max():.3g} s); the channels "
+        f"are interpolated to {1.0 / median:.6g} values per second."
+    )
+    time = written[0] + median * np.arange(round(span / median) + 1)
+    return Clock(time, 1.0 / median, None, written, tuple(remarks))
 
 
 def joined(parts: list[Floats]) -> tuple[Floats, int]:
@@ -159,9 +146,8 @@ def bridged(x: Floats, longest: int) -> Floats:
     unknown = np.isnan(x)
     if not longest or not unknown.any() or unknown.all():
         return x
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], unknown.view(np.int8), [0]])))
     found = x.copy()
-    for begin, end in edges.reshape(-1, 2):
+    for begin, end in stretches(unknown):
         if begin > 0 and end < len(x) and end - begin <= longest:
             t = np.arange(1, end - begin + 1) / (end - begin + 1)
             found[begin:end] = x[begin - 1] + t * (x[end] - x[begin - 1])

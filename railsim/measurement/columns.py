@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.measurement import MeasurementFile
-from railsim.errors import Fault, InputError, nearest, optional_package
+from railsim.errors import Fault, InputError, input_error, nearest, optional_package
 from railsim.files.access import open_regular
 
-Floats = NDArray[np.float64]
 Wanted = Mapping[str, tuple[str, tuple[int, ...]]]
 """Name of the column in the file, and index beyond time, by our names."""
 Piece = dict[str, Floats]
@@ -31,22 +30,26 @@ NUMERIC = {"double", "single", "logical"} | {
 def pieces(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
     """Yield pieces of the columns of a file, one behind the other.
 
-    Raises
-    ------
-    InputError : no such file or column; not what its ending says; something else than numbers.
+    Raises InputError: no such file or column; not what its ending says; something else than
+    numbers.
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         found = f"the name ends in '{path.suffix}'"
-        raise InputError([Fault(str(path), "", found, "one of " + ", ".join(_READERS))])
+        raise input_error(str(path), found, "one of " + ", ".join(_READERS))
     open_regular(path).close()
     if path.suffix.lower() in (".csv", ".txt") and any(index for _, index in wanted.values()):
-        raise InputError([Fault(str(path), "", "a table with 'index'", "leave 'index' out")])
+        raise input_error(str(path), "a table with 'index'", "leave 'index' out")
     yield from reader(path, wanted, how)
 
 
 def _fault(path: Path, key: str, found: str, allowed: str = "") -> InputError:
-    return InputError([Fault(str(path), key, found, allowed)])
+    return input_error(str(path), found, allowed, key=key)
+
+
+def _unreadable(path: Path, kind: str, error: Exception, allowed: str = "") -> InputError:
+    words = str(error).partition("\n")[0][:100]
+    return input_error(str(path), f"cannot be read as {kind} ({words})", allowed)
 
 
 def _named(path: Path, wanted: Wanted, known: Sequence[str]) -> None:
@@ -100,7 +103,7 @@ def _rows(
         if any(line.count(delimiter) != width - 1 for line in written):
             raise ValueError("another number of columns")
         table = np.loadtxt(written, delimiter=delimiter, usecols=places, ndmin=2, comments=None)
-        return {name: table[:, places.index(place)] for name, place in where.items()}
+        rows = []
     except ValueError:  # an empty cell, or what is named below
         table = np.empty((len(rows), len(places)))
     for k, (number, line) in enumerate(rows):
@@ -130,10 +133,7 @@ def _parquet(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
     except InputError:
         raise
     except Exception as error:  # pyarrow's own errors have no common base
-        words = str(error).partition("\n")[0][:100]
-        raise _fault(
-            path, "", f"cannot be read as Parquet ({words})", "columns of numbers"
-        ) from None
+        raise _unreadable(path, "Parquet", error, "columns of numbers") from None
 
 
 def _hdf5(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
@@ -173,8 +173,7 @@ def _matlab(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]
     except InputError:
         raise
     except (ValueError, TypeError, OSError, NotImplementedError, zlib.error, MatReadError) as error:
-        words = str(error).partition("\n")[0][:100]
-        raise _fault(path, "", f"cannot be read as MATLAB ({words})") from None
+        raise _unreadable(path, "MATLAB", error) from None
     yield from _slices(path, {n: arrays[column] for n, (column, _) in wanted.items()}, wanted)
 
 
@@ -191,13 +190,10 @@ def _slices(path: Path, arrays: Mapping[str, Any], wanted: Wanted) -> Iterator[P
         rows = slice(begin, min(begin + ROWS, count))
         piece = {}
         for name, array in arrays.items():
-            index = wanted[name][1]
-            if not index and array.ndim == 2 and array.shape[0] == 1:
-                piece[name] = np.asarray(array[0, rows], dtype=np.float64)
-            elif not index and array.ndim == 2:
-                piece[name] = np.asarray(array[rows, 0], dtype=np.float64)
-            else:
-                piece[name] = np.asarray(array[(rows, *index)], dtype=np.float64)
+            at: tuple[Any, ...] = (rows, *wanted[name][1])
+            if len(at) == 1 and array.ndim == 2:  # a single row or column
+                at = (0, rows) if array.shape[0] == 1 else (rows, 0)
+            piece[name] = np.asarray(array[at], dtype=np.float64)
         yield piece
 
 

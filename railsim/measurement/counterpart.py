@@ -4,19 +4,18 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Complexes, Floats
 from railsim.definitions.measurement import AXES, Channel
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, Faults, nearest
 from railsim.measurement.data import Measurement
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SIDES
 from railsim.result import Result
 from railsim.result.filters import filtered
 from railsim.result.sensors import all_sensors
 
-Floats = NDArray[np.float64]
 READINGS = ("sensor_acceleration", "sensor_roll_rate")
 
 
@@ -28,9 +27,7 @@ def compared(measurement: Measurement) -> dict[str, str]:
 def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> None:
     """Refuse channels of points, wheelsets, bodies and elements that a vehicle does not have.
 
-    Raises
-    ------
-    InputError : all of them at once.
+    Raises InputError: all of them at once.
     """
     flat = flatten(vehicle)
     wheelsets = [body.name for body in flat.of_kind("wheelset")]
@@ -44,7 +41,7 @@ def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> Non
         "sensor": list(all_sensors(vehicle)),
         "element": [element.name for element in flat.elements],
     }
-    faults = []
+    faults = Faults()
     for name, selection in compared(measurement).items():
         base, *labels = selection.split(":")
         quantity = QUANTITIES.get(base) or REQUESTED[base]
@@ -53,8 +50,7 @@ def check_channels(file: str, measurement: Measurement, vehicle: Vehicle) -> Non
                 found = f"{vehicle.name} has no {dim} '{label}'"
                 key = f"channels.{name}.quantity"
                 faults.append(Fault(file, key, found, nearest(label, known[dim])))
-    if faults:
-        raise InputError(faults)
+    faults.check()
 
 
 def outputs_for(selections: Iterable[str]) -> dict[str, Any]:
@@ -79,9 +75,7 @@ def outputs_for(selections: Iterable[str]) -> dict[str, Any]:
 def series(result: Result, selection: str) -> Floats:
     """Return a quantity with labels over time, such as ``Q:1:left``; wheelsets also by number.
 
-    Raises
-    ------
-    KeyError : the result does not have it.
+    Raises KeyError: the result does not have it.
     """
     name, *labels = selection.split(":")
     if name not in result:
@@ -103,7 +97,7 @@ def amplified(x: Floats, rate: float, channel: Channel) -> Floats:
             continue
         b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)  # type: ignore[call-overload]
 
-        def response(f: Floats, b: Floats = b, a: Floats = a) -> NDArray[np.complex128]:
+        def response(f: Floats, b: Floats = b, a: Floats = a) -> Complexes:
             s = 2j * np.pi * f
             return np.asarray(np.polyval(b, s) / np.polyval(a, s))
 

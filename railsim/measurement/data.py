@@ -4,14 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.measurement import Channel, MeasurementFile
 from railsim.errors import nearest
 from railsim.result.filters import band_passed, low_passed
 from railsim.table import Table
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +76,7 @@ class Measurement:
 
     def part(self, begin: float, end: float) -> "Measurement":
         """Return the values between two arc lengths [m]."""
-        low, high = np.searchsorted(self.distance, [begin, end])
-        return self._rows(slice(int(low), int(high)))
-
-    def _rows(self, rows: slice) -> "Measurement":
+        rows = slice(*np.searchsorted(self.distance, [begin, end]).tolist())
         return replace(
             self,
             time=self.time[rows],
@@ -101,16 +96,10 @@ class Measurement:
         lower = rate < self.rate * (1.0 - 1e-9)
 
         def taken(x: Floats) -> Floats:
-            unknown = np.isnan(x)
-            if unknown.all():
-                return np.full(count, np.nan)
-            index = np.arange(len(x))
-            whole = np.interp(index, index[~unknown], x[~unknown]) if unknown.any() else x
+            whole = _bridged(x)
             whole = low_passed(whole, self.rate, 0.4 * rate) if lower else whole
-            found: Floats = np.interp(time, self.time, whole)
-            lost = np.interp(time, self.time, unknown.astype(float)) > 0.0
-            found[lost] = np.nan
-            return found
+            lost = np.interp(time, self.time, np.isnan(x).astype(float)) > 0.0
+            return np.where(lost, np.nan, np.interp(time, self.time, whole))
 
         return replace(
             self,
@@ -127,13 +116,12 @@ class Measurement:
         """
 
         def passed(x: Floats) -> Floats:
-            unknown = np.isnan(x)
-            if unknown.all():
-                return x
-            index = np.arange(len(x))
-            found = np.interp(index, index[~unknown], x[~unknown]) if unknown.any() else x
-            found = _passed(found, self.rate, low, high)
-            return np.where(unknown, np.nan, found)
+            found = _bridged(x)
+            if high < np.inf:
+                found = band_passed(found, self.rate, low, high)
+            elif low > 0.0:
+                found = found - low_passed(found, self.rate, low)
+            return np.where(np.isnan(x), np.nan, found)
 
         return replace(self, channels={name: passed(x) for name, x in self.channels.items()})
 
@@ -167,7 +155,7 @@ class Measurement:
         return f"<Measurement {self.name!r}: {len(self.channels)} channels, {length:.3g} km>"
 
 
-def _passed(x: Floats, rate: float, low: float, high: float) -> Floats:
-    if high < np.inf:
-        return band_passed(x, rate, low, high)
-    return x - low_passed(x, rate, low) if low > 0.0 else x
+def _bridged(x: Floats) -> Floats:
+    """Return values with straight lines over the gaps."""
+    known = np.flatnonzero(np.isfinite(x))
+    return np.interp(np.arange(len(x)), known, x[known]) if 0 < len(known) < len(x) else x

@@ -5,12 +5,12 @@ best shift in time, the ratio of the rms values, and how the shift changes over 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from railsim.arrays import Floats
+
 OPPOSITE = -0.5  # correlation
 UNITS = (("1000", 1e3), ("1/1000", 1e-3), ("9.81 (g)", 9.81), ("1/9.81 (g)", 1 / 9.81))
 NEAR = 1.35  # ratio to such a factor, of signals that are alike
@@ -23,24 +23,12 @@ LONGEST = 1.0  # s
 
 @dataclass(frozen=True)
 class Likeness:
-    """How alike a measured and a simulated channel are.
+    """How alike a measured and a simulated channel are."""
 
-    Attributes
-    ----------
-    correlation : float
-        At the shift with the largest magnitude [1].
-    ratio : float
-        rms measured over simulated [1].
-    lag : float
-        Time by which the measured one comes later [s].
-    drift : float
-        Change of the lag over the record [s]; nan where it is not clear.
-    """
-
-    correlation: float
-    ratio: float
-    lag: float
-    drift: float
+    correlation: float  # at the shift with the largest magnitude [1]
+    ratio: float  # rms measured over simulated [1]
+    lag: float  # by which the measured one comes later [s]
+    drift: float  # change of the lag over the record [s]; nan where it is not clear
 
     def remark(self, name: str, step: float) -> str:
         """Return what looks wrong, empty if nothing does."""
@@ -59,14 +47,9 @@ class Likeness:
 
 
 def likeness(measured: Floats, simulated: Floats, step: float) -> Likeness:
-    """Return how alike two series are.
+    """Return how alike two series are, float64[time] with NaN where there is no value.
 
-    Parameters
-    ----------
-    measured, simulated : float64[time]
-        NaN where there is no value.
-    step : float
-        Between two values [s].
+    `step`: between two values [s].
     """
     known = np.isfinite(measured) & np.isfinite(simulated)
     a, b = np.where(known, measured, 0.0), np.where(known, simulated, 0.0)
@@ -118,11 +101,12 @@ def suspicions(
     common = float(np.median(clear)) if clear else 0.0
     drifts = [one.drift for one in found.values() if np.isfinite(one.drift)]
     drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
-    own = {
-        n: Likeness(o.correlation, o.ratio, clocks * (o.lag - common), clocks * (o.drift - drift))
-        for n, o in found.items()
-    }
-    said = [one.remark(name, step) for name, one in own.items()]
+    said = [
+        replace(one, lag=clocks * (one.lag - common), drift=clocks * (one.drift - drift)).remark(
+            name, step
+        )
+        for name, one in found.items()
+    ]
     if clocks and abs(drift) > APART * step:
         said.append(
             f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "

@@ -5,12 +5,11 @@ speed and distance are both measured they are held against each other: what diff
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.measurement import MeasurementFile
-from railsim.errors import Fault, InputError
+from railsim.errors import input_error
 
-Floats = NDArray[np.float64]
 BACKWARDS = 1.0  # m, by which a counter may step back
 APART = 0.002  # of the distance: remarked on
 WRONG = 0.5  # of the distance: refused
@@ -25,21 +24,10 @@ def position(
 ) -> tuple[Floats, Floats, list[str]]:
     """Return arc length [m], speed [m/s] and remarks of a run.
 
-    Parameters
-    ----------
-    file : str
-        For messages.
-    how : MeasurementFile
-    time : float64[time]
-        Equal steps [s].
-    axes : dict of str to float64[time]
-        ``distance``, ``mileage``, ``speed``, as far as they are measured [SI].
-    mileage : (float, bool) or None
-        Mileage of s = 0 of the track and whether it falls, where the track is known.
-
-    Raises
-    ------
-    InputError : a distance that does not rise; distance and speed that contradict each other.
+    `file`: for messages; `time`: equal steps [s]; `axes`: ``distance``, ``mileage``, ``speed`` over
+    time, as far as they are measured [SI]; `mileage`: that of s = 0 of the track and whether it
+    falls, where the track is known. Raises InputError: a distance that does not rise; distance and
+    speed that contradict each other.
     """
     remarks: list[str] = []
     step = (time[-1] - time[0]) / (len(time) - 1)
@@ -68,7 +56,7 @@ def position(
     share = (s[-1] - s[0]) / driven[-1] - 1.0 if driven[-1] > 0.0 else np.inf
     if not abs(share) < WRONG:
         found = f"{s[-1] - s[0]:.6g} m by distance, {driven[-1]:.6g} m by speed"
-        raise InputError([Fault(file, "speed", found, "the same; are the units right?")])
+        raise input_error(file, found, "the same; are the units right?", key="speed")
     if abs(share) > APART:
         remarks.append(
             f"Distance and speed run apart by {100 * share:+.2f} % ({s[-1] - s[0]:.1f} m by "
@@ -85,12 +73,12 @@ def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) ->
     """Return an axis without gaps."""
     known = np.isfinite(x)
     if known.sum() < 2:
-        raise InputError([Fault(file, name, "no values", "a channel with values")])
+        raise input_error(file, "no values", "a channel with values", key=name)
     if not known.all():
         remarks.append(f"The {name} has gaps ({100 * np.mean(~known):.2g} %): linear over them.")
         x = np.interp(time, time[known], x[known])
     if name == "speed" and x.min() < -0.1:
-        raise InputError([Fault(file, name, f"{x.min():.3g} m/s", "speeds forwards; 'reverse'?")])
+        raise input_error(file, f"{x.min():.3g} m/s", "speeds forwards; 'reverse'?", key=name)
     return x
 
 
@@ -102,7 +90,7 @@ def _rising(file: str, time: Floats, counter: Floats, remarks: list[str]) -> Flo
     if back > BACKWARDS or s[-1] <= s[0]:
         found = f"falls by {back:.3g} m" if s[-1] > s[0] else "does not rise"
         allowed = "a distance that rises; a mileage may fall (quantity = 'mileage')"
-        raise InputError([Fault(file, "distance", found, allowed)])
+        raise input_error(file, found, allowed, key="distance")
     moved = np.concatenate([[True], np.diff(highest) > 0.0])
     if not moved.all():
         s = np.interp(time, time[moved], s[moved])

@@ -1,24 +1,22 @@
 """From a measurement file and its data to arrays with railsim's units and signs."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats, stretches
 from railsim.constants import GRAVITY
 from railsim.definitions.file_definition import loaded
 from railsim.definitions.loading import load_track
 from railsim.definitions.measurement import AXES, FEWEST, Channel, MeasurementFile, quantity_of
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files import sources
 from railsim.measurement.clock import Clock, bridged, clock_of, delayed, joined
 from railsim.measurement.columns import pieces
 from railsim.measurement.data import Measurement
 from railsim.measurement.position import position
 
-Floats = NDArray[np.float64]
 MOST_VALUES = 200_000_000  # of all channels: 1.6 GB
 LARGEST = {
     "Q": 1e6, "Y": 1e6, "sum_Y": 2e6, "sum_abs_Y": 2e6, "Y_over_Q": 10.0, "speed": 170.0,
@@ -61,31 +59,29 @@ def load_measurement(
     _beside(source)
     how = loaded(MeasurementFile, source, overrides)
     wanted = _wanted(str(path), how, channels)
-    raw = _read(how, wanted)
+    parts = _read(how, wanted)
     times = [name for name in wanted if how.channels[name].quantity == "time"]
     remarks: list[str] = []
     if times:
         channel = how.channels[times[0]]
-        parts = [channel.factor * (part - channel.offset) for part in raw.parts[times[0]]]
-        written, anew = joined(parts)
+        written, anew = joined([
+            channel.factor * (part - channel.offset) for part in parts[times[0]]
+        ])  # fmt: skip
         if anew:
             remarks.append(f"The clock begins anew in {anew} files; they follow each other.")
         clock = clock_of(how.file[0], written)
     else:
-        count = sum(map(len, raw.parts[wanted[0]]))
+        count = sum(map(len, parts[wanted[0]]))
         assert how.rate is not None  # by the definition
         clock = Clock(np.arange(count) / how.rate, how.rate, np.arange(count), np.empty(0))
     remarks += clock.remarks
-    values, faults = {}, []
+    values, faults = {}, Faults()
     for name in wanted:
-        if name in times:
-            del raw.parts[name]
-            continue
-        x = np.concatenate(raw.parts.pop(name))
-        values[name] = _channel(name, how, x, clock, remarks)
-        faults += _implausible(how, name, values[name])
-    if faults:
-        raise InputError(faults)
+        own = parts.pop(name)  # freed as it is converted
+        if name not in times:
+            values[name] = _channel(name, how, np.concatenate(own), clock, remarks)
+            faults += _implausible(how, name, values[name])
+    faults.check()
     return _measurement(str(path), how, clock, values, remarks)
 
 
@@ -105,7 +101,7 @@ def _wanted(file: str, how: MeasurementFile, asked: Sequence[str] | None) -> lis
         return names
     by_quantity = {channel.quantity: name for name, channel in how.channels.items()}
     found = {name for name in names if how.channels[name].quantity in AXES}
-    faults = []
+    faults = Faults()
     for one in asked:
         name = one if one in how.channels else by_quantity.get(one)
         if name is None:
@@ -113,21 +109,14 @@ def _wanted(file: str, how: MeasurementFile, asked: Sequence[str] | None) -> lis
             faults.append(Fault(file, "channels", f"no channel '{one}'", known))
         else:
             found.add(name)
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return [name for name in names if name in found]
 
 
-@dataclass
-class _Raw:
-    """Values as the files have them: for each channel an array for each file."""
-
-    parts: dict[str, list[Floats]] = field(default_factory=dict)
-
-
-def _read(how: MeasurementFile, wanted: list[str]) -> _Raw:
+def _read(how: MeasurementFile, wanted: list[str]) -> dict[str, list[Floats]]:
+    """Return values as the files have them: for each channel an array for each file."""
     columns = {n: (how.channels[n].column or n, how.channels[n].index) for n in wanted}
-    raw = _Raw({name: [] for name in wanted})
+    found: dict[str, list[Floats]] = {name: [] for name in wanted}
     count = 0
     for file in how.file:
         own: dict[str, list[Floats]] = {name: [] for name in wanted}
@@ -136,16 +125,16 @@ def _read(how: MeasurementFile, wanted: list[str]) -> _Raw:
                 own[name].append(np.ascontiguousarray(x))
             count += len(x) * len(piece)
             if count > MOST_VALUES:
-                found, allowed = "too many values", f"{MOST_VALUES:g} at most; name fewer channels"
-                raise InputError([Fault(file, "", found, allowed)])
+                allowed = f"{MOST_VALUES:g} at most; name fewer channels"
+                raise input_error(file, "too many values", allowed)
         for name in wanted:
             parts = own.pop(name)  # freed as it is joined
-            raw.parts[name].append(np.concatenate(parts) if parts else np.empty(0))
+            found[name].append(np.concatenate(parts) if parts else np.empty(0))
             del parts
-    rows = sum(map(len, raw.parts[wanted[0]]))
+    rows = sum(map(len, found[wanted[0]]))
     if rows < FEWEST:
-        raise InputError([Fault(how.file[0], "", f"{rows} values", f"{FEWEST} at least")])
-    return raw
+        raise input_error(how.file[0], f"{rows} values", f"{FEWEST} at least")
+    return found
 
 
 def _channel(
@@ -179,7 +168,7 @@ def _zero(name: str, how: MeasurementFile, channel: Channel, x: Floats, time: Fl
     if not inside.any():
         found = f"no value between {channel.zero[0]:g} and {channel.zero[1]:g} s"
         allowed = f"times from {time[0]:g} to {time[-1]:g} s"
-        raise InputError([Fault(how.name, f"channels.{name}.zero", found, allowed)])
+        raise input_error(how.name, found, allowed, key=f"channels.{name}.zero")
     return float(x[inside].mean())
 
 
@@ -189,10 +178,8 @@ def _clipped(x: Floats) -> str:
     if len(known) < FEWEST or known.min() == known.max():
         return ""
     for value, word in ((known.max(), "largest"), (known.min(), "smallest")):
-        at = np.concatenate([[0], (known == value).view(np.int8), [0]])
-        edges = np.flatnonzero(np.diff(at)).reshape(-1, 2)
-        lengths = edges[:, 1] - edges[:, 0]
-        if np.count_nonzero(lengths >= EQUAL_ENDS) >= OFTEN and value != 0.0:
+        lengths = [end - begin for begin, end in stretches(known == value)]
+        if sum(length >= EQUAL_ENDS for length in lengths) >= OFTEN and value != 0.0:
             return f"rests {len(lengths)} times at its {word} value {value:g} and looks clipped"
     return ""
 
@@ -255,7 +242,7 @@ def _mounted(
         }
         if not names:
             allowed = "a point with channels of sensor_acceleration"
-            raise InputError([Fault(how.name, f"mounting.{point}", "no channel there", allowed)])
+            raise input_error(how.name, "no channel there", allowed, key=f"mounting.{point}")
         still = np.zeros(len(next(iter(values.values()))))
         read = [values[names[axis]] if axis in names else still for axis in "xyz"]
         read[2] = read[2] - GRAVITY  # what is taken out of the reading at rest

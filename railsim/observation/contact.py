@@ -95,8 +95,8 @@ def in_the_mean(
     def spectrum(values: Floats) -> Complexes:
         return np.fft.rfft((values - values.mean()) * window)
 
-    rails = moved(grid)[0]
-    u = np.stack([spectrum(row) for row in _quantities(rails)])
+    # alignment, level, cross level and gauge of y_left, z_left, y_right, z_right
+    u = np.stack([spectrum(row) for row in np.linalg.inv(RAILS.T) @ moved(grid)[0]])
     x, places = _states(linear, tangent, result, lambda y: spectrum(on_grid(s, y, grid)))
     shift = np.exp(1j * k[:, None] * tangent.offsets)[:, :, None]
     shift = shift * (1j * k[:, None, None]) ** np.arange(ORDERS)
@@ -143,11 +143,6 @@ def _window(n: int) -> Floats:
     window[:m] = 0.5 - 0.5 * np.cos(np.pi * np.arange(m) / m)
     window[-m:] = window[:m][::-1]
     return window
-
-
-def _quantities(rails: Floats) -> Floats:
-    """Alignment, level, cross level and gauge of y_left, z_left, y_right, z_right."""
-    return np.asarray(np.linalg.inv(RAILS.T) @ rails)
 
 
 def _states(

@@ -22,50 +22,50 @@ FILES = ("recording.csv", "track.toml", "estimates.csv", "forces.csv")
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
-    """Irregularities and forces of one piece of a run.
+class Estimated:
+    """Irregularities of a track and wheel forces over the arc length.
 
-    `values` (float64[quantity, n]): Alignment, level, cross level, gauge [m], without what is not
-    seen. `bands`, `band_deviations` (float64[quantity, n]): The same in D1 and D2. `wave_numbers`,
-    `seen`, `power` (float64[k]): Share of the variance that the channels explain; power assumed
-    before. `forces`, `force_deviations` (float64[output, n]): [N], lateral displacements [m].
+    `values`, `deviations` (float64[quantity, n]): Alignment, level, cross level and gauge under the
+    reference body, without what is not seen, and the standard deviations of their errors [m].
+    `bands`, `band_deviations` (float64[quantity, n]): The same in D1 and D2. `outputs`: Names of
+    the forces: ``Q.1.left``, ``Y.1.left``, ``sum_Y.1``, ``lateral.1``. `forces`,
+    `force_deviations` (float64[output, n]): [N], lateral displacements [m].
     """
 
-    s: Floats  # arc length, equal steps [m], float64[n]
-    speed: float  # [m/s]
-    values: Floats
-    deviations: Floats  # standard deviations of their errors [m], float64[quantity]
-    bands: Mapping[str, Floats]
-    band_deviations: Mapping[str, Floats]
-    wave_numbers: Floats
-    seen: Floats
-    power: Floats
-    outputs: tuple[str, ...]  # ``Q.1.left``, ``Y.1.left``, ``sum_Y.1``, ``lateral.1``,
-    forces: Floats
-    force_deviations: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Irregularity:
-    """Irregularities of a track and wheel forces from a measured run.
-
-    `name`, `vehicle`: Of the run; of the vehicle. `values`, `deviations` (float64[quantity, n]):
-    Alignment, level, cross level and gauge under the reference body, and the standard deviations
-    of their errors [m]. `bands`, `band_deviations` (float64[quantity, n]): The same in D1 and D2.
-    `forces`, `force_deviations` (float64[output, n]): [N], lateral displacements [m]. `flanges`:
-    Wheelset, begin and end of the places where its flange touches [m].
-    """
-
-    name: str
-    vehicle: str
     s: Floats  # arc length of the reference body, equal steps [m], float64[n]
     values: Floats
     deviations: Floats
     bands: Mapping[str, Floats]
     band_deviations: Mapping[str, Floats]
-    outputs: tuple[str, ...]  # names of the forces
+    outputs: tuple[str, ...]
     forces: Floats
     force_deviations: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate(Estimated):
+    """What is known of one piece of a run, whose deviations are the same all along it.
+
+    `wave_numbers`, `seen`, `power` (float64[quantity, k]): Share of the variance that the channels
+    explain; power assumed before.
+    """
+
+    speed: float  # [m/s]
+    wave_numbers: Floats
+    seen: Floats
+    power: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Irregularity(Estimated):
+    """Irregularities of a track and wheel forces from a measured run.
+
+    `name`, `vehicle`: Of the run; of the vehicle. `flanges`: Wheelset, begin and end of the places
+    where its flange touches [m].
+    """
+
+    name: str
+    vehicle: str
     pieces: tuple[Estimate, ...]  # what was put together
     flanges: tuple[tuple[int, float, float], ...]
     remarks: tuple[str, ...]
@@ -85,7 +85,7 @@ class Irregularity:
             for piece in self.pieces:
                 k = piece.wave_numbers[1:]
                 assumed = piece.power[number, 1:] > 0.0
-                dark = assumed & (piece.seen[number, 1:] < 0.5)
+                dark = assumed & (piece.seen[number, 1:] < SEEN)
                 for first, last in stretches(dark):
                     waves = 2.0 * np.pi / k[last - 1], 2.0 * np.pi / k[first]
                     ranges.add((round(waves[0], 1), round(waves[1], 1)))
@@ -272,18 +272,22 @@ def joined(
             found[:, inside] = (1.0 - share) * found[:, inside] + share * whole
         return found
 
-    outputs, forces = pieces[0].outputs, together([piece.forces for piece in pieces])
-    touching = []
-    for w, clearance in enumerate(clearances):
-        beyond = np.abs(forces[outputs.index(f"lateral.{w + 1}")]) > clearance
-        touching += [(w + 1, float(s[a]), float(s[b - 1])) for a, b in stretches(beyond)]
-    return Irregularity(
-        name, vehicle, s,
+    whole = Estimated(
+        s,
         together([p.values for p in pieces]), together([p.deviations for p in pieces]),
         {band: together([p.bands[band] for p in pieces]) for band in BANDS},
         {band: together([p.band_deviations[band] for p in pieces]) for band in BANDS},
-        outputs, forces, together([p.force_deviations for p in pieces]),
-        tuple(pieces), tuple(touching), tuple(dict.fromkeys(remarks)),
+        pieces[0].outputs,
+        together([p.forces for p in pieces]), together([p.force_deviations for p in pieces]),
+    )  # fmt: skip
+    touching = []
+    for w, clearance in enumerate(clearances):
+        lateral = whole.forces[whole.outputs.index(f"lateral.{w + 1}")]
+        places = stretches(np.abs(lateral) > clearance)
+        touching += [(w + 1, float(s[a]), float(s[b - 1])) for a, b in places]
+    return Irregularity(
+        **vars(whole), name=name, vehicle=vehicle, pieces=tuple(pieces), flanges=tuple(touching),
+        remarks=tuple(dict.fromkeys(remarks)),
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ that of the sharpest place of a piece.  A run is divided into pieces (`pieces.py
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -23,7 +24,7 @@ from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, ModelError, argument_fault, input_error, nearest
+from railsim.errors import Faults, ModelError, input_error, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
@@ -74,19 +75,15 @@ class Assumed:
         Raises InputError.
         """
         low, high = self.wavelengths
-        checks = (
-            (self.spectrum in SPECTRA, "spectrum", self.spectrum, nearest(self.spectrum, SPECTRA)),
-            (self.scale > 0.0, "scale", f"{self.scale:g}", "a positive number"),
-            (self.noise > 0.0, "noise", f"{self.noise:g} m/s2", "a positive number of m/s2"),
-            (self.bias > 0.0, "bias", f"{self.bias:g} m/s2", "a positive number of m/s2"),
-            (1.0 <= low < high <= 300.0, "wavelengths", f"{low:g} to {high:g} m",
-             "shortest and longest, 1 to 300 m"),
-        )  # fmt: skip
-        faults = [
-            argument_fault(name, "", f"found {f}", a) for right, name, f, a in checks if not right
-        ]
-        if faults:
-            raise InputError(faults)
+        known, faults = self.spectrum in SPECTRA, Faults()
+        faults.require(known, "spectrum", f"found {self.spectrum}", nearest(self.spectrum, SPECTRA))
+        faults.require(self.scale > 0.0, "scale", f"found {self.scale:g}", "a positive number")
+        for name, value in (("noise", self.noise), ("bias", self.bias)):
+            allowed = "a positive number of m/s2"
+            faults.require(value > 0.0, name, f"found {value:g} m/s2", allowed)
+        inside, allowed = 1.0 <= low < high <= 300.0, "shortest and longest, 1 to 300 m"
+        faults.require(inside, "wavelengths", f"found {low:g} to {high:g} m", allowed)
+        faults.check()
 
     def power(self, wave_numbers: Floats, points: int) -> Floats:
         """Two-sided power of the four quantities, float64[k, quantity]."""
@@ -127,8 +124,7 @@ def irregularity(
     known = all_sensors(vehicle)
     used = used_channels(measurement, known)
     remarks = list(measurement.remarks)
-    left = [name for name in measurement.channels if name not in used]
-    if left:
+    if left := [name for name in measurement.channels if name not in used]:
         remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")
     pieces = pieces_of(measurement, list(used))
     bare = track.replace(irregularities=[])
@@ -138,7 +134,7 @@ def irregularity(
         found.append(smooth.estimate(piece))
         if progress is not None:
             progress((number + 1) / len(pieces))
-    remarks += smooth.remarks()
+    remarks += [*smooth.linear.remarks, *smooth.said]
     if not simulations:
         remarks += _curves(track, measurement)
     return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks)
@@ -178,29 +174,21 @@ class _Smooth:
         bias = {**BIAS, "sensor_acceleration": assumed.bias}
         self.bias = np.array([bias[kind] for kind in kinds])
         self._alignment = Alignment(track)
-        self._models: dict[tuple[float, float, float], tuple[TrackResponse, Noise]] = {}
-        self.said: list[str] = []
+        self.model = cache(self._model)
+        self.said: list[
+            str
+        ] = []  # on pieces, and channels that read another thing than they should
         self._wrong: set[int] | None = None
         self.flanges = _flanges(self.linear, track)
         self._last: tuple[tuple[float, ...], Complexes] | None = None
 
-    def remarks(self) -> list[str]:
-        """Remarks on the model, and on channels that read another thing than they should."""
-        return [*self.linear.remarks, *self.said]
-
-    def model(
-        self, speed: float, curvature: float = 0.0, cant: float = 0.0
-    ) -> tuple[TrackResponse, Noise]:
+    def _model(self, speed: float, curvature: float, cant: float) -> tuple[TrackResponse, Noise]:
         """Linear vehicle and noise of its state at a speed [m/s], in a curve [1/m, m]."""
-        key = speed, curvature, cant
-        if key not in self._models:
-            tangent, a = track_response(self.linear, self.known, speed), self.assumed
-            rough = {"spectrum": a.spectrum, "wavelengths": list(a.wavelengths), "scale": a.scale}
-            with silent():
-                self._models[key] = in_the_mean(
-                    self.vehicle, self.track, self.linear, tangent, rough, key[1:]
-                )
-        return self._models[key]
+        tangent, a = track_response(self.linear, self.known, speed), self.assumed
+        rough = {"spectrum": a.spectrum, "wavelengths": list(a.wavelengths), "scale": a.scale}
+        curve = curvature, cant
+        with silent():
+            return in_the_mean(self.vehicle, self.track, self.linear, tangent, rough, curve)
 
     def _sharpest(self, piece: Piece) -> tuple[float, float]:
         """Curvature and cant where a piece is sharpest [1/m, m], three digits."""

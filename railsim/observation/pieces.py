@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, oaconvolve
 
 from railsim.arrays import Flags, Floats
-from railsim.errors import Fault, InputError, input_error, nearest
+from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.measurement import Measurement
 
 STEP = 0.25  # m
@@ -43,7 +43,7 @@ class Piece:
 
 def used_channels(measurement: Measurement, known: dict[str, Any]) -> dict[str, str]:
     """Outputs of the linear vehicle by channel: ``axlebox_1_left.z``."""
-    used, faults = {}, []
+    used, faults = {}, Faults()
     for name, quantity in measurement.quantities.items():
         kind, *labels = quantity.split(":")
         if kind not in READ:
@@ -57,8 +57,7 @@ def used_channels(measurement: Measurement, known: dict[str, Any]) -> dict[str, 
     if not used and not faults:
         allowed = "sensor_acceleration:axlebox_1_left:z and others of axleboxes, frames and floor"
         faults.append(Fault(measurement.name, "channels", "no accelerations", allowed))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return used
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from railsim.arrays import Flags, Floats
 from railsim.definitions.settings import Drive, Settings
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.layout import is_straight_and_level
+from railsim.definitions.track.layout import is_uniform
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.track_response import RAILS
 from railsim.observation.pieces import STEP, Piece, on_grid
@@ -75,18 +75,17 @@ class SimulatedRun:
     ) -> None:
         self.vehicle, self.piece, self.outputs, self.forces = vehicle, piece, outputs, forces
         s = piece.grid
-        # straight track is the same everywhere: the run begins at its beginning
-        self._straight = is_straight_and_level(track)
-        self._moved = float(s[0]) - LEAD if self._straight else 0.0
+        # where the track is the same everywhere the run begins at its beginning
+        self._uniform = is_uniform(track)
+        self._moved = float(s[0]) - LEAD if self._uniform else 0.0
         self._track = track
         self._start = max(0.0, float(s[0]) - LEAD - self._moved)
-
         self._constant = bool(np.ptp(piece.speeds) < STEADY * np.mean(piece.speeds))
 
     @property
     def is_steady(self) -> bool:
-        """Whether nothing but irregularities is read: straight and level, at a constant speed."""
-        return self._straight and self._constant
+        """Whether nothing but irregularities is read: on uniform track, at a constant speed."""
+        return self._uniform and self._constant
 
     def __call__(self, fields: Floats) -> Reading | str:
         """Return what is read over irregularities at the grid, or why the run ended before.
@@ -103,7 +102,7 @@ class SimulatedRun:
         irregularity = {"type": "measured", "rows": rows.tolist(), "fade": 0.0}
         changes: dict[str, Any] = {"irregularities": [irregularity]}
         end = float(s[-1]) + 0.5 * AFTER
-        if self._straight:
+        if self._uniform:
             changes["plan"] = [{"type": "STR", "length": end + AFTER}]
             changes["cant"] = [{"type": "CST", "length": end + AFTER, "cant": 0.0}]
         with silent():

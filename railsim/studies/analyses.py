@@ -64,9 +64,9 @@ def _largest(record: Mapping[str, Any], standard: str) -> Numbers:
         return {}
     ((_, report),) = record[standard].items()
     found: Numbers = {}
-    rows = report["wheels"] if standard == "safety" else report
-    parts = [*rows, {"overturning": report["overturning"]}] if standard == "safety" else rows
-    for row in parts:
+    if standard == "safety":
+        report = [*report["wheels"], {"overturning": report["overturning"]}]
+    for row in report:
         for key, value in _numbers(row):
             found[key] = max(found.get(key, 0.0), abs(value))
     return found

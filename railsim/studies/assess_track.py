@@ -12,30 +12,31 @@ complain of is a miss of the geometry, one that only the geometry complains of a
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.definitions import Settings, Track
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
+from railsim.definitions.track.layout import is_uniform
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
-from railsim.files.access import check_folder, write_text
+from railsim.files.access import check_folder, write_folder
+from railsim.notation import SIDES
 from railsim.result import Result, open_result
 from railsim.result.hunting import HUNTS
-from railsim.studies.carry_out import carry_out
+from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, short_name
-from railsim.studies.geometry_limits import CELL, SECTION, Flags, RecordedGeometry
-from railsim.studies.plan import Cases
-from railsim.studies.spec import Execution, StudySpec
+from railsim.studies.geometry_limits import CELL, SECTION, RecordedGeometry
+from railsim.studies.outcome import Outcome
+from railsim.studies.spec import StudySpec
 from railsim.table import Column, Table
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
@@ -66,6 +67,15 @@ class Place:
     shape: str
 
 
+class _Run(NamedTuple):
+    """A run over the piece from a to b of a track; by how much its own track begins later [m]."""
+
+    case: Case
+    a: float
+    b: float
+    moved: float
+
+
 @dataclass(frozen=True, eq=False)
 class TrackAssessment:
     """A track judged by vehicles, and by its geometry.
@@ -87,7 +97,7 @@ class TrackAssessment:
     cells: Floats
     shares: dict[tuple[str, float, str], Floats]
     sections: Table
-    flagged: NDArray[np.int64]
+    flagged: Integers
     computed: int
     remarks: tuple[str, ...]
 
@@ -127,11 +137,9 @@ class TrackAssessment:
 
     def write(self) -> list[Path]:
         """Write places and sections as CSV into the folder of the runs."""
-        written = []
-        for name, table in (("places.csv", self.table()), ("sections.csv", self.sections)):
-            write_text(self.folder / name, table.csv())
-            written.append(self.folder / name)
-        return written
+        tables = {"places.csv": self.table(), "sections.csv": self.sections}
+        content = {name: table.csv().encode() for name, table in tables.items()}
+        return write_folder(self.folder, content, overwrite=True)
 
 
 def assess_track(
@@ -169,31 +177,29 @@ def assess_track(
         "sensors": "readings",
     }
     settings = Settings(output_rate=RATE, outputs=outputs)
-    cases: list[Case] = []
-    pieces: dict[str, tuple[float, float, float]] = {}
-    for number, (a, b) in enumerate(pairwise(edges)):
-        part, moved = _part(track, float(a), float(b))
+    runs: list[_Run] = []
+    for number, (a, b) in enumerate(pairwise(edges.tolist())):
+        part, moved = _part(track, a, b)
         for name, vehicle in tested.items():
             for speed in speeds:
                 label = f"{name}_{speed:g}_{number:04d}"
-                start = max(0.0, float(a) - moved - RUN_IN)
-                cases.append(
-                    Case(label, vehicle, part, settings, float(speed), start,
-                         until=min(float(b) - moved, part.length),
-                         labels={"vehicle": name, "track": part.name, "speed": float(speed)})
+                case = Case(
+                    label, vehicle, part, settings, float(speed), max(0.0, a - moved - RUN_IN),
+                    until=min(b - moved, part.length),
+                    labels={"vehicle": name, "track": part.name, "speed": float(speed)},
                 )  # fmt: skip
-                pieces[label] = (float(a), float(b), moved)
+                runs.append(_Run(case, a, b, moved))
     spec = StudySpec(
         vehicles=[str(v) for v in vehicles], tracks=[str(recording)], speeds=list(speeds),
         single=True, keep="Q,Y,Y_over_Q,sum_Y,wheelset_distance,sensor_acceleration",
     )  # fmt: skip
-    outcome = carry_out(Cases(cases), spec, folder, Execution(longest_first=True, **how))
+    outcome = carry_out_cases([run.case for run in runs], spec, folder, **how)
     remarks = [
         f"{record['name']}: {record['status']}, {record['status_reason']}"
         for record in outcome.records
         if record["status"] != "complete"
     ] + _hunting(outcome.records)
-    return _judged(track, cases, pieces, folder, share, outcome.computed, remarks)
+    return _judged(track, runs, share, outcome, remarks)
 
 
 def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -248,16 +254,11 @@ def _extent(track: Track) -> tuple[float, float]:
 def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
     """Track with the rows between a and b and around them; by how much it begins later [m].
 
-    Of a straight track the part alone, of others the whole plan.
+    Of a track that is the same everywhere the part alone, of others the whole plan.
     """
     low, high = a - RUN_IN - BEYOND, b + BEYOND
-    straight = (
-        all(element.type == "STR" for element in track.plan)
-        and not track.vertical
-        and track.gauge_widening is None
-        and all(isinstance(part, Measured) for part in track.irregularities)
-    )
-    moved = max(0.0, low) if straight else 0.0
+    uniform = is_uniform(track) and all(isinstance(p, Measured) for p in track.irregularities)
+    moved = max(0.0, low) if uniform else 0.0
     parts: list[Any] = []
     for part in track.irregularities:
         if isinstance(part, Measured):
@@ -271,7 +272,7 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
         else:
             parts.append(part)
     changes: dict[str, Any] = {"irregularities": [p.model_dump(exclude_none=True) for p in parts]}
-    if straight:
+    if uniform:
         length = min(high, track.length) - moved
         changes["plan"] = [{"type": "STR", "length": length}]
         changes["cant"] = [{"type": "CST", "length": length, "cant": 0.0}]
@@ -282,24 +283,17 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
 
 
 def _judged(
-    track: Track,
-    cases: Sequence[Case],
-    pieces: dict[str, tuple[float, float, float]],
-    folder: Path,
-    share: float,
-    computed: int,
-    remarks: Sequence[str],
+    track: Track, runs: Sequence[_Run], share: float, outcome: Outcome, remarks: Sequence[str]
 ) -> TrackAssessment:
     begin, end = _extent(track)
     cells = np.arange(begin, end, CELL)
     geometry = RecordedGeometry(track, begin, end)
     shares: dict[tuple[str, float, str], Floats] = {}
     places: list[Place] = []
-    for case in cases:
-        path = folder / case.file_name
+    for case, a, b, moved in runs:
+        path = outcome.folder / case.file_name
         if not path.is_file():
             continue
-        a, b, moved = pieces[case.name]
         name = str(case.labels["vehicle"])
         for quantity, where, s, value, limit in _signals(case, open_result(path)):
             s = s + moved
@@ -314,16 +308,16 @@ def _judged(
                     Place(name, case.speed, quantity, where, float(s[k]), float(part[k] * limit),
                           limit, geometry.shape(float(s[k])))
                 )  # fmt: skip
-    places = _strongest(places)
-    asked = len({(c.labels["vehicle"], c.speed) for c in cases}) * len(QUANTITIES)
-    rows = (
-        np.array([*shares.values()]) if len(shares) == asked else np.full((1, len(cells)), np.nan)
-    )
-    flags = Flags(np.any(rows > share, axis=0), np.isnan(rows).any(axis=0))
-    sections, flagged = geometry.sections(flags, max(case.speed for case in cases))
+    asked = len({(case.labels["vehicle"], case.speed) for case, *_ in runs}) * len(QUANTITIES)
+    rows = np.full((1, len(cells)), np.nan)
+    if len(shares) == asked:
+        rows = np.array([*shares.values()])
+    exceeded, unknown = np.any(rows > share, axis=0), np.isnan(rows).any(axis=0)
+    sections, flagged = geometry.sections(exceeded, unknown, max(case.speed for case, *_ in runs))
     return TrackAssessment(
-        folder, share, tuple(places), cells, shares, sections, flagged, computed, tuple(remarks)
-    )
+        outcome.folder, share, tuple(_strongest(places)), cells, shares, sections, flagged,
+        outcome.computed, tuple(remarks),
+    )  # fmt: skip
 
 
 def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats, float]]:
@@ -337,7 +331,7 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
         return float(laws[name].at(at))
 
     found = []
-    Q0 = np.asarray(result["Q0"], dtype=float)
+    load = np.asarray(result["Q0"], dtype=float).mean(axis=1)
     at = np.asarray(result["wheelset_distance"], dtype=float)
     rate = len(at) / float(result["time"][-1] - result["time"][0])
     window = max(1, round(SLIDING / case.speed * rate))
@@ -346,19 +340,18 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
         return np.asarray(uniform_filter1d(x, window))
 
     for w in range(at.shape[1]):
-        load, s, number = float(Q0[w].mean()), at[:, w], f"wheelset {w + 1}"
-        for side, word in enumerate(("left", "right")):
-            found.append(("Q", f"{number} {word}", s, result["Q"][:, w, side],
-                          limit("Q", w, load)))  # fmt: skip
-            found.append(("Y_over_Q", f"{number} {word}", s, mean(result["Y_over_Q"][:, w, side]),
-                          limit("Y_over_Q", w, load)))  # fmt: skip
-        found.append(("sum_Y", number, s, np.abs(mean(result["sum_Y"][:, w])),
-                      limit("sum_Y", w, load)))  # fmt: skip
-    for point in ("floor_front", "floor_rear"):
-        for axis in "yz":
-            name = f"body_{axis}"
-            x = result.series("sensor_acceleration", sensor=point, axis=axis)
-            found.append((name, point, result["distance"], np.abs(x), limit(name)))
+        number = f"wheelset {w + 1}"
+        values = []
+        for side, word in enumerate(SIDES):
+            place = f"{number} {word}"
+            values.append(("Q", place, result["Q"][:, w, side]))
+            values.append(("Y_over_Q", place, mean(result["Y_over_Q"][:, w, side])))
+        values.append(("sum_Y", number, np.abs(mean(result["sum_Y"][:, w]))))
+        found += [(n, place, at[:, w], x, limit(n, w, float(load[w]))) for n, place, x in values]
+    for point, axis in product(("floor_front", "floor_rear"), "yz"):
+        x = result.series("sensor_acceleration", sensor=point, axis=axis)
+        name = f"body_{axis}"
+        found.append((name, point, result["distance"], np.abs(x), limit(name)))
     return [(n, p, np.asarray(s, float), np.asarray(v, float), m) for n, p, s, v, m in found]
 
 

@@ -1,9 +1,11 @@
 """A scenario for vehicles: all its runs as one job, and the assessment at the end.
 
 It is carried out as a study: with journal, index and summary, and a run whose file exists with the
-same inputs is not computed again.
+same inputs is not computed again.  A test campaign has conditions of the vehicle, and runs on
+independent seeds of its track, scaled to the target quality.
 """
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,22 +13,37 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from pydantic import ValidationError
+
 from railsim.assessment import Assessment, assess
+from railsim.assessment.conditions import SHARE
+from railsim.assessment.record import START
+from railsim.assessment.sections import TestSection, track_sections
+from railsim.assessment.track_quality import TrackQuality
 from railsim.cant import curve_speed
+from railsim.definitions import Track, Vehicle
+from railsim.definitions.excitations.random import Random
+from railsim.definitions.limits import RunningLimits
 from railsim.definitions.loading import load_running_limits, load_scenario, load_vehicle
 from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
+from railsim.definitions.track.elements import Circle
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, Faults, InputError, RailsimError
+from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
 from railsim.files.access import check_folder
 from railsim.processes import available_cores
 from railsim.result import Result, open_result
-from railsim.studies.carry_out import carry_out
+from railsim.result.sensors import sensors
+from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, load_case, short_name
-from railsim.studies.in_conditions import in_condition, repeated, scaled_radii
-from railsim.studies.plan import Cases
-from railsim.studies.points import ROUGH_DURATION, check_number
+from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
-from railsim.studies.spec import Execution, RunSpec, StudySpec
+from railsim.studies.spec import RunSpec, StudySpec
+
+MOST = 20  # seeds of a part
+SEEDS = 100  # between those of two conditions
+LATERAL, VERTICAL = ("lateral", "gauge"), ("vertical", "cross_level")
 
 
 @dataclass(frozen=True)
@@ -79,7 +96,7 @@ def campaign(
         single=plan.single,
         assignments=list(assignments),
     )
-    outcome = carry_out(Cases(cases), spec, folder, Execution(longest_first=True, **how))
+    outcome = carry_out_cases(cases, spec, folder, **how)
     if outcome.failed:
         words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in outcome.failed)
         raise RailsimError(f"{len(outcome.failed)} of {len(cases)} runs failed: {words}")
@@ -97,8 +114,9 @@ def scenario_cases(
     """
     faults = Faults()
     cases: list[Case] = []
-    axes = [vehicles, _conditions(scenario), list(scenario.parts), *scenario.grid.values()]
-    check_number(axes, available_cores(), lambda: ROUGH_DURATION)
+    conditions = _conditions(scenario)
+    axes = (vehicles, conditions, scenario.parts, *scenario.grid.values())
+    check_number(math.prod(map(len, axes)), available_cores(), lambda: ROUGH_DURATION)
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:
@@ -106,23 +124,23 @@ def scenario_cases(
             a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")
         ]
         try:
-            service = load_vehicle(vehicle, vehicle_assignments).service
+            loaded = load_vehicle(vehicle, vehicle_assignments)
         except InputError as error:
             faults += error.faults
             continue
+        service = loaded.service
         if service is None:
             allowed = "add [service] with admissible_speed and cant_deficiency"
             faults.append(Fault(str(vehicle), "service", "missing", allowed))
             continue
-        several = list(product(_conditions(scenario), scenario.parts.items(), points))
+        several = product(conditions, scenario.parts.items(), points)
         for (number, state, condition), (name, part), point in several:
             texts = [*scenario.assignments, *(f"{key}={v}" for key, v in point.items())]
             speed = part_speed(part.speed, service)
             label = [short_name(vehicle), state, name, *map(in_a_name, point.values())]
             try:
                 if condition:
-                    loads = load_vehicle(vehicle, vehicle_assignments).loads
-                    if condition.load not in (None, "design", *loads):
+                    if condition.load not in (None, "design", *loaded.loads):
                         continue
                     texts += condition.assignments
                     texts += [f"vehicle.load={condition.load}"] if condition.load else []
@@ -162,5 +180,133 @@ def part_speed(speed: Speed, service: Service) -> float:
         return speed.fixed
     if speed.admissible is not None:
         return speed.admissible * service.admissible_speed
+    return _speed_in_curve(speed, service)
+
+
+def _speed_in_curve(speed: Speed, service: Service) -> float:
     deficiency = (speed.cant_deficiency or 0.0) * service.cant_deficiency
     return curve_speed(speed.radius or 0.0, speed.cant + deficiency)
+
+
+def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehicle | None:
+    """Return the vehicle in a condition; None where its file has nothing of the kind.
+
+    Load and assignments have been made when it was loaded.
+
+    Raises InputError: what is removed does not exist; a wrong vehicle without it.
+    """
+    data = vehicle.model_dump(mode="json", exclude_none=True)
+    if condition.wheels and not _exchange(data, condition.wheels):
+        return None
+    for key in condition.remove:
+        *path, last = key.split(".")
+        table = data
+        for part in path:
+            table = table.get(part, {})
+        if last not in table:
+            allowed = "a key of the vehicle's file"
+            raise input_error(f"conditions.{name}", key, allowed, key="remove")
+        del table[last]
+    data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
+    try:
+        return Vehicle.model_validate(data)
+    except ValidationError as error:
+        faults = [Fault(f"conditions.{name}", ".".join(map(str, e["loc"])), e["msg"], "")
+                  for e in error.errors()]  # fmt: skip
+        raise InputError(faults) from None
+
+
+def _exchange(node: Any, wheels: dict[str, str]) -> bool:
+    """Exchange wheel profiles in a vehicle's tables; tell whether there was one."""
+    if not isinstance(node, dict):
+        return False
+    found = False
+    for name, table in node.items():
+        if name != "wheelsets":
+            found = _exchange(table, wheels) or found
+            continue
+        for wheelset in table.values():
+            pair = wheelset["profile"]
+            names = [pair] if isinstance(pair, str) else list(pair)
+            found = found or any(profile in wheels for profile in names)
+            wheelset["profile"] = [wheels.get(profile, profile) for profile in names]
+    return found
+
+
+def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
+    """Track whose radii give the cant deficiency asked for at the speed asked for."""
+    if speed.admissible is None or speed.cant_deficiency is None:
+        return track
+    as_drawn = _speed_in_curve(speed, service)
+    factor = (speed.admissible * service.admissible_speed / as_drawn) ** 2
+    plan = [
+        element.model_copy(update={"radius": factor * element.radius})
+        if isinstance(element, Circle)
+        else element
+        for element in track.plan
+    ]
+    return track.model_copy(update={"plan": tuple(plan)})
+
+
+def repeated(case: Case, limits: RunningLimits, service: Service, condition: int) -> list[Case]:
+    """Return a run with as many seeds as its zone needs sections, each to the target quality.
+
+    `case`: run on track with one random irregularity; others are returned as they are; `condition`:
+    number of the condition, which has its own seeds.
+    """
+    parts = case.track.irregularities
+    if len(parts) != 1 or not isinstance(parts[0], Random):
+        return [case]
+    found: list[Case] = []
+    counted = 0
+    for number in range(MOST):
+        seed = parts[0].seed + SEEDS * condition + 10 * number
+        part = parts[0].model_copy(update={"seed": seed})
+        track = case.track.model_copy(update={"irregularities": (part,)})
+        sections = counting_sections(track, case, limits, service)
+        label = f"{case.name}_seed{seed}"
+        scaled = to_target(track, part, sections, limits, service)
+        labels = {**case.labels, "seed": seed}
+        found.append(replace(case, name=label, track=scaled, labels=labels))
+        counted += len(sections)
+        if not sections or counted >= limits.zones[sections[0].zone].sections:
+            break
+    return found
+
+
+def counting_sections(
+    track: Track, case: Case, limits: RunningLimits, service: Service
+) -> list[TestSection]:
+    """Sections that count, of the zone with most of them, at constant speed."""
+    vehicle = case.vehicle
+    x = [b.position[0] for b in flatten(vehicle).of_kind("wheelset")]
+    x += [sensor.offset + sensor.arm[0] for sensor in sensors(vehicle).values()]
+    ahead, behind = max(0.0, *x), min(0.0, *x)
+    begin = case.start + max(START * case.speed, ahead - behind) + ahead
+    end = (case.until or track.length) + behind - 1.0
+    sections = track_sections(track, limits, service, (begin, end), lambda _: case.speed)
+    counting = [section for section in sections if section.zone and not section.reason]
+    by_zone = [[s for s in counting if s.zone == zone] for zone in limits.zones]
+    return max(by_zone, key=len)
+
+
+def to_target(
+    track: Track,
+    part: Random,
+    sections: Sequence[TestSection],
+    limits: RunningLimits,
+    service: Service,
+) -> Track:
+    """Track whose 90 % values of alignment and level are in the middle of the target."""
+    target = limits.track_quality
+    if not sections or target is None:
+        return track
+    quality = TrackQuality(track, sections[0].begin, sections[-1].end)
+    found = np.percentile([quality.deviations(s.begin, s.end) for s in sections], SHARE, axis=0)
+    wanted = np.array(target.middle(min(sections[0].speed, service.admissible_speed)))
+    scales = part.scale * wanted / found
+    parts = tuple(
+        part.model_copy(update={"channels": channels, "scale": round(float(scale), 4)})
+        for channels, scale in zip((LATERAL, VERTICAL), scales, strict=True)
+    )
+    return track.model_copy(update={"irregularities": parts})

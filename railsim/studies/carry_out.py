@@ -1,18 +1,26 @@
-"""`carry_out`: computes the missing runs of a study or a campaign, with the journal."""
+"""`carry_out`: computes the missing runs of a study or a campaign, with the journal of its folder.
+
+`State` knows from journal and files which runs are done, and which are to be computed.
+"""
 
 import errno
 import logging
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import InputError, argument_error
+from railsim.errors import Fault, InputError, argument_error, argument_fault
 from railsim.files.access import is_file, make_folder, sweep
+from railsim.laws.permission import check_laws
 from railsim.processes import available_cores
+from railsim.result import open_result
+from railsim.result.hdf5 import Storage
+from railsim.studies.case import Case
 from railsim.studies.execute import (
-    Batch,
     Job,
     batches,
     cluster,
@@ -21,23 +29,51 @@ from railsim.studies.execute import (
     in_this_process,
     on_cluster,
 )
-from railsim.studies.journal import JOURNAL, Journal
+from railsim.studies.journal import JOURNAL, Journal, Records
 from railsim.studies.outcome import Outcome
+from railsim.studies.plan import Point, check_names
 from railsim.studies.records import Record
-from railsim.studies.retention import retention
-from railsim.studies.spec import Execution, StudySpec
-from railsim.studies.state import Runs, State
-from railsim.studies.summary import read_index, write_index
+from railsim.studies.spec import Execution, RunSpec, StudySpec, kept_quantities
+from railsim.studies.summary import finished_record, read_index, waiting_record, write_index
 
 _LOG = logging.getLogger(__name__)
 MANY = 10_000  # number of runs from which an index that is up to date is not written again
 # errors after which no other run could be written either
 NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
+DAMAGED = "`resume` computes it again and keeps this file beside it; or another `out`"
+CHANGED = "`resume` computes what has changed, `overwrite` everything; or another `out`"
+
+Load = Callable[[Sequence[Point]], list[Case]]
 
 
-def carry_out(plan: Runs, spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
-    """Compute the missing runs of a study or a campaign, with the journal of its folder."""
-    inputs = spec.stored()
+def carry_out_cases(cases: Sequence[Case], spec: StudySpec, folder: Path, **how: Any) -> Outcome:
+    """Compute the missing runs of cases that are loaded, the longest first.
+
+    `how`: fields of `Execution`. Raises InputError: as `carry_out`; equal names.
+    """
+    points = [
+        Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
+        for c in cases
+    ]
+    check_names(points)
+    by_name = {case.name: case for case in cases}
+
+    def load(wanted: Sequence[Point]) -> list[Case]:
+        return [by_name[point.name] for point in wanted]
+
+    return carry_out(points, load, spec, folder, Execution(longest_first=True, **how))
+
+
+def carry_out(
+    points: Sequence[Point], load: Load, spec: StudySpec, folder: Path, execution: Execution
+) -> Outcome:
+    """Compute the missing runs of a study.
+
+    `load`: loads the inputs of some of the points. Raises InputError: an unknown quantity to keep;
+    a folder of another study; as `State`.
+    """
+    inputs, keep = spec.stored(), kept_quantities(spec.keep)
+    remark = execution.on_remark or _LOG.warning
     with ExitStack() as stack:
         known = None
         if is_file(folder / JOURNAL):
@@ -46,7 +82,7 @@ def carry_out(plan: Runs, spec: StudySpec, folder: Path, execution: Execution) -
             _refuse_another_study(folder, known, inputs)
         if known is None and not execution.overwrite:
             _refuse_files_of_others(folder)
-        state = State(folder, plan, spec, known, execution)
+        state = State(folder, points, load, spec, known, execution)
         client = None if execution.scheduler is None else cluster(execution.scheduler)
         make_folder(folder)
         sweep(folder)
@@ -54,62 +90,60 @@ def carry_out(plan: Runs, spec: StudySpec, folder: Path, execution: Execution) -
         if execution.overwrite:
             journal.clear()
         elif known is None and journal.entries:
-            found = f"another study has begun in {folder}"
-            raise argument_error("out", found)
+            raise argument_error("out", f"another study has begun in {folder}")
         journal.begin(inputs)
         for text in state.settle(journal):
-            (execution.on_remark or _LOG.warning)(text)
-        jobs = _jobs(state, spec, folder, execution)
-        status = "interrupted"
+            remark(text)
+        jobs = _jobs(state, spec, keep, folder, execution)
         try:
             if jobs:
                 with suppress(FileNotFoundError):  # it would be out of date
                     (folder / "study.json").unlink()
-            for record in _computed(jobs, client, execution):
-                _add(journal, state.keys[record["name"]], record)
+            for record in _computed(jobs, client, execution, remark):
+                has_file = record["status"] != "failed" and record["file"]
+                file = (folder / record["file"]).stat() if has_file else None
+                journal.add(record, state.keys[record["name"]], file)
                 if execution.on_record is not None:
                     execution.on_record(record)
                 if record.get("errno") in NOTHING_MORE:
                     raise OSError(record["errno"], os.strerror(record["errno"]), str(folder))
-            status = "complete"
         except BaseException:
             with suppress(OSError):  # the disk may be full
-                write_index(folder, inputs, status, state.records(journal))
+                write_index(folder, inputs, "interrupted", state.records(journal))
             raise
-        whole = len(plan.points) > MANY and _is_newer(folder / "study.json", journal.path)
+        whole = len(points) > MANY and _is_newer(folder / "study.json", journal.path)
         if jobs or state.found or not whole:
-            write_index(folder, inputs, status, state.records(journal))
+            write_index(folder, inputs, "complete", state.records(journal))
         return Outcome(folder, state.records(journal), len(jobs))
 
 
-def _jobs(state: State, spec: StudySpec, folder: Path, execution: Execution) -> list[Job]:
+def _jobs(
+    state: "State", spec: StudySpec, keep: tuple[str, ...], folder: Path, execution: Execution
+) -> list[Job]:
+    storage = Storage(compress=spec.compress, single=spec.single)
     jobs = []
     for case in state.cases:
         path = (folder / f"{case.name}.h5").resolve()
         picture = path.with_suffix(".png") if execution.plots and case.file_name else None
         exists = case.name in state.to_be_analysed
-        jobs.append(Job(case, path, picture, spec.quantities, retention(spec), exists))
+        jobs.append(Job(case, path, picture, spec.quantities, keep, storage, exists))
     if execution.longest_first:
         jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
     return jobs
 
 
-def _add(journal: Journal, key: str, record: Record) -> None:
-    has_file = record["status"] != "failed" and record["file"]
-    file = (journal.path.parent / record["file"]).stat() if has_file else None
-    journal.add(record, key, file)
-
-
-def _computed(jobs: Sequence[Job], client: Any, execution: Execution) -> Iterable[Record]:
+def _computed(
+    jobs: Sequence[Job], client: Any, execution: Execution, remark: Callable[[str], None]
+) -> Iterable[Record]:
     progress = execution.progress or (lambda _: None)
     if client is not None:
         threads = sum(client.nthreads().values())
-        compile_on_cluster(client, execution.on_remark or _LOG.warning)
+        compile_on_cluster(client, remark)
         return on_cluster(batches(jobs, execution.together, max(1, threads)), client, progress)
-    count = execution.workers or available_cores()
-    work: Sequence[Batch] = batches(jobs, execution.together, count)
-    count = min(count, len(work))
-    return in_processes(work, count, progress) if count > 1 else in_this_process(work, progress)
+    workers = execution.workers or available_cores()
+    work = batches(jobs, execution.together, workers)
+    workers = min(workers, len(work))
+    return in_processes(work, workers, progress) if workers > 1 else in_this_process(work, progress)
 
 
 def _refuse_another_study(
@@ -152,3 +186,137 @@ def _is_newer(one: Path, other: Path) -> bool:
         return one.stat().st_mtime_ns >= other.stat().st_mtime_ns
     except OSError:
         return False
+
+
+class State:
+    """Which runs of a study are done, and which are to be computed.
+
+    `cases`: cases to compute; `keys`: keys of all points by their names; `found`: existing results
+    that are not in the journal; `to_be_analysed`: names of the cases whose run exists, but not
+    their analyses. Raises InputError: all faults of the cases to compute; without `resume` also
+    results that would have to be replaced.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        points: Sequence[Point],
+        load: Load,
+        spec: StudySpec,
+        known: Journal | None,
+        execution: Execution,
+    ) -> None:
+        self._folder, self._points, self._spec = folder, points, spec
+        anew = execution.overwrite
+        self._entries = dict(known.entries) if known and not anew else {}
+        self._files = {} if anew else _files(folder)
+        self._damaged: dict[Path, str] = {}
+        self._changed: list[str] = []
+        self._damaged_lines = known.damaged if known else 0
+        self.keys = {point.name: point.key for point in points}
+        self.found: list[tuple[Point, Record]] = []
+        self.to_be_analysed: set[str] = set()
+        waiting = [point for point in points if not self._is_done(point)]
+        self._waiting = dict(zip(waiting, load(waiting), strict=True))
+        faults = [
+            fault for point, case in self._waiting.items() for fault in self._faults_of(point, case)
+        ]
+        if faults and not execution.resume:
+            raise InputError(faults)
+        found = {point for point, _ in self.found}
+        self.cases = [case for point, case in self._waiting.items() if point not in found]
+        check_laws(
+            law
+            for case in self.cases
+            for definition in (case.vehicle, case.track, case.settings)
+            for law in (definition.laws or {}).items()
+        )
+
+    def _is_done(self, point: Point) -> bool:
+        """Whether the journal has the result of these inputs, and its file has not changed."""
+        entry = self._entries.get(point.name)
+        if entry is None or not entry.is_done or not point.key:
+            return False
+        if not entry.size and self._spec.keep != "summary" and point.has_run:
+            return False  # only the summary was kept, the file is required
+        return entry.key == point.key and entry.is_of(self._files.get(f"{point.name}.h5"))
+
+    def _faults_of(self, point: Point, case: Case) -> list[Fault]:
+        """Accept an existing result of a case, or say why it cannot be used; also a summary."""
+        path = self._folder / case.file_name
+        if case.file_name not in self._files:
+            entry = self._entries.get(case.name)
+            if entry is None or not entry.is_done or entry.size or entry.key == point.key:
+                return []
+            self._changed.append(case.name)
+            return [argument_fault("out", case.name, "a summary of other inputs", CHANGED)]
+        try:
+            result = open_result(path)
+            if result.attributes.get("inputs_hash") == case.key:
+                if case.analyses:  # takes time: done as a job like others
+                    self.to_be_analysed.add(case.name)
+                else:
+                    record = finished_record(case, result, self._spec.quantities)
+                    self.found.append((point, record))
+                return []
+        except InputError as error:
+            self._damaged[path] = str(error.faults[0])
+            return [replace(f, allowed=DAMAGED, option=f.file) for f in error.faults]
+        self._changed.append(case.name)
+        return [argument_fault("out", str(path), "a result of other inputs", CHANGED)]
+
+    def settle(self, journal: Journal) -> list[str]:
+        """Record existing results, rename damaged files; return remarks for the user."""
+        remarks = []
+        if self._damaged_lines:
+            remarks.append(f"{self._damaged_lines} damaged lines of {JOURNAL} are ignored")
+        for point, record in self.found:
+            journal.add(record, point.key, self._files[record["file"]])
+        for path, words in self._damaged.items():
+            old = _moved_aside(path)
+            remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
+        lost = [
+            case.name
+            for case in self.cases
+            if self._entries.get(case.name)
+            and case.file_name not in self._files
+            and self._entries[case.name].size
+        ]
+        for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
+            if names:
+                number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
+                remarks.append(f"{number} {words} and computed again: {_listed(names)}")
+        return remarks
+
+    def records(self, journal: Journal) -> Records:
+        """Return the records of all runs, done or waiting, in the order of the combinations."""
+        waiting = {point.name: case for point, case in self._waiting.items()}
+        return Records(
+            journal.path,
+            [
+                journal.entries.get(point.name) or waiting_record(waiting[point.name])
+                for point in self._points
+            ],
+        )
+
+
+def _moved_aside(path: Path) -> Path:
+    """Give a damaged file another name that is free, and return it."""
+    endings = chain([""], (f"-{number}" for number in count(2)))
+    names = (path.with_name(f"{path.name}.damaged{ending}") for ending in endings)
+    free = next(name for name in names if not os.path.lexists(name))
+    return path.rename(free)
+
+
+def _files(folder: Path) -> dict[str, os.stat_result]:
+    """Return the result files of a folder; fast enough for a hundred thousand."""
+    try:
+        with os.scandir(folder) as entries:
+            return {entry.name: entry.stat() for entry in entries if entry.name.endswith(".h5")}
+    except OSError:  # missing, or not a folder
+        return {}
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.study.analyses import Analysis, needs_run, needs_speed
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, Faults, InputError
 from railsim.files.overrides import split_overrides
 from railsim.files.sources import OVERRIDE
 from railsim.profiles import load_profile
@@ -56,6 +56,12 @@ class Case:
         """Name of the result file; empty if there is no run in the time domain."""
         return f"{self.name}.h5" if needs_run(self.analyses) else ""
 
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """Speed, beginning, end and settings, as arguments of `railsim.simulate`."""
+        names = ("speed", "start", "duration", "until", "settings")
+        return {name: getattr(self, name) for name in names}
+
     @cached_property
     def key(self) -> str:
         """Hash of everything that the results of the run depend on.
@@ -68,11 +74,8 @@ class Case:
             "railsim": __version__,
             "vehicle": self.vehicle.to_toml(),
             "track": self.track.to_toml(),
+            **self.conditions,
             "settings": self.settings.to_toml(),
-            "speed": self.speed,
-            "start": self.start,
-            "duration": self.duration,
-            "until": self.until,
             "profiles": {
                 name: hashlib.sha256(load_profile(name).key()).hexdigest()
                 for name in sorted({name for _, name, _ in used})
@@ -101,18 +104,13 @@ class Loader:
     ) -> None:
         self._grid = grid
         self._analyses = dict(analyses or {})
-        self._faults: dict[Fault, None] = {}
+        self.faults = Faults()
         self._loaded = cache(self._load)
         self.overrides = cache(self._overrides)
 
-    def report(self, faults: Iterable[Fault]) -> None:
-        """Add faults."""
-        self._faults |= dict.fromkeys(faults)
-
-    def raise_faults(self) -> None:
+    def check(self) -> None:
         """Raise an `InputError` if anything was wrong so far."""
-        if self._faults:
-            raise InputError(self._faults)
+        Faults(dict.fromkeys(self.faults)).check()
 
     def definition(self, kind: str, run: RunSpec) -> Any:
         """Return the ``vehicle``, ``track`` or ``settings`` of a run; None if it is wrong."""
@@ -121,11 +119,11 @@ class Loader:
     def _load(self, kind: str, path: str | Path | None, overrides: Overrides) -> Any:
         try:
             definition = LOADERS[kind](path, overrides)
-            self.report(profile_faults(definition, str(path)))
-            return definition
         except InputError as error:
-            self.report(self._as_written(fault, kind) for fault in error.faults)
+            self.faults += [self._as_written(fault, kind) for fault in error.faults]
             return None
+        self.faults += profile_faults(definition, str(path))
+        return definition
 
     def _as_written(self, fault: Fault, kind: str = "") -> Fault:
         """Return the fault of an assignment with its key and option as given."""
@@ -144,7 +142,7 @@ class Loader:
                 for kind, some in split_overrides([text]).items():
                     found[kind] += tuple(some)
             except InputError as error:
-                self.report(self._as_written(fault) for fault in error.faults)
+                self.faults += [self._as_written(fault) for fault in error.faults]
         return found
 
     def first_speed(self, run: RunSpec) -> float | None:
@@ -152,11 +150,9 @@ class Loader:
         settings = self.definition("settings", run)
         if settings is None or (run.speed is None and not needs_speed(self._analyses)):
             return run.speed
-        try:
+        with self.faults.caught():
             return initial_speed(settings, run.speed, run.start)
-        except InputError as error:
-            self.report(error.faults)
-            return None
+        return None
 
     def case(self, name: str, run: RunSpec, labels: Mapping[str, str | float]) -> Case | None:
         """Return the case of a run whose speed is that at its start; None if it is wrong."""
@@ -165,14 +161,11 @@ class Loader:
         if speed is None and not needs_speed(self._analyses):
             speed = math.nan
         elif track and speed is not None and needs_run(self._analyses):
-            try:
+            with self.faults.caught():
                 check_range(track, speed, run.start, run.duration, run.until)
-            except InputError as error:
-                self.report(error.faults)
         if not (vehicle and track and settings) or speed is None:
             return None
-        end = run.duration, run.until
-        inputs = vehicle, track, settings, speed, run.start, *end
+        inputs = vehicle, track, settings, speed, run.start, run.duration, run.until
         return Case(name, *inputs, labels, self._analyses)
 
 
@@ -183,18 +176,17 @@ def load_case(run: RunSpec) -> Case:
     """
     loader = Loader()
     loader.overrides(run.assignments)  # its faults come first
-    speed = loader.first_speed(run)
-    name = run_name(run.vehicle, run.track, 0.0 if speed is None else speed)
-    labels = run_labels(run.vehicle, run.track, math.nan if speed is None else speed)
-    case = loader.case(name, replace(run, speed=speed), labels)
-    loader.raise_faults()
+    run = replace(run, speed=loader.first_speed(run))
+    case = loader.case(run_name(run), run, run_labels(run))
+    loader.check()
     assert case is not None  # without a fault
     return case
 
 
-def run_labels(vehicle: str | Path, track: str | Path, speed: float) -> dict[str, str | float]:
+def run_labels(run: RunSpec) -> dict[str, str | float]:
     """Return the labels that every run has."""
-    return {"vehicle": short_name(vehicle), "track": short_name(track), "speed": speed}
+    speed = math.nan if run.speed is None else run.speed
+    return {"vehicle": short_name(run.vehicle), "track": short_name(run.track), "speed": speed}
 
 
 @lru_cache(1000)  # few files in up to 100 000 runs
@@ -203,12 +195,12 @@ def short_name(path: str | Path) -> str:
     return Path(path).name.removesuffix(".toml")
 
 
-def run_name(vehicle: str | Path, track: str | Path, speed: float) -> str:
+def run_name(run: RunSpec) -> str:
     """Return the name of a run.
 
     Examples
     --------
-    >>> run_name("vehicles/coach_manchester.toml", "curve_r250", 20.0)
+    >>> run_name(RunSpec("vehicles/coach_manchester.toml", "curve_r250", 20.0))
     'coach_manchester_curve_r250_20'
     """
-    return f"{short_name(vehicle)}_{short_name(track)}_{speed:.10g}"
+    return f"{short_name(run.vehicle)}_{short_name(run.track)}_{run.speed or 0.0:.10g}"

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +52,11 @@ class Design:
     feasible: bool
     reason: str = ""
 
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Of objectives, then constraints."""
+        return (*self.objectives, *self.constraints)
+
 
 class Evaluation:
     """Evaluation of designs by a study, as called by a search.
@@ -65,6 +69,7 @@ class Evaluation:
         self, definition: Study, wanted: Optimise, folder: Path, execution: Execution
     ) -> None:
         self.definition, self.wanted, self.folder = definition, wanted, folder
+        self.variables = list(wanted.variables.items())  # paths and bounds
         self.rows: list[tuple[str, ...]] = []
         self.asked: list[int] = []
         self.computed = 0
@@ -73,11 +78,6 @@ class Evaluation:
         self._spec = StudySpec.of_file(definition, keep="summary")
         self._progress = execution.progress or (lambda _: None)
         self._execution = replace(execution, resume=not execution.overwrite)
-
-    @cached_property
-    def variables(self) -> list[tuple[str, Variable]]:
-        """Paths and bounds."""
-        return list(self.wanted.variables.items())
 
     def __call__(self, points: Floats) -> Values:
         """Compute designs, and return the values of all designs requested so far."""
@@ -91,17 +91,14 @@ class Evaluation:
                 known[row] = len(self.rows)
                 self.rows.append(row)
             self.asked.append(known[row])
-        before, number = self._done, self.wanted.evaluations
+        before, number = len(self.designs), self.wanted.evaluations
         self._study(lambda share: self._progress(min(1.0, (before + share * len(points)) / number)))
         objectives = np.array([design.objectives for design in self.designs])
         values = signs_of(self.wanted) * objectives
         return Values(values[self.asked], self._margins[self.asked])
 
-    @property
-    def _done(self) -> int:
-        return len(self.designs)
-
     def _study(self, progress: Progress) -> None:
+        """Carry out the study of all designs, and gather the runs of each."""
         linked: dict[str, list[str]] = {}
         for column, (path, variable) in enumerate(self.variables):
             for key in (path, *variable.also):
@@ -110,14 +107,10 @@ class Evaluation:
         outcome = run_study(spec, self.folder, replace(self._execution, progress=progress))
         self._execution = replace(self._execution, resume=True, overwrite=False)
         self.computed += outcome.computed
-        self._take(outcome)
-
-    def _take(self, outcome: Outcome) -> None:
-        """Gather the runs of each design."""
+        _check_quantities(self.wanted, outcome)
         runs: dict[tuple[str, ...], list[Record]] = {row: [] for row in self.rows}
         for record in outcome.records:
             runs[tuple(str(record["labels"][path]) for path, _ in self.variables)].append(record)
-        _check_quantities(self.wanted, outcome)
         designs, margins = [], []
         for number, row in enumerate(self.rows, start=1):
             rows = [(record["labels"], summary_row(record)) for record in runs[row]]
@@ -126,27 +119,15 @@ class Evaluation:
             worst = [_constraint(one, rows) for one in self.wanted.constraints]
             excess = tuple(margin for _, margin in worst)
             if bad:
-                objectives = tuple(math.nan for _ in objectives)
-                excess = tuple(math.nan for _ in excess)
+                objectives, excess = (math.nan,) * len(objectives), (math.nan,) * len(excess)
             fine = not any(map(math.isnan, objectives)) and all(one <= 0.0 for one in excess)
-            values = {
-                path: float(text) for (path, _), text in zip(self.variables, row, strict=True)
-            }
+            values = dict(zip(self.wanted.variables, map(float, row), strict=True))
             reason = str(bad[0]["status_reason"]) if bad else ""
             limits = tuple(value for value, _ in worst)
             designs.append(Design(number, values, objectives, limits, fine, reason))
             margins.append(excess)
         self.designs = tuple(designs)
         self._margins = np.array(margins, dtype=float).reshape(len(designs), -1)
-
-    def shares(self) -> Floats:
-        """Return all designs as points of the unit cube."""
-        return np.array(
-            [
-                [share_of(v, design.variables[path]) for path, v in self.variables]
-                for design in self.designs
-            ]
-        )
 
 
 def _written(variable: Variable, share: float) -> str:
@@ -265,10 +246,8 @@ def values_by_name(wanted: Optimise, designs: Sequence[Design]) -> dict[str, lis
     and the worst of them do.
     """
     found: dict[str, list[float]] = {}
-    ones = (*wanted.objectives, *wanted.constraints)
-    rows = [(*design.objectives, *design.constraints) for design in designs]
-    for number, one in enumerate(ones):
-        name, values = with_unit(one), [row[number] for row in rows]
+    for number, one in enumerate((*wanted.objectives, *wanted.constraints)):
+        name, values = with_unit(one), [design.values[number] for design in designs]
         if not np.array_equal(found.get(name, values), values, equal_nan=True):
             name = f"{name}, worst of its limit"
         found[name] = values

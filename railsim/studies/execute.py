@@ -16,11 +16,12 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from itertools import pairwise
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -34,16 +35,17 @@ from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
+from railsim.result.hdf5 import PLAIN, Storage, write
 from railsim.simulation import simulate
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.records import Record
-from railsim.studies.retention import EVERYTHING, Retention
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
+ALWAYS_KEPT = ("time", "distance", "Q0")
 
 Progress = Callable[[float], None]
 
@@ -53,15 +55,18 @@ class Job:
     """A case and the paths of its files.
 
     `path`, `picture`: files of result and figure; existing ones are replaced; `function`: function
-    for user-defined quantities, see `railsim.studies.user_function`; `exists`: whether the run
-    exists, and only its analyses are to be computed.
+    for user-defined quantities, see `railsim.studies.user_function`; `keep`, `storage`: quantities
+    of the result that are kept, see `railsim.studies.spec.kept_quantities`, compression and
+    precision of its file; `exists`: whether the run exists, and only its analyses are to be
+    computed.
     """
 
     case: Case
     path: Path
     picture: Path | None = None
     function: str | None = None
-    retention: Retention = EVERYTHING
+    keep: tuple[str, ...] = ("*",)
+    storage: Storage = PLAIN
     exists: bool = False
 
 
@@ -86,9 +91,9 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
             continue
         group = next((some for some in alike if can_share_a_call(some[0].case, job.case)), None)
         if group is None:
-            alike.append([job])
-        else:
-            group.append(job)
+            group = []
+            alike.append(group)
+        group.append(job)
     for group in alike:
         parts = math.ceil(len(group) / size)
         ends = [len(group) * part // parts for part in range(parts + 1)]
@@ -101,15 +106,17 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     first = batch[0]
     if not first.case.file_name:
         return [_analysed(job) for job in batch]
-    if first.exists and (record := _existing(first)) is not None:
-        return [record]
-    files = [None if job.retention.summary else job.path for job in batch]
+    if first.exists:
+        with suppress(RailsimError):  # its file lacks required quantities: it is run again
+            return [finished_record(first.case, open_result(first.path), first.function)]
+    files = [job.path if job.keep else None for job in batch]
     found: list[Result | Exception]
     try:
         if len(batch) == 1:
-            only = _quantities(first)
-            result = run_case(first.case, files[0], overwrite=True, progress=progress, only=only)
-            found = [result]
+            # the quantities that the record needs; None for all
+            wants_all = first.function or first.case.analyses or first.picture or first.keep
+            only = None if wants_all else OF_FACTS
+            found = [run_case(first.case, files[0], overwrite=True, progress=progress, only=only)]
         else:
             cases = [job.case for job in batch]
             found = run_cases(cases, files, overwrite=True, progress=progress)
@@ -119,20 +126,6 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         found = [error] * len(batch)
     found.reverse()  # each result is released after its record: it holds data read from its file
     return [_record(job, found.pop()) for job in batch]
-
-
-def _quantities(job: Job) -> Collection[str] | None:
-    """Return the quantities that the record of a job needs; None for all."""
-    wants_all = job.function is not None or job.case.analyses or job.picture is not None
-    return None if wants_all or not job.retention.summary else OF_FACTS
-
-
-def _existing(job: Job) -> Record | None:
-    """Return the record of an existing run; None if its file lacks required quantities."""
-    try:
-        return finished_record(job.case, open_result(job.path), job.function)
-    except RailsimError:
-        return None
 
 
 def _analysed(job: Job) -> Record:
@@ -161,20 +154,33 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
 
             save(histories(outcome), job.picture, overwrite=True)
         record = finished_record(job.case, outcome, job.function)
-        return {**record, "file": job.retention.applied(job.path, outcome)}
+        return {**record, "file": _reduced(job, outcome)}
     except Exception as error:
         return failed_record(job.case, error)
 
 
+def _reduced(job: Job, result: Result) -> str:
+    """Reduce a result file to what is kept; return its name, empty without a file."""
+    if not job.keep:
+        job.path.unlink(missing_ok=True)  # kept by an earlier run
+        return ""
+    if job.keep != ("*",) or job.storage != PLAIN:
+        wanted = (*job.keep, *ALWAYS_KEPT)
+        names = [name for name in result if any(fnmatchcase(name, one) for one in wanted)]
+        write(result, job.path, overwrite=True, names=names, storage=job.storage)
+    return job.path.name
+
+
 def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:
     """Carry out batches one after the other."""
-    shares = _shares(batches)
-    for index, batch in enumerate(batches):
+    done = 0.0
+    for batch, share in zip(batches, _shares(batches), strict=True):
 
-        def share(fraction: float, index: int = index) -> None:
-            progress(sum(shares[:index]) + fraction * shares[index])
+        def tell(fraction: float, before: float = done, of: float = share) -> None:
+            progress(before + fraction * of)
 
-        yield from perform(batch, share)
+        yield from perform(batch, tell)
+        done += share
 
 
 def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> Iterator[Record]:
@@ -215,52 +221,46 @@ class _Pool:
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
         context: Any = worker_context()
         self._batches, self._indices = batches, indices
-        self._shares = _shares(batches)
         self._fractions = context.Array("d", len(batches), lock=False)
         self._holders = context.Array("l", len(batches), lock=False)  # process of each batch
         self._stop = context.Event()
         self._others = set(multiprocessing.active_children())
         self._processes: set[BaseProcess] = set()
-        self._index_of: dict[Future[list[Record]], int] = {}
+        self._running: dict[Future[list[Record]], int] = {}
         shared = self._fractions, self._holders, self._stop
         begun = (*shared, bool(logging.getLogger("railsim").handlers))
         self._pool = ProcessPoolExecutor(min(workers, len(indices)), context, _begin, begun)
         self.lost: set[int] = set()
 
-    def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
-        new = set()
+    def _submit(self, indices: Sequence[int]) -> None:
         with signals_later(), workers_begin():  # inherited by the processes
             for index in indices:
-                future = self._pool.submit(_work, index, self._batches[index])
-                self._index_of[future] = index
-                new.add(future)
+                self._running[self._pool.submit(_work, index, self._batches[index])] = index
             self._processes |= set(multiprocessing.active_children()) - self._others
-        return new
 
     def outcomes(self, progress: Progress) -> Iterator[tuple[int, list[Record]]]:
         """Yield index and records of every batch that ends."""
         first, rest = self._indices[0], list(self._indices[1:])
-        done: set[int] = set()
+        shares = _shares(self._batches)
         broken = False
         try:
-            waiting = self._submit([first])
-            if is_compiled():
-                waiting |= self._submit(rest)
-                rest = []
-            while waiting and not broken:
-                ended, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
-                progress(sum(self._fractions[i] * self._shares[i] for i in self._indices))
-                if rest and (ended or self._fractions[first] > 0.0):
-                    waiting |= self._submit(rest)
+            self._submit([first])
+            compiled = is_compiled()
+            while (rest or self._running) and not broken:
+                if rest and compiled:
+                    self._submit(rest)
                     rest = []
+                ended, _ = wait(self._running, timeout=POLL, return_when=FIRST_COMPLETED)
+                progress(sum(self._fractions[i] * shares[i] for i in self._indices))
+                compiled = bool(ended) or self._fractions[first] > 0.0
                 for future in ended:
-                    index = self._index_of[future]
+                    index = self._running[future]
                     try:
                         records = _outcome(future, self._batches[index])
                     except BrokenProcessPool:
                         broken = True
                         continue
-                    done.add(index)
+                    del self._running[future]
                     yield index, records
         except BrokenProcessPool:  # nothing more can be submitted
             broken = True
@@ -274,15 +274,15 @@ class _Pool:
             for folder in {job.path.parent for batch in self._batches for job in batch}:
                 sweep(folder)  # left by a process that was killed
         if broken:
-            self.lost = self._lost(done)
+            self.lost = self._lost()
 
-    def _lost(self, done: set[int]) -> set[int]:
+    def _lost(self) -> set[int]:
         """Return the batches of the process that died; the pool has terminated the others."""
         for process in self._processes:
             process.join(GRACE)
         ended = (None, 0, -signal.SIGTERM)
         dead = {process.pid for process in self._processes if process.exitcode not in ended}
-        begun = {i for i in self._indices if i not in done and self._holders[i]}
+        begun = {i for i in self._running.values() if self._holders[i]}
         return {i for i in begun if self._holders[i] in dead} or begun or {self._indices[0]}
 
 

@@ -1,11 +1,10 @@
 """What the geometry of a recorded track says by itself: EN 13848-5, and shapes of defects."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Flags, Integers, stretches
 from railsim.definitions import Track
 from railsim.definitions.excitations.recording import BANDS, band_passed
 from railsim.table import Column, Table
@@ -22,14 +21,6 @@ GEOMETRY = (
     (230.0, 1.2, 0.8, 9.0, 7.0),
     (300.0, 1.0, 0.7, 8.0, 6.0),
 )
-
-
-@dataclass(frozen=True)
-class Flags:
-    """Cells in which some vehicle exceeds the share of a limit, and over which some did not run."""
-
-    exceeded: NDArray[np.bool_]
-    unknown: NDArray[np.bool_]
 
 
 class RecordedGeometry:
@@ -57,21 +48,17 @@ class RecordedGeometry:
         name = max(sizes, key=lambda n: sizes[n])
         x = self.kinds[name]
         k = int(near[np.argmax(np.abs(x[near]))])
-        same = np.sign(x) == np.sign(x[k])
-        low, high = k, k
-        while low > 0 and same[low - 1]:
-            low -= 1
-        while high < len(x) - 1 and same[high + 1]:
-            high += 1
+        begin, end = next(at for at in stretches(np.sign(x) == np.sign(x[k])) if at[1] > k)
         crossings = np.count_nonzero(np.diff(np.sign(x[near])))
         repeated = ", repeated" if crossings >= 6 and sizes[name] < 4.0 else ""
-        length = STEP * (high - low + 1)
-        return f"{name} {1e3 * x[k]:+.1f} mm over {length:.1f} m{repeated}"
+        return f"{name} {1e3 * x[k]:+.1f} mm over {STEP * (end - begin):.1f} m{repeated}"
 
-    def sections(self, flags: Flags, speed: float) -> tuple[Table, NDArray[np.int64]]:
+    def sections(self, exceeded: Flags, unknown: Flags, speed: float) -> tuple[Table, Integers]:
         """Return the table of sections, and how many each of both flags.
 
-        The last section takes what is left, if that is less than half a section.
+        `exceeded`, `unknown`: cells in which some vehicle exceeds the share of a limit, and over
+        which some did not run; `speed`: the highest one [m/s]. The last section takes what is
+        left, if that is less than half a section.
         """
         row = next((row for row in GEOMETRY if 3.6 * speed <= row[0] + 1e-3), GEOMETRY[-1])
         columns: list[Column | str] = [
@@ -85,7 +72,7 @@ class RecordedGeometry:
         first, last = self.s[0], self.s[-1] + STEP
         edges = first + SECTION * np.arange(max(1, round((last - first) / SECTION)) + 1)
         edges[-1] = last
-        cells = first + CELL * np.arange(len(flags.exceeded))
+        cells = first + CELL * np.arange(len(exceeded))
         for begin, end in pairwise(edges.tolist()):
             there = self.rails[:, (self.s >= begin) & (self.s < end)]
             deviations, peaks = there.std(axis=1), np.abs(there).max(axis=1)
@@ -93,10 +80,10 @@ class RecordedGeometry:
                       max(peaks[1], peaks[3]), max(peaks[0], peaks[2])]  # fmt: skip
             by_geometry = any(1e3 * v > m for v, m in zip(values, row[1:], strict=True))
             inside = (cells >= begin - 1e-6) & (cells < end - 1e-6)
-            by_vehicles = bool(flags.exceeded[inside].any())
+            by_vehicles = bool(exceeded[inside].any())
             both = (0 if by_geometry else 1) if by_vehicles else (2 if by_geometry else 3)
-            unknown = not by_vehicles and bool(flags.unknown[inside].any())
-            flagged[4 if unknown else both] += 1
+            not_run = not by_vehicles and bool(unknown[inside].any())
+            flagged[4 if not_run else both] += 1
             rows.append([begin, end, *map(float, values), "flagged" if by_geometry else "",
-                         "not run" if unknown else "flagged" if by_vehicles else ""])  # fmt: skip
+                         "not run" if not_run else "flagged" if by_vehicles else ""])  # fmt: skip
         return Table(columns, rows), flagged

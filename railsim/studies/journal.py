@@ -13,10 +13,10 @@ Opening 100 000 runs reads the heads only; a record is read on access.
 import json
 import os
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Self, overload
+from typing import Any, BinaryIO, NamedTuple, Self, overload
 
 from railsim.errors import argument_error, input_error
 from railsim.files.access import locked
@@ -34,7 +34,7 @@ class Entry(NamedTuple):
     """Data of a run that are available without reading its record.
 
     `name`, `status`: name of the run, and how it ended: as in its result, or ``failed``; `key`:
-    hash of the inputs of the run, see `railsim.studies.points`; `size`, `changed`: size of its
+    hash of the inputs of the run, see `railsim.studies.plan`; `size`, `changed`: size of its
     result file [bytes] and time of its last change [ns]; 0 without a file; `offset`, `length`:
     position and length of its record in the journal [bytes].
     """
@@ -54,8 +54,12 @@ class Entry(NamedTuple):
 
     def is_of(self, file: os.stat_result | None) -> bool:
         """Whether a file is unchanged since the run ended."""
-        found = (0, 0) if file is None else (file.st_size, file.st_mtime_ns)
-        return found == (self.size, self.changed)
+        return size_and_time(file) == (self.size, self.changed)
+
+
+def size_and_time(file: os.stat_result | None) -> tuple[int, int]:
+    """Return size [bytes] and time of the last change [ns] of a file; 0 without one."""
+    return (0, 0) if file is None else (file.st_size, file.st_mtime_ns)
 
 
 class Journal:
@@ -124,20 +128,14 @@ class Journal:
             self._line({"format": FORMAT}, json_bytes(inputs))
             self.inputs = inputs
 
-    def add(self, record: Record, key: str, file: os.stat_result | None) -> Entry:
+    def add(self, record: Record, key: str, file: os.stat_result | None) -> None:
         """Append the record of a run; it is on disk when the function returns."""
-        facts = {
-            "name": record["name"],
-            "status": record["status"],
-            "key": key,
-            "size": 0 if file is None else file.st_size,
-            "changed": 0 if file is None else file.st_mtime_ns,
-        }
+        size, changed = size_and_time(file)
+        facts: dict[str, Any] = {"name": record["name"], "status": record["status"], "key": key}
+        facts |= {"size": size, "changed": changed}
         body = json_bytes(record)
-        offset = self._line(facts, body)
-        entry = Entry(**facts, offset=offset, length=len(body))
+        entry = Entry(**facts, offset=self._line(facts, body), length=len(body))
         self.entries[entry.name] = entry
-        return entry
 
     def _line(self, head: Mapping[str, Any], body: bytes) -> int:
         text = json_bytes(head) + b"\t" + body
@@ -190,45 +188,37 @@ class Records(Sequence[Record]):
     def __getitem__(self, index: slice) -> list[Record]: ...
     def __getitem__(self, index: int | slice) -> Record | list[Record]:
         if isinstance(index, slice):
-            return list(self._read(self._entries[index]))
-        return next(self._read([self._entries[index]]))
+            return [record for record, _ in self._read(self._entries[index])]
+        return next(self._read([self._entries[index]]))[0]
 
     def __iter__(self) -> Iterator[Record]:
-        return self._read(self._entries)
+        return (record for record, _ in self._read(self._entries))
 
-    def with_status(self, *statuses: str, but: Sequence[str] = ()) -> tuple[Record, ...]:
-        """Return the records of runs that ended in one of `statuses`, or in none of `but`."""
+    def where(self, chosen: Callable[[str], bool]) -> tuple[Record, ...]:
+        """Return the records of runs of a chosen status."""
         found = []
         for entry in self._entries:
-            status = entry.status if isinstance(entry, Entry) else entry["status"]
-            if status in statuses or (but and status not in but):
+            if chosen(entry.status if isinstance(entry, Entry) else entry["status"]):
                 found.append(entry)
-        return tuple(self._read(found))
+        return tuple(record for record, _ in self._read(found))
 
     def with_texts(self) -> Iterator[tuple[Record, bytes]]:
         """Yield every record and its JSON."""
-        for entry, text in zip(self._entries, self._texts(self._entries), strict=True):
-            yield self._record(entry, text), text
+        return self._read(self._entries)
 
-    def _read(self, entries: Sequence[Entry | Record]) -> Iterator[Record]:
-        for entry, text in zip(entries, self._texts(entries), strict=True):
-            yield self._record(entry, text)
-
-    def _texts(self, entries: Sequence[Entry | Record]) -> Iterator[bytes]:
-        if not any(isinstance(entry, Entry) for entry in entries):
-            yield from map(json_bytes, entries)
-            return
-        with open(self._path, "rb") as file:
+    def _read(self, entries: Sequence[Entry | Record]) -> Iterator[tuple[Record, bytes]]:
+        with ExitStack() as stack:
+            file: BinaryIO | None = None
             for entry in entries:
                 if isinstance(entry, Entry):
+                    file = file or stack.enter_context(open(self._path, "rb"))
                     file.seek(entry.offset)
-                    yield file.read(entry.length)
+                    text = file.read(entry.length)
+                    yield self._record(entry, text), text
                 else:
-                    yield json_bytes(entry)
+                    yield dict(entry), json_bytes(entry)
 
-    def _record(self, entry: Entry | Record, text: bytes) -> Record:
-        if isinstance(entry, dict):
-            return dict(entry)
+    def _record(self, entry: Entry, text: bytes) -> Record:
         try:
             record: Record = json.loads(text)
             if not record.keys() >= RECORD or not isinstance(record["labels"], dict):

@@ -34,7 +34,7 @@ from railsim.studies.designs import (
     values_by_name,
     with_unit,
 )
-from railsim.studies.points import ROUGH_DURATION, check_number
+from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.records import finite
 from railsim.studies.search import Task, hypervolume, knee, non_dominated, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
@@ -69,8 +69,8 @@ class Optimisation:
     chosen: Design | None
     active: tuple[str, ...]
     sensitivities: tuple[Sensitivity, ...]
-    vehicles: tuple[Path, ...] = ()
-    computed: int = 0
+    vehicles: tuple[Path, ...]
+    computed: int
 
     def hypervolume(self, reference: Sequence[float]) -> float:
         """Return the volume between the front and a reference point, in SI of all objectives."""
@@ -178,8 +178,8 @@ def optimise(
         raise input_error(str(file), "missing", "needed: variables and objectives", key="optimise")
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
     replaced = {name: value for name, value in changes.items() if value is not None}
-    wanted = _changed(definition.optimise, replaced)
-    runs = (range(wanted.evaluations), range(definition.runs))
+    wanted = checked(Optimise, definition.optimise.model_dump() | replaced, "optimise")
+    runs = wanted.evaluations * definition.runs
     check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
     folder = Path(out)
     check_folder(folder)
@@ -211,10 +211,6 @@ def optimise(
     return _concluded(evaluation, choose)
 
 
-def _changed(wanted: Optimise, changes: Mapping[str, Any]) -> Optimise:
-    return checked(Optimise, {**wanted.model_dump(), **changes}, "optimise")
-
-
 def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: bool) -> None:
     """Refuse a folder with another optimisation; record this one."""
     assert definition.optimise is not None
@@ -227,8 +223,7 @@ def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: b
         allowed = (
             "`resume` uses what is still valid, `overwrite` computes everything; or another `out`"
         )
-        found = "holds another optimisation"
-        raise argument_error("out", found, allowed, key=str(folder))
+        raise argument_error("out", "holds another optimisation", allowed, key=str(folder))
     make_folder(folder)
     write_text(path, text)
 
@@ -250,7 +245,6 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         if not 1 <= choose <= len(designs):
             raise argument_error("choose", f"design {choose}", f"1 to {len(designs)}")
         chosen = designs[choose - 1]
-    names = [name_of(one) for one in (*wanted.objectives, *wanted.constraints)]
     found = Optimisation(
         evaluation.folder,
         wanted,
@@ -258,7 +252,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         tuple(front),
         chosen,
         _active(wanted, chosen) if chosen else (),
-        tuple(_sensitivities(evaluation, chosen, names)) if chosen else (),
+        tuple(_sensitivities(evaluation, chosen)) if chosen else (),
         tuple(export_vehicles(evaluation, chosen)) if chosen else (),
         evaluation.computed,
     )
@@ -266,15 +260,18 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
     return found
 
 
-def _sensitivities(
-    evaluation: Evaluation, chosen: Design, names: list[str]
-) -> Sequence[Sensitivity]:
-    shares = evaluation.shares()
-    values = np.array([(*design.objectives, *design.constraints) for design in evaluation.designs])
-    paths = [path for path, _ in evaluation.variables]
+def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivity]:
+    wanted = evaluation.wanted
+    names = [name_of(one) for one in (*wanted.objectives, *wanted.constraints)]
+    variables = wanted.variables.items()
+    shares = np.array(
+        [[share_of(v, d.variables[path]) for path, v in variables] for d in evaluation.designs]
+    )  # designs as points of the unit cube
+    values = np.array([design.values for design in evaluation.designs])
     unique = list(dict.fromkeys(names))
-    columns = [names.index(name) for name in unique]
-    return sensitivities(shares, values[:, columns], shares[chosen.number - 1], paths, unique)
+    values = values[:, [names.index(name) for name in unique]]
+    middle = shares[chosen.number - 1]
+    return sensitivities(shares, values, middle, list(wanted.variables), unique)
 
 
 def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
@@ -326,13 +323,10 @@ def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
         texts += [f"{key}={text}" for key in (path, *variable.also)]
     overrides = split_overrides(texts)["vehicle"]
     wanted = evaluation.wanted
+    ones = (*wanted.objectives, *wanted.constraints)
     values = [
         f"# {name_of(one)}: {value:.6g} {unit_of(one.quantity)}".rstrip()
-        for one, value in zip(
-            (*wanted.objectives, *wanted.constraints),
-            (*chosen.objectives, *chosen.constraints),
-            strict=True,
-        )
+        for one, value in zip(ones, chosen.values, strict=True)
     ]
     found = []
     for vehicle in evaluation.definition.vehicles:
@@ -367,8 +361,7 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
         "name": f"{base.data.get('name', vehicle)}, optimised",
         "extends": named,
     }
-    text: str = tomli_w.dumps({**head, **_difference(base.data, changed)})
-    return text
+    return str(tomli_w.dumps({**head, **_difference(base.data, changed)}))
 
 
 def _difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
@@ -384,8 +377,11 @@ def _difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str
         old = before.get(key)
         if value == old:
             continue
+        if (
+            isinstance(value, dict)
+            and isinstance(old, dict)
+            and value.get("kind") == old.get("kind")
+        ):
+            value = _difference(old, value)
         found[key] = value
-        if isinstance(value, dict) and isinstance(old, dict):
-            alike = value.get("kind") == old.get("kind")
-            found[key] = _difference(old, value) if alike else value
     return found

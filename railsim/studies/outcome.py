@@ -38,12 +38,12 @@ class Outcome:
     @property
     def failed(self) -> tuple[Record, ...]:
         """Runs without a result."""
-        return self.records.with_status("failed")
+        return self.records.where(lambda status: status == "failed")
 
     @property
     def ended_early(self) -> tuple[Record, ...]:
         """Runs that ended early for a physical reason."""
-        return self.records.with_status(but=("complete", "failed"))
+        return self.records.where(lambda status: status not in ("complete", "failed"))
 
     def results(self) -> dict[str, Result]:
         """Return the results by the names of their runs; arrays are read on access."""

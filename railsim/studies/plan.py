@@ -1,25 +1,59 @@
-"""`Plan`: from the inputs of a study to its points and cases; all faults are reported together."""
+"""`Plan`: from the inputs of a study to its points and cases; all faults are reported together.
 
+When a study of a hundred thousand runs is continued, its finished runs must be found at once.  The
+key of a point is a hash of the texts that define the run: contents of the vehicle, track and
+settings files and of all files that they name, assignments, speed, start and end.  Definitions are
+loaded and checked for the runs that are to be computed.
+"""
+
+import hashlib
+import json
 import math
 import os
 import re
+import tomllib
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import needs_run
 from railsim.definitions.study.definition import value_texts
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
-from railsim.studies.case import Case, Loader, run_labels, run_name
-from railsim.studies.points import Fingerprints, Point, check_number, point_key
+from railsim.files import sources
+from railsim.files.access import TABLE_BYTES, is_file, read_bytes
+from railsim.studies.case import Case, Loader, Overrides, run_labels, run_name
 from railsim.studies.rows import PERMITTED, Row, made_rows
 from railsim.studies.spec import RunSpec, StudySpec
 from railsim.studies.user_function import fingerprint
-from railsim.units import ALLOWED
+from railsim.units import ALLOWED, duration_in_words
+from railsim.version import __version__
 
 LONGEST_NAME = 250  # bytes of a file name with its ending; file systems allow 255
+MOST_RUNS = 200_000
+ROUGH_DURATION = 60.0  # s; simulated time of a run that has not been looked at
+# what a run takes at a rough guess: simulated seconds per second of one core, and seconds besides
+REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Inputs of one run, before its definitions are loaded.
+
+    `name`: name of the run; `run`: the run, with its speed at the start; `labels`: labels of the
+    run; `key`: hash of all inputs; empty if a file cannot be read; `has_run`: whether a run in the
+    time domain belongs to it, with a result file.
+    """
+
+    name: str
+    run: RunSpec
+    labels: Mapping[str, str | float]
+    key: str
+    has_run: bool = True
 
 
 class Plan:
@@ -36,61 +70,49 @@ class Plan:
             raise input_error("study", "no combination", "give a vehicle, a track, a speed")
         self._spec = spec
         self._loader = Loader({*spec.grid, *(k for t in spec.linked for k in t)}, spec.analyses)
-        self._fingerprint = Fingerprints()
+        self._fingerprints = Fingerprints()
         # what the record of a run depends on besides the run
         self._further = [f"told {told}"] if (told := fingerprint(spec.quantities)) else []
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
         linked = [next(iter(table.values())) for table in spec.linked]
         lists: list[Sequence[object]] = [
-            spec.vehicles,
-            spec.tracks,
-            spec.speeds,
+            *(spec.vehicles, spec.tracks, spec.speeds),
             *spec.grid.values(),
             *linked,
         ]
-        number = range(spec.sample.number if spec.sample else 1)
-        check_number([*lists, number], workers, self._simulated_time)
+        number = math.prod(map(len, lists)) * (spec.sample.number if spec.sample else 1)
+        check_number(number, workers, self._simulated_time)
         self._loader.overrides(tuple(spec.assignments))  # its faults come first
         rows = made_rows(spec.grid, spec.linked, spec.sample)
         assigned = [
             (*spec.assignments, *(f"{key}={value}" for key, value in row.values.items()))
             for row in rows
         ]
+        shared = spec.settings, spec.start, spec.duration, spec.until
         self.points: list[Point] = []
         for vehicle, track, speed in product(spec.vehicles, spec.tracks, spec.speeds):
             for row, assignments in zip(rows, assigned, strict=True):
                 wanted = speed if row.speed is None else row.speed
-                run = RunSpec(
-                    vehicle,
-                    track,
-                    None if isinstance(wanted, str) else wanted,
-                    spec.settings,
-                    spec.start,
-                    spec.duration,
-                    spec.until,
-                    assignments,
-                )
+                given = None if isinstance(wanted, str) else wanted
+                run = RunSpec(vehicle, track, given, *shared, assignments)
                 permitted = isinstance(wanted, str)
                 first = self._permitted(run) if permitted else self._loader.first_speed(run)
                 self.points.append(self._point(replace(run, speed=first), row))
 
     def _point(self, run: RunSpec, row: Row) -> Point:
         overrides = self._loader.overrides(run.assignments)
-        key = point_key(
-            *(
-                self._fingerprint(kind, getattr(run, kind), some)
-                for kind, some in overrides.items()
-            ),
-            run.speed,
-            run.start,
-            run.duration,
-            run.until,
-            *self._further,
+        parts = [
+            self._fingerprints.of(kind, getattr(run, kind), some)
+            for kind, some in overrides.items()
+        ]
+        inputs = (*parts, run.speed, run.start, run.duration, run.until, *self._further)
+        return Point(
+            run_name(run) + row.suffix,
+            run,
+            {**run_labels(run), **row.values},
+            "" if "" in parts else _hashed([__version__, *map(repr, inputs)]),
+            needs_run(self._spec.analyses),
         )
-        speed = run.speed
-        name = run_name(run.vehicle, run.track, 0.0 if speed is None else speed) + row.suffix
-        labels = run_labels(run.vehicle, run.track, math.nan if speed is None else speed)
-        return Point(name, run, {**labels, **row.values}, key, needs_run(self._spec.analyses))
 
     def cases(self, points: Sequence[Point] | None = None) -> list[Case]:
         """Load the inputs of the runs of some points, by default of all.
@@ -99,9 +121,8 @@ class Plan:
         """
         wanted = self.points if points is None else points
         found = [self._loader.case(point.name, point.run, point.labels) for point in wanted]
-        self._loader.raise_faults()
-        self._loader.report(name_faults(self.points))
-        self._loader.raise_faults()
+        self._loader.check()
+        check_names(self.points)
         return [case for case in found if case is not None]
 
     def _permitted(self, run: RunSpec) -> float | None:
@@ -109,14 +130,13 @@ class Plan:
         vehicle, track = (self._loader.definition(kind, run) for kind in ("vehicle", "track"))
         if vehicle is None or track is None:
             return None  # already reported
-        allowed = f"needed for the speed '{PERMITTED}'"
-        missing = []
+        allowed, missing = f"needed for the speed '{PERMITTED}'", Faults()
         if vehicle.service is None:
-            fault = Fault(str(run.vehicle), "service.admissible_speed", "missing", allowed)
-            missing.append(fault)
+            key = "service.admissible_speed"
+            missing.append(Fault(str(run.vehicle), key, "missing", allowed))
         if track.speed is None:
             missing.append(Fault(str(run.track), "speed", "missing", allowed))
-        self._loader.report(missing)
+        self._loader.faults += missing
         return None if missing else float(min(vehicle.service.admissible_speed, track.speed))
 
     def _simulated_time(self) -> float:
@@ -132,35 +152,98 @@ class Plan:
         return max(0.0, length - spec.start) / max(first, 0.5)
 
 
-class Cases:
-    """Loaded cases in the form that `carry_out` takes."""
+class Fingerprints:
+    """Hashes of files with assignments; each file is read once."""
 
-    def __init__(self, cases: Sequence[Case]) -> None:
-        self._cases = {case.name: case for case in cases}
-        self.points = [
-            Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
-            for c in cases
-        ]
-        Faults(name_faults(self.points)).check()
+    def __init__(self) -> None:
+        self.of = cache(self._with_overrides)
+        self._base = cache(self._of_file)
+        self._content = cache(_content_hash)
 
-    def cases(self, points: Sequence[Point]) -> list[Case]:
-        """Return the cases of some points."""
-        return [self._cases[point.name] for point in points]
+    def _with_overrides(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
+        """Return the hash of a file with assignments; empty if it cannot be read."""
+        base = self._base(kind, path)
+        if not base:
+            return ""
+        named = [self._content(name) for text in overrides for name in _named_files(text)]
+        return _hashed([base, *overrides, *named])
+
+    def _of_file(self, kind: str, path: str | Path | None) -> str:
+        if path is None:
+            return "defaults"
+        try:
+            data = sources.read_source(sources.find_file(path, kind), kind).data
+        except InputError:
+            return ""
+        text = json.dumps(data, sort_keys=True, default=str)
+        return _hashed([text, *(self._content(name) for name in _file_names(data))])
 
 
-def name_faults(points: Sequence[Point]) -> list[Fault]:
-    """Return the faults of the names of runs: equal names, or names too long for a file."""
+def _hashed(parts: Sequence[str]) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _content_hash(name: str) -> str:
+    try:
+        return hashlib.sha256(read_bytes(name, TABLE_BYTES)).hexdigest()
+    except InputError:
+        return "unreadable"
+
+
+def _file_names(node: Any, of_file: bool = False) -> Iterator[str]:
+    """Yield what stands under keys that name files, where it is a file."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _file_names(value, key in sources.FILE_KEYS)
+    elif isinstance(node, list):
+        for value in node:
+            yield from _file_names(value, of_file)
+    elif of_file and isinstance(node, str) and is_file(node):
+        yield node
+
+
+def _named_files(assignment: str) -> Iterator[str]:
+    """Yield the files that an assignment names."""
+    key, _, written = assignment.partition("=")
+    if not sources.FILE_KEYS & set(key.strip().split(".")):
+        return
+    try:
+        value: Any = tomllib.loads(f"v = {written}")["v"]
+    except (ValueError, RecursionError):
+        value = written.strip()
+    yield from _file_names(value, of_file=True)
+
+
+def check_number(number: int, cores: int, seconds: Callable[[], float]) -> None:
+    """Refuse a study whose number of runs must be a mistake.
+
+    `cores`: number of processes; `seconds`: returns an estimate of the simulated time of a run [s];
+    called if there are too many runs. Raises InputError: the number is above `MOST_RUNS`; the
+    message gives the time needed.
+    """
+    if number <= MOST_RUNS:
+        return
+    each = seconds() / REAL_TIME_FACTOR + SECONDS_BESIDES
+    found = f"{number:,} runs, some {duration_in_words(number * each / cores)} on {cores} cores"
+    raise input_error("study", found, f"at most {MOST_RUNS:,}; give fewer values")
+
+
+def check_names(points: Sequence[Point]) -> None:
+    """Refuse names of runs that are equal, or too long for a file.
+
+    Raises InputError: all of them.
+    """
     counts = Counter(point.name for point in points)
-    faults = [
+    faults = Faults(
         Fault("study", name, f"{count} runs of this name", "give files with different names")
         for name, count in counts.items()
         if count > 1
-    ]
+    )
     longest = max(counts, key=lambda name: len(os.fsencode(name)))
     if len(os.fsencode(longest)) + len(".h5") > LONGEST_NAME:
         found = f"the name of a run has {len(os.fsencode(longest))} bytes"
         faults.append(Fault("study", f"{longest[:60]}...", found, "shorter names of files"))
-    return faults
+    faults.check()
 
 
 def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:

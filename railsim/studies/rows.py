@@ -28,7 +28,7 @@ class Row:
     speed: float | None = None
 
 
-def made_rows(grid: Grid, linked: Sequence[Grid] = (), sample: Sample | None = None) -> list[Row]:
+def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list[Row]:
     """Return all combinations: the grid outermost, then linked keys, then the sample."""
     combined = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     for table in linked:
@@ -36,37 +36,32 @@ def made_rows(grid: Grid, linked: Sequence[Grid] = (), sample: Sample | None = N
             dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)
         ]
         combined = [{**row, **more} for row in combined for more in together]
-    if sample is None:
-        return [_row(values, suffix(_without_speed(values))) for values in combined]
-    members = sampled(sample)
-    width = len(str(len(members)))
-    return [
-        _row({**row, **values}, f"{suffix(_without_speed(row))}_sample={number:0{width}d}")
-        for row in combined
-        for number, values in enumerate(members, start=1)
-    ]
-
-
-def _without_speed(values: Mapping[str, str]) -> dict[str, str]:
-    return {key: value for key, value in values.items() if key != SPEED}
-
-
-def _row(values: Mapping[str, str], name: str) -> Row:
-    speed = speed_of(values[SPEED]) if SPEED in values else None
-    return Row(_without_speed(values), name, speed)
+    members = [("", dict[str, str]())]
+    if sample is not None:
+        drawn = sampled(sample)
+        width = len(str(len(drawn)))
+        members = [(f"_sample={n:0{width}d}", values) for n, values in enumerate(drawn, start=1)]
+    rows = []
+    for row in combined:
+        name = suffix({key: value for key, value in row.items() if key != SPEED})
+        for ending, drawn_values in members:
+            values = {**row, **drawn_values}
+            speed = values.pop(SPEED, None)
+            rows.append(Row(values, name + ending, None if speed is None else speed_of(speed)))
+    return rows
 
 
 SPEEDS = "such as 20 or 72km/h"
 
 
-def speed_of(text: str, option: str = "speeds") -> float:
+def speed_of(text: str) -> float:
     """Return the speed of a text, which may have a unit [m/s].
 
     Raises InputError: the text is not a number.
     """
     found = speed_in_si(text)
     if isinstance(found, str):
-        raise argument_error(option, f"'{text}' is not a speed", SPEEDS)
+        raise argument_error("speeds", f"'{text}' is not a speed", SPEEDS)
     return float(found)
 
 

@@ -15,8 +15,8 @@ def run_case(
     case: Case,
     path: str | Path | None,
     *,
-    overwrite: bool = False,
-    progress: Callable[[float], None] | None = None,
+    overwrite: bool,
+    progress: Callable[[float], None] | None,
     resume: Result | None = None,
     only: Collection[str] | None = None,
 ) -> Result:
@@ -34,16 +34,7 @@ def run_case(
         facts["continues"] = str(resume.attributes.get("run", "another run"))
     with _sink(path, overwrite, facts, only) as sink:
         return simulate(
-            case.vehicle,
-            case.track,
-            speed=case.speed,
-            start=case.start,
-            duration=case.duration,
-            until=case.until,
-            settings=case.settings,
-            sink=sink,
-            progress=progress,
-            resume=resume,
+            case.vehicle, case.track, **case.conditions, sink=sink, progress=progress, resume=resume
         )
 
 
@@ -60,12 +51,7 @@ def _sink(
 
 def can_share_a_call(one: Case, other: Case) -> bool:
     """Whether two cases differ only in the vehicle."""
-    return (
-        one.track == other.track
-        and one.settings == other.settings
-        and (one.speed, one.start, one.duration, one.until)
-        == (other.speed, other.start, other.duration, other.until)
-    )
+    return one.track == other.track and one.conditions == other.conditions
 
 
 def run_cases(
@@ -81,7 +67,6 @@ def run_cases(
     """
     found: dict[int, Result | Exception] = {}
     sinks: dict[int, Hdf5Sink | MemorySink] = {}
-    first = cases[0]
     with ExitStack() as stack:
         for number, (case, path) in enumerate(zip(cases, paths, strict=True)):
             facts = {"run": case.name, "inputs_hash": case.key}
@@ -94,12 +79,8 @@ def run_cases(
                 sinks[number] = sink
         done = outcomes(
             [cases[number].vehicle for number in sinks],
-            first.track,
-            speed=first.speed,
-            start=first.start,
-            duration=first.duration,
-            until=first.until,
-            settings=first.settings,
+            cases[0].track,
+            **cases[0].conditions,
             sinks=list(sinks.values()),
             progress=progress,
         )

@@ -12,9 +12,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Flags, Floats
 from railsim.errors import input_error
 
 CANDIDATES = 512  # candidates for a batch, from Sobol's sequence
@@ -32,7 +31,7 @@ class Values:
     constraints: Floats
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
+    def feasible(self) -> Flags:
         """Whether each design has values and meets all constraints."""
         known = np.isfinite(self.objectives).all(axis=1)
         within = (self.constraints <= 0.0).all(axis=1)
@@ -109,9 +108,9 @@ def _promising(designs: Floats, values: Values, size: int, rng: np.random.Genera
     m = values.objectives.shape[1]
     objectives, constraints = predicted[:, :m], predicted[:, m:]
     # if no design is feasible, the smallest violation comes first
-    excess = np.maximum(constraints, 0.0).sum(axis=1) if constraints.shape[1] else None
-    allowed = np.ones(len(points), bool) if excess is None else excess <= 0.0
-    if excess is not None and not allowed.any():
+    excess = np.maximum(constraints, 0.0).sum(axis=1)
+    allowed = excess <= 0.0
+    if not allowed.any():
         allowed = excess <= np.quantile(excess, 0.02)
     front = values.objectives[feasible]
     chosen: list[int] = []
@@ -181,7 +180,7 @@ class Surrogate:
     def __init__(self, designs: Floats, values: Floats) -> None:
         from scipy.interpolate import RBFInterpolator
 
-        worst = np.nanmax(np.where(np.isnan(values), -np.inf, values), axis=0)
+        worst = np.max(values, axis=0, where=~np.isnan(values), initial=-np.inf)
         filled = np.where(np.isnan(values), np.where(np.isfinite(worst), worst, 0.0), values)
         self._middle, spread = filled.mean(axis=0), filled.std(axis=0)
         self._spread = np.where(spread > 0.0, spread, 1.0)
@@ -225,10 +224,9 @@ def _nsga2(task: Task) -> None:
         if asked is None or not len(asked):
             return
         values = task.evaluate(asked.get("X"))
-        objectives, constraints = values.objectives, values.constraints
-        asked.set("F", _without_nan(objectives)[-len(asked) :])
+        asked.set("F", _without_nan(values.objectives)[-len(asked) :])
         if task.constraints:
-            asked.set("G", _without_nan(constraints)[-len(asked) :])
+            asked.set("G", _without_nan(values.constraints)[-len(asked) :])
         algorithm.tell(infills=asked)
 
 
@@ -274,7 +272,7 @@ METHODS: dict[str, Callable[[Task], None]] = {
 }
 
 
-def non_dominated(values: Floats) -> NDArray[np.bool_]:
+def non_dominated(values: Floats) -> Flags:
     """Return which rows are not dominated: no other is as small in all columns, smaller in one.
 
     Of equal rows only the first is non-dominated; rows with NaN are dominated.

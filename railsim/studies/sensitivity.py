@@ -55,6 +55,10 @@ def sensitivities(
     from scipy.stats import sobol_indices, uniform
 
     count = len(variables)
+
+    def named(values: Floats) -> dict[str, float]:
+        return dict(zip(variables, values.tolist(), strict=True))
+
     known = ~np.isnan(values).any(axis=1)
     if known.sum() < count + 2:
         return []
@@ -62,7 +66,7 @@ def sensitivities(
     ends = np.repeat(chosen[None], 2 * count, axis=0)
     ends[np.arange(count), np.arange(count)] = 0.0
     ends[count + np.arange(count), np.arange(count)] = 1.0
-    moved = model(ends)
+    low, high = np.split(model(ends), 2)
     spread = np.ptp(values[known], axis=0)
     # a quantity that does not vary has no variance to explain
     varied = np.flatnonzero(spread > 1e-12 * np.abs(values[known]).max(axis=0))
@@ -81,15 +85,11 @@ def sensitivities(
     return [
         Sensitivity(
             quantity,
-            _named(variables, moved[:count, k]),
-            _named(variables, moved[count:, k]),
-            _named(variables, first[k]),
-            _named(variables, total[k]),
+            named(low[:, k]),
+            named(high[:, k]),
+            named(first[k]),
+            named(total[k]),
             float(errors[k]),
         )
         for k, quantity in enumerate(quantities)
     ]
-
-
-def _named(names: list[str], values: Floats) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(names, values, strict=True)}

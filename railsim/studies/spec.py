@@ -6,6 +6,7 @@ The command line, Python's keyword arguments and study files make them; the jour
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -15,7 +16,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, Va
 from railsim.definitions.base import Name
 from railsim.definitions.study.analyses import Analysis
 from railsim.definitions.study.definition import Sample, Study, value_texts
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import Fault, InputError, argument_fault, input_error, nearest
+from railsim.notation import QUANTITIES, REQUESTED
 from railsim.studies.rows import PERMITTED, speed_of
 from railsim.units import ALLOWED
 from railsim.version import __version__
@@ -100,7 +102,7 @@ class StudySpec(BaseModel):
     depends on them; `folder`: folder that relative file names refer to, from the folder of the
     study; `scenario`: scenario of a campaign, which has tracks and speeds of its own; `quantities`:
     ``FILE.py:FUNCTION``, see `railsim.studies.user_function`; `keep`, `compress`, `single`: parts
-    of each result that are kept, see `railsim.studies.retention`.
+    of each result that are kept, see `kept_quantities`, and how they are stored.
     """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
@@ -164,6 +166,27 @@ class Execution:
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None
+
+
+def kept_quantities(keep: str) -> tuple[str, ...]:
+    """Return the quantities of each result that a study keeps, with ``*`` for any characters.
+
+    `keep`: ``all``; ``summary``, which keeps no file: none; or quantities separated by commas.
+    Raises InputError: an unknown quantity.
+    """
+    if keep in ("all", "summary"):
+        return ("*",) if keep == "all" else ()
+    names = tuple(name.strip() for name in keep.split(",") if name.strip())
+    known = [*QUANTITIES, *REQUESTED]
+    wrong = [name for name in names if not any(fnmatchcase(one, name) for one in known)]
+    if wrong or not names:
+        raise InputError(
+            argument_fault(
+                "keep", name, "no such quantity", nearest(name, ["all", "summary", *known])
+            )
+            for name in wrong or [keep]
+        )
+    return names
 
 
 def checked(model: type[M], data: Any, file: str) -> M:

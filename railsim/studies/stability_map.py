@@ -6,10 +6,8 @@ command continues an interrupted map.  A damaged point is computed again.
 
 import hashlib
 import json
-import logging
 import multiprocessing
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,15 +18,13 @@ import numpy as np
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import InputError, RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
-from railsim.processes import workers_begin
+from railsim.processes import available_cores, workers_begin
 from railsim.stability.critical_speed import critical_speed
 from railsim.studies.records import Record, read_record, write_record
 from railsim.table import Column, Table
 from railsim.version import __version__
 
 Progress = Callable[[float], None]
-
-_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -49,51 +45,51 @@ def stability_map(
     points: Sequence[MapPoint],
     options: dict[str, Any],
     *,
-    folder: Path | None = None,
-    workers: int | None = None,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-    on_remark: Callable[[str], None] | None = None,
+    folder: Path | None,
+    workers: int | None,
+    overwrite: bool,
+    progress: Progress,
+    on_remark: Callable[[str], None],
 ) -> list[Record]:
     """Return the record of `critical_speed` at each point, in their order.
 
-    `options`: further arguments of `critical_speed`; `folder`: folder for finished points;
-    `workers`: processes; by default one for each core; `overwrite`: compute everything again;
+    `options`: further arguments of `critical_speed`; `folder`: folder for finished points, if any;
+    `workers`: processes; None: one for each core; `overwrite`: compute everything again;
     `progress`: called repeatedly with the finished fraction; `on_remark`: called with a sentence on
-    every stored point that is damaged and computed again; by default these sentences are logged.
+    every stored point that is damaged and computed again.
     """
-    jobs = [(point, options) for point in points]
-    paths = [_stored_path(folder, job) for job in jobs]
+    paths = [_stored_path(folder, point, options) for point in points]
     found: dict[int, Record] = {}
     for number, path in enumerate(paths):
         if path is not None and path.exists() and not overwrite:
             try:
                 found[number] = read_record(path)
             except InputError as error:
-                (on_remark or _LOG.warning)(f"{error.faults[0]}: it is computed again")
-    tell = progress or (lambda _: None)
-    tell(len(found) / len(jobs))
-    waiting = [number for number in range(len(jobs)) if number not in found]
-    count = min(workers or os.cpu_count() or 1, max(1, len(waiting)))
-    for number, record in _computed(jobs, waiting, count):
+                on_remark(f"{error.faults[0]}: it is computed again")
+    progress(len(found) / len(points))
+    waiting = {number: point for number, point in enumerate(points) if number not in found}
+    count = min(workers or available_cores(), max(1, len(waiting)))
+    for number, record in _computed(waiting, options, count):
         found[number] = record
         path = paths[number]
         if path is not None:
             write_record(path, record)
-        tell(len(found) / len(jobs))
-    return [found[number] for number in range(len(jobs))]
+        progress(len(found) / len(points))
+    return [found[number] for number in range(len(points))]
 
 
-def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
-    """Yield number and record of each waiting job as it ends."""
+def _computed(
+    waiting: Mapping[int, MapPoint], options: dict[str, Any], workers: int
+) -> Iterator[tuple[int, Record]]:
+    """Yield number and record of each point as it ends."""
     if workers == 1:
-        for number in waiting:
-            yield number, point_record(*jobs[number])
+        for number, point in waiting.items():
+            yield number, point_record(point, options)
         return
     # "spawn": a fork of a process that has run compiled code with threads may hang
     context = multiprocessing.get_context("spawn")
     with workers_begin(), ProcessPoolExecutor(workers, context) as pool:
-        futures = {pool.submit(point_record, *jobs[number]): number for number in waiting}
+        futures = {pool.submit(point_record, point, options): n for n, point in waiting.items()}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -114,10 +110,9 @@ def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
     return {"at": point.at, **found.record()}
 
 
-def _stored_path(folder: Path | None, job: tuple[MapPoint, dict[str, Any]]) -> Path | None:
+def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) -> Path | None:
     if folder is None:
         return None
-    point, options = job
     files = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
     text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"

@@ -197,11 +197,8 @@ def stationary(
         np.nan if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
         for state in (rolling(f"{curve}, {name}", sign * heights) for sign in (1.0, -1.0))
     ]
-    values.append(
-        _judged(
-            f"{curve}, {name}", "guiding Y/Q, combined", float(np.max(quotients)), limits.guiding
-        )
-    )
+    worst = float(np.max(quotients))
+    values.append(_judged(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
     name = f"cant {1e3 * cant:g} mm"
     standing = found(name, lambda: on_cant(balance, track, cant, held=held))
     values += _lean(name, balance.model, flat.reference, standing, cant, limits)
@@ -255,11 +252,8 @@ def _unloading(
         wheel = f"wheelset {wheelset + 1} {SIDES[side]}"
         worst, left = float(np.max(loop.unloading)), loop.on_level
     values = [_judged(case, UNLOADING, worst, limit, wheel)]
-    if friction:
-        values += [
-            StationaryValue(case, name, value, None, wheel)
-            for name, value in zip(level, left, strict=True)
-        ]
+    for name, value in zip(level, left, strict=True) if friction else ():
+        values.append(StationaryValue(case, name, value, None, wheel))
     return values
 
 

@@ -14,12 +14,12 @@ from railsim.definitions.study.definition import Sample
 from railsim.errors import argument_error
 from railsim.files.access import check_folder, is_file, make_folder, write_text
 from railsim.processes import available_cores
+from railsim.result import Result
 from railsim.studies.carry_out import carry_out
 from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Plan
 from railsim.studies.records import Record
-from railsim.studies.retention import ALL, retention
 from railsim.studies.spec import Execution, StudySpec, checked
 from railsim.studies.summary import read_index, refuse_too_many
 from railsim.studies.user_function import Function, full_name
@@ -48,7 +48,7 @@ def study(
     resume: bool = False,
     overwrite: bool = False,
     plots: bool = False,
-    keep: str = ALL,
+    keep: str = "all",
     compress: bool = False,
     single: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -168,19 +168,42 @@ def study(
 def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
     """Carry out a study in its folder; see `study`."""
     check_folder(folder)
-    retention(spec)  # refuses unknown quantities
     if spec.quantities and not needs_run(spec.analyses):
         raise argument_error("quantities", "no analysis computes a run", 'add one of kind = "run"')
     plan = Plan(spec, execution.workers or available_cores())
     base = os.path.relpath(Path.cwd(), folder)
-    outcome = carry_out(
-        plan, spec.changed(railsim_version=__version__, folder=base), folder, execution
-    )
+    spec = spec.changed(railsim_version=__version__, folder=base)
+    outcome = carry_out(plan.points, plan.cases, spec, folder, execution)
     if execution.plots:
-        from railsim.studies.pictures import draw
-
-        draw(outcome)
+        _draw(outcome)
     return outcome
+
+
+def _draw(outcome: Outcome) -> None:
+    """Draw the runs whose picture is missing or out of date, and comparisons of the vehicles.
+
+    Runs that differ only in the vehicle are drawn into one picture,
+    ``compare_TRACK_SPEED.png``.
+    """
+    from railsim.plot.histories import histories
+    from railsim.plot.overlay import overlay
+    from railsim.plot.style import save
+
+    results = outcome.results()
+    alike: dict[str, dict[str, Result]] = {}
+    for record in outcome.records:
+        result = results.get(record["name"])
+        if result is None or not len(result["time"]):
+            continue
+        file = outcome.folder / record["file"]
+        picture = file.with_suffix(".png")
+        if not picture.exists() or picture.stat().st_mtime < file.stat().st_mtime:
+            save(histories(result), picture, overwrite=True)
+        vehicle = str(record["labels"]["vehicle"])
+        alike.setdefault(record["name"].removeprefix(f"{vehicle}_"), {})[vehicle] = result
+    for rest, some in alike.items():
+        if len(some) > 1:
+            save(overlay(some), outcome.folder / f"compare_{rest}.png", overwrite=True)
 
 
 def stored_spec(folder: Path) -> tuple[StudySpec, Path]:

@@ -26,7 +26,7 @@ from railsim.result.facts import FACTS, run_facts
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, NOT_DONE, Records
-from railsim.studies.points import MOST_RUNS
+from railsim.studies.plan import MOST_RUNS
 from railsim.studies.records import Record
 from railsim.studies.spec import StudySpec, checked
 from railsim.studies.user_function import user_quantities

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any
 
 from railsim.errors import RailsimError, argument_error
 from railsim.files.access import TABLE_BYTES, read_bytes
@@ -80,23 +79,15 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
     if name is None:
         return {}
     try:
-        found: Any = _loaded(name)(result)
-        return {_checked_name(key): _number(key, value) for key, value in dict(found).items()}
+        found = {key: float(value) for key, value in dict(_loaded(name)(result)).items()}
+        for key, number in found.items():
+            if not isinstance(key, str) or not key.isprintable() or not key:
+                raise TypeError(f"the name {key!r} is not a text")
+            if math.isinf(number):
+                raise ValueError(f"'{key}' is infinite")
+        return found
     except Exception as error:
         raise RailsimError(f"{PARAMETER} {name}: {type(error).__name__}: {error}") from error
-
-
-def _checked_name(key: object) -> str:
-    if not isinstance(key, str) or not key.isprintable() or not key:
-        raise TypeError(f"the name {key!r} is not a text")
-    return key
-
-
-def _number(key: str, value: Any) -> float:
-    number = float(value)
-    if math.isinf(number):
-        raise ValueError(f"'{key}' is infinite")
-    return number
 
 
 @cache

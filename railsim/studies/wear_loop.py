@@ -10,7 +10,6 @@ import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -183,7 +182,7 @@ class Wearing:
 
 def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
     """Run, subtract what has worn, and run again."""
-    _check(wearing.runs, how)
+    _check(wearing, how)
     law, outputs = wear_law(how.law), {"contact_patches": True}
     settings = how.settings or Settings()
     settings = settings.model_copy(update={"outputs": settings.outputs.model_copy(update=outputs)})
@@ -204,7 +203,10 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
         lost = {name: np.zeros(1) for name in profiles}
         try:
             while left > 0.0:
-                part = partial(_tell_part, tell, at / whole, left / whole)
+
+                def part(done: float, before: float = at, of: float = left) -> None:
+                    tell((before + of * done) / whole)
+
                 path = how.folder and how.folder / _file_name(
                     wearing, settings, how.step, law, worn
                 )
@@ -232,10 +234,6 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
         tell((number + 1) / how.steps)
         profiles = worn
     return found
-
-
-def _tell_part(tell: Callable[[float], None], before: float, portion: float, done: float) -> None:
-    tell(before + portion * done)
 
 
 def wear_rows(
@@ -286,22 +284,27 @@ def row(distance: float, worn: Profile, lost: Floats) -> dict[str, float | None]
 
 
 def _profile_name(vehicle: Vehicle) -> str:
-    names = {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
+    names = _wheels(vehicle)
     if len(names) != 1:
         found = f"{len(names)} wheel profiles"
         raise input_error("vehicle", found, "the same for all wheels", key="profile")
     return names.pop()
 
 
-def _check(runs: Sequence[Run], how: Loop) -> None:
+def _wheels(vehicle: Vehicle) -> set[str]:
+    """Names of its wheel profiles."""
+    return {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
+
+
+def _check(wearing: Wearing, how: Loop) -> None:
     faults = Faults()
-    faults += [Fault("wear", "routes", "no route", "at least one")] * (not runs)
-    for run in runs:
+    faults += [Fault("wear", "routes", "no route", "at least one")] * (not wearing.runs)
+    for run in wearing.runs:
         if not (run.share > 0.0 and math.isfinite(run.share)):
             found = f"found {run.share:g} for {run.track.name}"
             faults.append(Fault("wear", "share", found, "above 0"))
     if not (how.step > 0.0 and math.isfinite(how.step)):
-        faults.append(Fault("wear", "step", f"found {how.step:g} m", "above 0"))
+        faults.append(Fault("wear", "step", f"found {wearing.amount(how.step)}", "above 0"))
     if how.steps < 1:
         faults.append(Fault("wear", "steps", f"found {how.steps}", "1 or more"))
     faults.check()
@@ -322,9 +325,8 @@ def _file_name(
 
 def _others(wearing: Wearing, run: Run) -> list[Profile]:
     """Profiles of a run that do not wear."""
-    wheels = [n for w in flatten(run.vehicle).bodies if w.wheelset for n in w.wheelset.profile]
-    names = {*wheels, *run.track.rail} - set(wearing.names.values())
-    return [load_profile(name) for name in names]
+    names = _wheels(run.vehicle) | {*run.track.rail}
+    return [load_profile(name) for name in names - {*wearing.names.values()}]
 
 
 def _kept(path: Path | None, remark: Callable[[str], None]) -> _Wear | None:
@@ -358,9 +360,8 @@ def _wear(
         def part(done: float, before: int = number) -> None:
             progress((before + done) / len(wearing.runs))
 
-        known = worn_profiles | {
-            rail: load_profile(rail) for rail in run.track.rail if rail not in worn_profiles
-        }
+        known = {rail: load_profile(rail) for rail in run.track.rail if rail not in worn_profiles}
+        known |= worn_profiles
         try:
             result = simulate(
                 run.vehicle, run.track, speed=run.speed, settings=settings, profiles=known,

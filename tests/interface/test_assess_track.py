@@ -9,7 +9,7 @@ import railsim
 from railsim.cli import main
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
-from railsim.studies.geometry_limits import GEOMETRY, Flags, RecordedGeometry
+from railsim.studies.geometry_limits import GEOMETRY, RecordedGeometry
 from railsim.track.irregularity import displacement
 
 LENGTH, SPEED, DEFECT = 1000.0, 40.0, 640.0
@@ -118,6 +118,23 @@ def test_wrong_input(recording, tmp_path, capsys):
     assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"cant": [{"type": "CST", "length": LENGTH, "cant": 0.05}]},
+        {"friction_table": [[0.0, 0.2], [900.0, 0.4]]},
+    ],
+)
+def test_pieces_keep_what_a_straight_track_has_at_its_places(recording, changes):
+    """Only a track that is the same everywhere is cut; cant and friction are not lost or moved."""
+    track = recorded(recording)
+    assert module._part(track, 500.0, 900.0)[1] == 240.0
+    part, moved = module._part(track.replace(**changes), 500.0, 900.0)
+    assert moved == 0.0
+    for name in changes:
+        assert getattr(part, name) == getattr(track.replace(**changes), name)
+
+
 def test_sections_are_counted_by_hand():
     """Five sections: a dip of 20 mm in the first, vehicles flag the first, second and fifth.
 
@@ -136,7 +153,7 @@ def test_sections_are_counted_by_hand():
     exceeded[3:12] = exceeded[42] = True  # 75 to 300 m, 1050 to 1060 m
     unknown = np.zeros(43, dtype=bool)
     unknown[25] = True  # 625 to 650 m
-    table, flagged = RecordedGeometry(track, 0.0, 1060.0).sections(Flags(exceeded, unknown), 40.0)
+    table, flagged = RecordedGeometry(track, 0.0, 1060.0).sections(exceeded, unknown, 40.0)
     assert flagged.tolist() == [1, 2, 0, 1, 1]
     records = table.records()
     assert [r["vehicles"] for r in records] == ["flagged", "flagged", "", "not run", "flagged"]

@@ -267,7 +267,7 @@ def test_nothing_is_executed_without_permission(coach, track, capsys, monkeypatc
     with pytest.raises(InputError, match=r"'damper' is code of mine.py.*--allow-code"):
         railsim.simulate(vehicle, track, **WAY)
     assert "executed" not in capsys.readouterr().out
-    binding._bound.clear()
+    binding._bound.cache_clear()
     laws.allow(SOURCE)
     railsim.Simulation(vehicle, track, **WAY)
     assert "executed" in capsys.readouterr().out

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+import railsim
 from railsim.observation.innovations import Powers, likely_sizes
-from railsim.observation.simulated import CHANGE, Reading, refined
+from railsim.observation.pieces import STEP, Piece
+from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, refined
 
 N = 400
 
@@ -86,3 +88,16 @@ def test_sizes_of_errors_are_those_of_the_data():
     found = likely_sizes(powers, np.sqrt(powers.points) * data.T)
     assert found.model == pytest.approx(true_model, rel=0.3)
     assert found.contact == pytest.approx(true_contact, rel=0.35)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"friction_table": [[0.0, 0.2], [900.0, 0.4]]}, {"gauge_widening": [[0.0, 0.01]]}]
+)
+def test_a_run_on_track_that_differs_from_place_to_place_begins_at_its_place(changes):
+    track, grid = railsim.load_track("straight"), 500.0 + STEP * np.arange(N)
+    piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 40.0), 500.0)
+    coach = railsim.load_vehicle("coach_manchester")
+    assert SimulatedRun(coach, track, piece, [], []).is_steady
+    run = SimulatedRun(coach, track.replace(**changes), piece, [], [])
+    assert not run.is_steady
+    assert run._start == pytest.approx(400.0)

@@ -52,6 +52,12 @@ def test_worn_rail_loses_the_area_and_nothing_below_its_head(place):
     assert np.min(worn.z - new.z) >= 0.0
 
 
+def test_a_wrong_step_is_named_as_tonnage():
+    mix = [Traffic(railsim.load_vehicle("coach_manchester"), 20.0, 1.0)]
+    with pytest.raises(railsim.InputError, match="wear: step: found -1 Mt; above 0"):
+        rail_wear(curve(), mix, step=-1e9, steps=1)
+
+
 def test_rails_wear_over_the_tonnage_of_a_mix():
     coach, told = railsim.load_vehicle("coach_manchester"), []
     mix = [Traffic(coach, 20.0, 3.0), Traffic(coach, 18.0, 1.0)]

@@ -49,6 +49,12 @@ def is_straight_and_level(track: "Track") -> bool:
     return not any(section.start_value or section.end_value for section in sections)
 
 
+def is_uniform(track: "Track") -> bool:
+    """Whether a track is the same everywhere but for its irregularities: also the rails on it."""
+    tables = (track.gauge_widening, track.friction_table, track.sections, track.check_rail)
+    return is_straight_and_level(track) and not any(tables)
+
+
 def track_faults(track: "Track") -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
     _, faults = _sections("plan", track.plan)
