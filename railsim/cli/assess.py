@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Speed, allow_code_option, fail_option, flag, option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import (
+    DONE,
+    LIMIT_EXCEEDED,
+    Output,
+    allow_code_option,
+    as_speed,
+    fail_option,
+    flag,
+    option,
+    output_options,
+)
 from railsim.errors import Fault, Faults, InputError
 
 if TYPE_CHECKING:
@@ -37,7 +46,7 @@ FILES = (
     kind=click.Choice(["normal", "simplified"]),
     default="normal",
 )
-@option("--admissible-speed", "Admissible speed in m/s, instead of the vehicle's.", "V", Speed())
+@option("--admissible-speed", "Admissible speed in m/s, instead of the vehicle's.", "V", as_speed)
 @option("--cant-deficiency", "Admissible cant deficiency in m.", "I", float)
 @option(
     "--category",
@@ -70,10 +79,9 @@ def command(
     Example:
       railsim assess coach_manchester_curve_r500_29.h5
       railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.assessment import assess
     from railsim.assessment.tables import assessment_lines
-    from railsim.cli import DONE, LIMIT_EXCEEDED
     from railsim.cli.gathered import opened
 
     results = opened(_paths(files))

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.arrays import Flags, Floats
-from railsim.plot.style import DISTINCT, LIMIT, Picture, note, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, grid_of, note, styled
 
 MOST_PAIRS = 6
 NARROW = 0.05  # of the widest bar, below which its ends bear no words
@@ -31,16 +31,13 @@ def front_figure(
         labels = ["design", *labels]
     pairs = list(combinations(range(values.shape[1]), 2))[:MOST_PAIRS]
     columns = min(3, len(pairs))
-    rows = -(-len(pairs) // columns)
-    figure = Picture(6.4 if columns == 1 else 4.4 * columns, 4.4 * rows)
-    for number, (i, j) in enumerate(pairs, start=1):
-        axes = figure.add_subplot(rows, columns, number)
+    figure, cells = grid_of(len(pairs), columns, 6.4 if columns == 1 else 4.4 * columns, 4.4, 0.0)
+    for axes, (i, j) in zip(cells, pairs, strict=True):
         _pair(axes, values[:, [i, j]], feasible, list(front), chosen)
         axes.set(xlabel=labels[i], ylabel=labels[j])
-        if single:
-            axes.set_title("Designs in the order of computation")
-        if number == 1:
-            axes.legend(loc="best")
+    if single:
+        cells[0].set_title("Designs in the order of computation")
+    cells[0].legend(loc="best")
     return figure
 
 

@@ -36,8 +36,7 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     """
     if not found.branches:
         return _linear_figure(found, title or _title(found))
-    figure = Picture(10.2, 7.2)
-    figure.suptitle(title or _title(found), x=0.012, ha="left")
+    figure = Picture(10.2, 7.2, title or _title(found))
     grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
@@ -92,8 +91,7 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     words = "no linear critical speed in the range"
     if found.linear is not None:
         words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
-    figure = Picture(8.4, 4.4)
-    figure.suptitle(f"{title}\n{words}", x=0.012, ha="left")
+    figure = Picture(8.4, 4.4, f"{title}\n{words}")
     left, right = figure.subplots(1, 2, sharey=True)
     left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
     left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
@@ -175,8 +173,7 @@ def map_figure(
     title : str
     """
     first, *others = axes_values
-    figure = Picture(8.4, 4.6)
-    figure.suptitle(title, x=0.012, ha="left")
+    figure = Picture(8.4, 4.6, title)
     axes = figure.subplots()
     for method, values in speeds.items():
         for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):

@@ -168,9 +168,8 @@ def _text(value: Any) -> str:
 
 
 def _panels(count: int) -> tuple[Picture, list[Axes]]:
-    across = 1 if count == 1 else 2
-    wide = 6.8 if across == 1 else 10.0
-    return grid_of(count, across, lambda rows: (wide, 1.0 + 2.9 * rows))
+    across, wide = (1, 6.8) if count == 1 else (2, 10.0)
+    return grid_of(count, across, wide, 2.9, 1.0)
 
 
 def _colours(count: int) -> list[Any]:
@@ -184,6 +183,11 @@ def _legend(figure: Figure, axes: Axes, title: str) -> None:
     handles, labels = axes.get_legend_handles_labels()
     longest = max(map(len, labels), default=1)
     fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
-    columns = min(fitting, 8, len(labels))
-    where: Any = {"loc": "outside lower left", "alignment": "left"}
-    figure.legend(handles, labels, ncols=columns, title=title, **where)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower left",
+        alignment="left",
+        title=title,
+        ncols=min(fitting, 8, len(labels)),
+    )

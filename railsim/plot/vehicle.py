@@ -52,10 +52,9 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
         scales within each.
     """
     flat = flatten(vehicle)
-    kinds = list(dict.fromkeys(_kind(element) for element in flat.elements))
+    kinds = dict.fromkeys(element.definition.kind for element in flat.elements)
     colours = {kind: distinct(i) for i, kind in enumerate(kinds)}
-    figure = Picture(11.0, 9.0)
-    figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
+    figure = Picture(11.0, 9.0, unformatted(title or vehicle.name))
     grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
     end, boxes = _leading_end(flat), body_boxes(flat)
     cells = (grid[0, :], grid[1, :], grid[2, 0], grid[2, 1], grid[2, 2])
@@ -82,10 +81,6 @@ def _leading_end(flat: FlatVehicle) -> tuple[float, float]:
     return min(near) - 0.8, first + 0.8
 
 
-def _kind(element: FlatElement) -> str:
-    return str(getattr(element.definition, "kind", "element"))
-
-
 def _draw_view(
     axes: Axes,
     view: tuple[int, int],
@@ -99,7 +94,7 @@ def _draw_view(
     for body in flat.of_kind("wheelset"):
         _draw_wheelset(axes, body, across, upright)
     for element in flat.elements:
-        _draw_element(axes, element, flat, view, colours[_kind(element)])
+        _draw_element(axes, element, flat, view, colours[element.definition.kind])
     for body in flat.of_kind("axlebox"):
         axes.plot(body.position[across], body.position[upright], **BOX)
     together: dict[tuple[float, float], list[str]] = {}
@@ -179,6 +174,6 @@ def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D | Re
     if flat.of_kind("axlebox"):
         yield key("axlebox", **BOX)
     for kind, colour in colours.items():
-        of_kind = [element for element in flat.elements if _kind(element) == kind]
+        of_kind = [element for element in flat.elements if element.definition.kind == kind]
         label = f"{kind.replace('_', ' ')} ({len(of_kind)})"
         yield key(label, color=colour, **_look(of_kind[0]))

@@ -22,7 +22,6 @@ def wear_figure(
     """
     new = wheels[0][1]
     figure = Picture(8.6, 7.6, title)
-
     outline, depth, conicity = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 0.8])
     depth.sharex(outline)
     outline.plot(1e3 * new.y, 1e3 * new.z, color="0.2", lw=1.2, label="new")
@@ -34,8 +33,7 @@ def wear_figure(
     for number, (distance, wheel) in enumerate(wheels[1:], start=1):
         lost = 1e3 * (np.asarray(new.z) - np.asarray(wheel.z))
         share = 0.25 + 0.75 * number / (len(wheels) - 1)
-        named = number in (1, len(wheels) - 1)
-        label = _km(distance) if named else None
+        label = _km(distance) if number in (1, len(wheels) - 1) else None
         depth.plot(1e3 * new.y, lost, color="C3", alpha=share, lw=1.0, label=label)
     depth.set_xlim(1e3 * SHOWN[0], 1e3 * SHOWN[1])
     depth.set_ylim(bottom=0.0)

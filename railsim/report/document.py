@@ -6,24 +6,18 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.design_checks import Check, verdict
 from railsim.page import rendered
 from railsim.plot.style import styled
+from railsim.report.tables import Drawing
 from railsim.table import Table
 from railsim.version import __version__
 
 DPI = 130
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A picture of the page: PNG in base64, its width on the screen, its caption."""
-
-    png: str
-    width: int
-    caption: str
+IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 
 
 @dataclass
@@ -33,7 +27,7 @@ class Section:
     title: str
     texts: Sequence[str] = ()
     tables: Sequence[Table] = ()
-    figures: list[Drawn] = field(default_factory=list)
+    figures: list[Drawing] = field(default_factory=list)
 
 
 def as_png(figure: Figure) -> bytes:
@@ -46,7 +40,7 @@ def as_png(figure: Figure) -> bytes:
 
 def pictures(
     drawn: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str] | None = None
-) -> list[Drawn]:
+) -> list[Drawing]:
     """Return those of some pictures that were drawn, by default all, with their captions."""
     found = []
     for name in drawn if names is None else names:
@@ -54,7 +48,8 @@ def pictures(
             width = int.from_bytes(drawn[name][16:20], "big")  # the header of a PNG file
             caption = captions[name.rstrip("_0123456789")]
             code = b64encode(drawn[name]).decode()
-            found.append(Drawn(code, round(width * 96 / DPI), caption))
+            image = IMAGE.format(caption, round(width * 96 / DPI), code)
+            found.append(Drawing("", caption, image))
     return found
 
 

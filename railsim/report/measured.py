@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.assessment.model_comparison import FAIL, INCOMPLETE, ModelValidation
@@ -17,12 +16,11 @@ from railsim.identification.identified import correlation_table, parameter_table
 from railsim.plot import validation as plots
 from railsim.plot.style import styled
 from railsim.report import tables
-from railsim.report.document import Drawn, Section, as_png, document, pictures
+from railsim.report.document import Section, as_png, document, pictures
 
 RECORDS = ("model_validation.json", "identified.json")
 LARGEST_RECORD, LARGEST_PICTURE = 200_000_000, 20_000_000  # bytes
 PNG = b"\x89PNG\r\n\x1a\n"
-IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 CAPTIONS = {
     "scatter": "Simulated over measured section values; dashed the limit of the mean, dotted twice "
     "that of the standard deviation.",
@@ -79,15 +77,13 @@ def as_section(part: Part, number: int) -> tables.Section:
     found = tables.Section(f"measured{number}", part.title, [part.verdict, *part.remarks])
     for section in part.sections:
         found.texts += section.texts
-        for one in section.figures:
-            image = IMAGE.format(one.caption, one.width, one.png)
-            found.drawings.append(tables.Drawing("", one.caption, image))
+        found.drawings += section.figures
         found.details += [tables.of_values(table, section.title) for table in section.tables]
     found.tables, found.details = found.details[:1], found.details[1:]
     return found
 
 
-def _drawn(figures: Mapping[str, Figure]) -> list[Drawn]:
+def _drawn(figures: Mapping[str, Figure]) -> list[tables.Drawing]:
     return pictures({name: as_png(figure) for name, figure in figures.items()}, CAPTIONS)
 
 
@@ -100,7 +96,7 @@ def validation_figures(found: ModelValidation) -> dict[str, Figure]:
     return figures
 
 
-def of_validation(found: ModelValidation, more: Sequence[Drawn] = ()) -> Part:
+def of_validation(found: ModelValidation, more: Sequence[tables.Drawing] = ()) -> Part:
     """Return what a page says about a model against a test; `more` pictures at the end."""
     words = {FAIL: "The model does not match the test.", INCOMPLETE: "Too few sections."}
     text = words.get(found.verdict, "The model matches the test within all limits.")
@@ -120,7 +116,7 @@ def identification_figures(found: Identified) -> dict[str, Figure]:
         return {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
 
 
-def of_identification(record: Mapping[str, Any], figures: list[Drawn]) -> Part:
+def of_identification(record: Mapping[str, Any], figures: list[tables.Drawing]) -> Part:
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
     coloured = [one["channel"] for one in record["channels"] if one["white"] is False]
@@ -180,7 +176,7 @@ def read_part(file: str | Path) -> Part:
         raise input_error(str(path), words, allowed) from None
 
 
-def _pictures(folder: Path, *names: str) -> list[Drawn]:
+def _pictures(folder: Path, *names: str) -> list[tables.Drawing]:
     """Return pictures beside a record, those that are there."""
     files = {name: folder / f"{name}.png" for name in names}
     drawn = {n: read_bytes(f, LARGEST_PICTURE) for n, f in files.items() if f.is_file()}

@@ -38,7 +38,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing of the page; `kinds` are the labels of its colours."""
+    """A drawing or a picture of the page; `kinds` are the labels of its colours."""
 
     title: str
     words: str
