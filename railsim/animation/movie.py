@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
 from railsim.animation.scene import Drawn, Scene
 from railsim.arrays import Floats
@@ -98,10 +99,13 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats
         q = scene.pose[frame, k]
         frame_at = _track(scene, s0 + body.offset + q[0])
         face, edge = COLOURS[body.kind]
+        roll, pitch, yaw = gain * q[3:]
+        pitch = 0.0 if body.kind == "wheelset" else pitch  # its rims are round
+        turned = Rotation.from_euler("ZXY", [yaw, roll, pitch])
         for points in _shape(body):
-            moved = _turned(points, gain * q[3], 0.0 if body.kind == "wheelset" else gain * q[4],
-                            gain * q[5])  # fmt: skip
-            moved += np.array([(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]])
+            moved = turned.apply(points) + np.array(
+                [(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]]
+            )
             seen, depth = _seen(_space(frame_at, moved), at)
             found.append((depth, seen, face, edge))
     return found
@@ -118,43 +122,23 @@ def _shape(body: Drawn) -> list[Floats]:
     return [corners[list(face)] for face in FACES]
 
 
-def _track(scene: Scene, s: float) -> tuple[float, float, float, float]:
+def _track(scene: Scene, s: float) -> Floats:
+    """Position in plan, heading and cant of the track."""
     track = scene.track
-    x, y, heading, cant = (
-        float(np.interp(s, track["s"], track[name])) for name in ("x", "y", "heading", "cant")
-    )
-    return x, y, heading, cant
+    return np.array([np.interp(s, track["s"], track[n]) for n in ("x", "y", "heading", "cant")])
 
 
-def _space(at: tuple[float, float, float, float], points: Floats) -> Floats:
+def _space(at: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = at
-    across = np.cos(cant) * points[:, 1] - np.sin(cant) * points[:, 2]
-    down = np.sin(cant) * points[:, 1] + np.cos(cant) * points[:, 2]
-    ahead = points[:, 0]
-    return np.column_stack([
-        x + np.cos(heading) * ahead - np.sin(heading) * across,
-        y + np.sin(heading) * ahead + np.cos(heading) * across, down,
-    ])  # fmt: skip
+    placed: Floats = Rotation.from_euler("ZX", [heading, cant]).apply(points) + [x, y, 0.0]
+    return placed
 
 
-def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:
-    """Rz(yaw) Rx(roll) Ry(pitch)."""
-    x, y, z = points.T
-    x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
-    y, z = np.cos(roll) * y - np.sin(roll) * z, np.sin(roll) * y + np.cos(roll) * z
-    x, y = np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y
-    return np.column_stack([x, y, z])
-
-
-def _seen(points: Floats, at: tuple[float, float, float, float]) -> tuple[Floats, float]:
+def _seen(points: Floats, at: Floats) -> tuple[Floats, float]:
     """Points on the screen, right and down [m], and their mean depth."""
-    turn = at[2] + AZIMUTH
-    x, y, z = points[:, 0] - at[0], points[:, 1] - at[1], points[:, 2] + 1.4
-    forward = np.cos(turn) * x + np.sin(turn) * y
-    right = np.cos(turn) * y - np.sin(turn) * x
-    down = np.cos(ELEVATION) * z - np.sin(ELEVATION) * forward
-    depth = np.cos(ELEVATION) * forward + np.sin(ELEVATION) * z
+    view = Rotation.from_euler("YZ", [ELEVATION, -(at[2] + AZIMUTH)])
+    depth, right, down = view.apply(points - np.array([at[0], at[1], -1.4])).T
     return np.column_stack([right, down]), float(np.mean(depth))
 
 

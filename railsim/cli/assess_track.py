@@ -45,7 +45,7 @@ def command(
       railsim assess-track track/track.toml --vehicles coach_25t coach_manchester \\
           --speeds 40 --out judged
     """
-    from railsim.plot.assessed_track import heat_strip
+    from railsim.plot.study import heat_strip
     from railsim.report.assessed_track import assessed_track_page
     from railsim.studies.assess_track import assess_track
     from railsim.studies.rows import speed_of

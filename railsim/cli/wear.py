@@ -203,7 +203,7 @@ def _carry_out(
                 name = _file_name(of, done.distance + done.length, side)
                 output.written.append(save_profile(worn, folder / name))
     if "rows" in rows:
-        from railsim.plot.wear import wear_figure
+        from railsim.plot.study import wear_figure
 
         wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
         title = f"{given['vehicle']}: wear of the wheels"

@@ -27,9 +27,9 @@ def assessed_track_page(
     places.rows = places.rows[:MOST_ROWS]
     heat = pictures({"heat": as_png(strip)}, CAPTIONS)
     parts = [
-        Section("Places", texts if number > MOST_ROWS else (), [places] if number else []),
-        Section("Along the track", figures=heat),
-        Section("Vehicles and geometry limits", notes, [sections]),
+        Section("Places", texts if number > MOST_ROWS else [], [places] if number else []),
+        Section("Along the track", drawings=heat),
+        Section("Vehicles and geometry limits", [*notes], [sections]),
     ]
     verdict = {"text": text, "ok": number == 0}
     return document("Track judged by vehicles", parts, METHOD, verdict)

@@ -28,8 +28,7 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 from railsim.plot import mechanisms as plots
 from railsim.plot.style import styled
-from railsim.report.document import Section, as_png, of_design, pictures
-from railsim.report.tables import Drawing
+from railsim.report.document import Drawing, Section, as_png, of_design, pictures
 from railsim.table import Table
 
 if TYPE_CHECKING:
@@ -304,7 +303,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         found = tables.optimum_sentences(optimum), tables.optimum_tables(optimum)
         sections += [
             Section("Search", *found, shown("search")),
-            Section("Before and after the search", figures=compared),
+            Section("Before and after the search", drawings=compared),
         ]
     if len(collected.results) > 1:
         compared += shown(*(name for name in drawn if name.startswith("drawing_")))
@@ -313,7 +312,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     kinematics = shown("kinematics", "actuators", "angles", "cam")
     forces = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")
     sections += [
-        Section("Kinematics", figures=kinematics),
+        Section("Kinematics", drawings=kinematics),
         Section("Forces and motion", [], [tables.reaction_table(result)], shown(*forces)),
     ]
     if choices := selection(result):

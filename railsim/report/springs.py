@@ -15,8 +15,7 @@ from railsim.design_checks import check_table
 from railsim.errors import InputError
 from railsim.plot import springs as plots
 from railsim.plot.style import styled
-from railsim.report.document import Section, as_png, of_design, pictures
-from railsim.report.tables import Drawing
+from railsim.report.document import Drawing, Section, as_png, of_design, pictures
 from railsim.springs import tables
 from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import Design, design
