@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from scipy.spatial.transform import Rotation
 
 from railsim.animation.scene import Drawn, Scene
 from railsim.arrays import Floats
@@ -101,9 +100,8 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats
         face, edge = COLOURS[body.kind]
         roll, pitch, yaw = gain * q[3:]
         pitch = 0.0 if body.kind == "wheelset" else pitch  # its rims are round
-        turned = Rotation.from_euler("ZXY", [yaw, roll, pitch])
         for points in _shape(body):
-            moved = turned.apply(points) + np.array(
+            moved = _turned(points, roll, pitch, yaw) + np.array(
                 [(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]]
             )
             seen, depth = _seen(_space(frame_at, moved), at)
@@ -128,17 +126,36 @@ def _track(scene: Scene, s: float) -> Floats:
     return np.array([np.interp(s, track["s"], track[n]) for n in ("x", "y", "heading", "cant")])
 
 
+def _rotated(a: Floats, b: Floats, angle: float) -> tuple[Floats, Floats]:
+    """Coordinates in a plane after a turn from the first axis to the second."""
+    return np.cos(angle) * a - np.sin(angle) * b, np.sin(angle) * a + np.cos(angle) * b
+
+
 def _space(at: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = at
-    placed: Floats = Rotation.from_euler("ZX", [heading, cant]).apply(points) + [x, y, 0.0]
-    return placed
+    ahead = points[:, 0]
+    across, down = _rotated(*points[:, 1:].T, cant)
+    return np.column_stack([
+        x + np.cos(heading) * ahead - np.sin(heading) * across,
+        y + np.sin(heading) * ahead + np.cos(heading) * across, down,
+    ])  # fmt: skip
+
+
+def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:
+    """Rz(yaw) Rx(roll) Ry(pitch)."""
+    x, y, z = points.T
+    z, x = _rotated(z, x, pitch)
+    y, z = _rotated(y, z, roll)
+    x, y = _rotated(x, y, yaw)
+    return np.column_stack([x, y, z])
 
 
 def _seen(points: Floats, at: Floats) -> tuple[Floats, float]:
     """Points on the screen, right and down [m], and their mean depth."""
-    view = Rotation.from_euler("YZ", [ELEVATION, -(at[2] + AZIMUTH)])
-    depth, right, down = view.apply(points - np.array([at[0], at[1], -1.4])).T
+    x, y, z = points.T
+    forward, right = _rotated(x - at[0], y - at[1], -(at[2] + AZIMUTH))
+    down, depth = _rotated(z + 1.4, forward, ELEVATION)
     return np.column_stack([right, down]), float(np.mean(depth))
 
 

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from railsim.arrays import Floats
 from railsim.contact.curves import rail_curve, tape_circle_position
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import body_boxes
-from railsim.errors import Fault, InputError, argument_error, input_error, nearest
+from railsim.errors import Fault, Faults, argument_error, input_error, nearest
 from railsim.notation import COMPONENTS
 from railsim.result import Result
 from railsim.track.alignment import Alignment
@@ -87,10 +86,10 @@ def result_scene(
     Distances of the reference body between which the run is shown [m]. Raises InputError: the
     result lacks something; nothing lies between.
     """
-    missing = [name for name in NEEDED if name not in result]
-    if missing:
-        allowed = f"run it with settings.outputs.quantities with {', '.join(NEEDED)}"
-        raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
+    allowed = f"run it with settings.outputs.quantities with {', '.join(NEEDED)}"
+    Faults(
+        Fault("result", name, "is not in it", allowed) for name in NEEDED if name not in result
+    ).check()
     distance = result["distance"]
     if len(distance) < 2:
         found = f"{len(distance)} instants: {result.status}"
@@ -210,11 +209,16 @@ def _drawn(flat: FlatVehicle) -> tuple[Drawn, ...]:
 def _track(alignment: Alignment, distance: Floats) -> dict[str, Floats]:
     """Centre line in plan and cant angle around the way of a run; gradients are left out."""
     s = np.arange(distance[0] - AROUND, distance[-1] + AROUND + TRACK_STEP, TRACK_STEP)
-    half = 0.5 * TRACK_STEP
-    heading = alignment.heading(s[0] + half * np.arange(2 * len(s) - 1))
-    x = cumulative_simpson(np.cos(heading), dx=half, initial=0.0)[::2]
-    y = cumulative_simpson(np.sin(heading), dx=half, initial=0.0)[::2]
-    return {"s": s, "x": x, "y": y, "heading": heading[::2], "cant": alignment.cant_angle(s)}
+    heading = alignment.heading(s)
+    middle = alignment.heading(0.5 * (s[1:] + s[:-1]))
+    # Simpson's rule for the integral of the direction
+    x = TRACK_STEP / 6.0 * (np.cos(heading[1:]) + 4.0 * np.cos(middle) + np.cos(heading[:-1]))
+    y = TRACK_STEP / 6.0 * (np.sin(heading[1:]) + 4.0 * np.sin(middle) + np.sin(heading[:-1]))
+    return {
+        "s": s, "x": np.concatenate([[0.0], np.cumsum(x)]),
+        "y": np.concatenate([[0.0], np.cumsum(y)]), "heading": heading,
+        "cant": alignment.cant_angle(s),
+    }  # fmt: skip
 
 
 def chosen_mode(

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from railsim.result import Result
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
+SERVICE = ("admissible_speed", "cant_deficiency", "category")  # keys of the service table
 FILES = (
     "assessment.json",
     "assessment.csv",
@@ -59,16 +60,7 @@ FILES = (
 @fail_option
 @output_options("Folder for assessment.json, .csv and .png.")
 @allow_code_option
-def command(
-    files: tuple[str, ...],
-    standard: str,
-    fail: bool,
-    admissible_speed: float | None,
-    cant_deficiency: float | None,
-    category: str | None,
-    output: Output,
-    **how: Any,
-) -> int:
+def command(files: tuple[str, ...], standard: str, fail: bool, output: Output, **how: Any) -> int:
     """Assess results: running behaviour, comfort, wear or derailment.
 
     Runs of one vehicle are assessed together, those of several vehicles one after the other; a
@@ -86,11 +78,7 @@ def command(
 
     results = opened(_paths(files))
     output.reserve(*FILES)
-    changes = {
-        "admissible_speed": admissible_speed,
-        "cant_deficiency": cant_deficiency,
-        "category": category,
-    }
+    changes = {name: how.pop(name) for name in SERVICE}
     assessments = assess(results, standard, service=_service(results, changes), **how)
     write_assessments(output, assessments)
     lines = [line for one in assessments for line in assessment_lines(one, quiet=output.quiet)]

@@ -40,6 +40,17 @@ def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
     return click.option(*name.split(), is_flag=True, help=words, **more)
 
 
+def together(*options: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Return several options as one decorator, in this order."""
+
+    def add(function: Any) -> Any:
+        for one in reversed(options):
+            function = one(function)
+        return function
+
+    return add
+
+
 def as_speed(text: object) -> float:
     """Return a speed in m/s, or with a unit: ``72km/h``; a type of options."""
     from railsim.units import speed_in_si
@@ -109,15 +120,11 @@ optional_track = click.argument(
 )
 
 
-def extent_options(function: F) -> F:
-    """Add ``--start``, ``--duration``, ``--until``."""
-    for option, metavar, words in (
-        ("--until", "S", "End of the run in m along the track."),
-        ("--duration", "T", "Length of the run in s."),
-        ("--start", "S", "Start in m along the track; default 0."),
-    ):
-        function = click.option(option, type=float, metavar=metavar, help=words)(function)
-    return function
+extent_options = together(
+    option("--start", "Start in m along the track; default 0.", "S", float),
+    option("--duration", "Length of the run in s.", "T", float),
+    option("--until", "End of the run in m along the track.", "S", float),
+)
 
 
 def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
@@ -140,17 +147,17 @@ allow_code_option = flag(
 )
 
 
-def code_options(function: F) -> F:
-    """Add ``--allow-code`` and ``--law``, which permit laws of one's own."""
-    files = option(
+code_options = together(
+    allow_code_option,
+    option(
         "--law",
         "Execute the laws of this file, or of this name; may be given several times.",
         "FILE",
         multiple=True,
         expose_value=False,
         callback=_allow,
-    )
-    return allow_code_option(files(function))
+    ),
+)
 
 
 def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:
@@ -167,29 +174,26 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
             own = {key: values.pop(key) for key in keys if key in values}
             return function(**values, **{name: kind(**own)})
 
-        for option in reversed(options):
-            command = option(command)
-        return command  # type: ignore[return-value]
+        return together(*options)(command)  # type: ignore[return-value]
 
     return add
 
 
-def linearisation_options(function: F) -> F:
-    """Add ``--linearisation`` and ``--amplitude``."""
-    linearisation = option(
+linearisation_options = together(
+    option(
         "--linearisation",
         "Contact: its derivative, or its first harmonic for --amplitude.",
         kind=click.Choice(["tangent", "harmonic"]),
         default="tangent",
-    )
-    amplitude = option(
+    ),
+    option(
         "--amplitude",
         "Lateral amplitude of the wheelsets in m, for harmonic.",
         "A",
         float,
         default=3e-3,
-    )
-    return linearisation(amplitude(function))
+    ),
+)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Output, faults_in, flag, option, output_options, set_option
+from railsim.cli.common import Output, faults_in, flag, option, output_options, set_option, together
 from railsim.cli.terminal import echo
 from railsim.files.access import TABLES, is_file, write_text
 
@@ -35,10 +35,13 @@ def command() -> None:
     """
 
 
-def _spring_command(function: Any) -> Any:
-    """Make a command of the group with a file, a folder for pages and the common options."""
-    options = output_options(f"Folder for the pictures and the page {REPORT}.")
-    return command.command()(click.argument("file")(set_option(options(function))))
+# a command of the group with a file, a folder for pages and the common options
+_spring_command = together(
+    command.command(),
+    click.argument("file"),
+    set_option,
+    output_options(f"Folder for the pictures and the page {REPORT}."),
+)
 
 
 @_spring_command

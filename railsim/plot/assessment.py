@@ -90,10 +90,10 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
         return None
     zones = sorted({zone.zone for zone in reports})
     names = list(dict.fromkeys(row.criterion.name for zone in reports for row in zone.rows))
-    looks: dict[str, dict[str, Any]] = {}
-    for k, name in enumerate(names):
-        marker = "o^"[k // len(DISTINCT) % 2]
-        looks[name] = {"color": distinct(k), "marker": marker, "ls": "", "ms": 4}
+    looks: dict[str, dict[str, Any]] = {
+        name: {"color": distinct(k), "marker": "o^"[k // len(DISTINCT) % 2], "ls": "", "ms": 4}
+        for k, name in enumerate(names)
+    }
     x, height = "middle of the section (km)", 1.8 + 2.4 * len(assessments)
     figure, grid = _by_zone(assessments, zones, x, height, sharex="col")
     for axes, assessment in zip(grid, assessments, strict=True):

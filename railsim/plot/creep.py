@@ -53,6 +53,9 @@ def creep_curves_figure(
         _draw_curves(panel, patch, direction, scale, laws, (nx, ny))
         if exact_points:
             _draw_exact(panel, patch, direction, exact_points)
+        if len(_components(direction)) > 1:
+            words, look = "solid $T_x$, dashed $T_y$", {"fontsize": 8, "frame": "axes fraction"}
+            note(panel, words, (0.985, 0.03), (0, 0), "right", "bottom", **look)
         panel.set_title(name)
         panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
         panel.set_xlim(0.0, LARGEST)
@@ -62,8 +65,6 @@ def creep_curves_figure(
         panel.set_xlabel("magnitude of the normalised creepage")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, ncols=len(labels), loc="lower center", bbox_to_anchor=(0.5, 0.0))
-    for panel in panels:
-        _name_components(panel)
     return figure
 
 
@@ -107,13 +108,6 @@ def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: in
             sizes, shares, "o", label=label, ms=3.6, mfc="none", mec="0.1", mew=0.9, clip_on=False
         )
         label = "_"
-
-
-def _name_components(panel: Axes) -> None:
-    """Say which lines are longitudinal where a picture has both."""
-    if any(line.get_linestyle() == "--" for line in panel.get_lines()):
-        words, look = "solid $T_x$, dashed $T_y$", {"fontsize": 8, "frame": "axes fraction"}
-        note(panel, words, (0.985, 0.03), (0, 0), "right", "bottom", **look)
 
 
 @styled()

@@ -1,6 +1,6 @@
 """Pictures of stability: amplitude over speed, maps of critical speeds; a vehicle on a twist."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,9 +36,10 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     title : str
         By default vehicle, rails, friction and creep law.
     """
+    title = title or _title(found)
     if not found.branches:
-        return _linear_figure(found, title or _title(found))
-    figure = Picture(10.2, 7.2, title or _title(found))
+        return _linear_figure(found, title)
+    figure = Picture(10.2, 7.2, title)
     grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
@@ -87,7 +88,6 @@ def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
     return 0.9 * min(marks), min(found.high, 1.25 * max(marks))
 
 
-@styled()
 def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     """What there is without a branch: linear critical speeds over amplitude, the conicity."""
     words = "no linear critical speed in the range"
@@ -109,8 +109,15 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
 
 def _mark(axes: Axes, found: CriticalSpeed) -> None:
     """Linear critical speeds as lines, the lowest speeds of sustained hunting as circles."""
-    for words, speed, line in _linear_speeds(found):
-        axes.axvline(speed, color="0.1", lw=0.9, ls=line, label=f"{words}: {speed:.2f} m/s")
+    if (lost := found.linear) is not None:
+        lines: list[tuple[str, float | None, Any]] = [
+            (f"linear, {found.contact.words()}", lost.speed, "-"),
+            ("the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))),
+        ]
+        for words, speed, dashes in lines:
+            if speed is not None:
+                label = f"{words}: {speed:.2f} m/s"
+                axes.axvline(speed, color="0.1", lw=0.9, ls=dashes, label=label)
     line = found.linear_over_amplitude
     if line is not None and line.smallest is not None:
         speeds = np.array(line.speed, dtype=float)
@@ -124,14 +131,6 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
                 color=BRANCHES["down" if method == "bifurcation" else method][0],
                 label=f"lowest by {method}: {lowest.speed:.2f} m/s",
             )  # fmt: skip
-
-
-def _linear_speeds(found: CriticalSpeed) -> Iterator[tuple[str, float, Any]]:
-    lost = found.linear
-    if lost is not None:
-        yield f"linear, {found.contact.words()}", lost.speed, "-"
-        if lost.speed_on_rigid_rails is not None:
-            yield "the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))
 
 
 def _conicity(axes: Axes, conicity: Conicity) -> None:

@@ -67,6 +67,7 @@ def page(
     safety are shown in sections of their own. `measured`: Comparisons with tests and
     identifications.
     """
+    inputs = inputs or {}
     found = groups(results)
     cells = cells_of(found)
     curves = [curve_data(group, cells) for group in found]
@@ -82,9 +83,9 @@ def page(
     if limits.tables or limits.details:
         sections.append(limits)
     if len(records) >= LEAST:
-        sections.append(_spread(records, data, inputs or {}))
+        sections.append(_spread(records, data, inputs))
     sections += [*_published(results), *measured]
-    sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs or {}))
+    sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report", "templates/runs.html", title=title,
