@@ -135,7 +135,7 @@ def _space(at: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = at
     ahead = points[:, 0]
-    across, down = _rotated(*points[:, 1:].T, cant)
+    across, down = _rotated(points[:, 1], points[:, 2], cant)
     return np.column_stack([
         x + np.cos(heading) * ahead - np.sin(heading) * across,
         y + np.sin(heading) * ahead + np.cos(heading) * across, down,
