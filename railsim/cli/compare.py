@@ -84,9 +84,8 @@ def command(files: tuple[str, ...], over: str, output: Output) -> None:
             parts += [*[""] * bool(parts), title]
         for one in comparison_tables(rows, results):
             parts += [one, ""]
-        parts += [
-            f"{n}: remark: {remark}" for n, result in results.items() for remark in result.remarks
-        ]
+        for label, result in () if output.quiet else results.items():
+            parts += [f"{label}: remark: {remark}" for remark in result.remarks]
         parts += [difference_table(differing)] if differing else why
     output.answer(records[0] if list(groups) == [""] else {"groups": records}, parts)
 

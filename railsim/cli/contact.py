@@ -163,7 +163,7 @@ def command(
         right = found.pairs[1]
         own = right.wheel if compared.kind == "wheel" else right.rail
         output.write(OVERLAY, lambda: overlay_figure([compared, own]))
-    if not output.as_json:
+    if not (output.as_json or output.quiet):
         for note in found.notes:
             echo(note, err=True)
     output.answer(described.data, described.parts)
