@@ -16,7 +16,7 @@ from railsim.definitions.vehicle.outlines import Box, body_boxes
 from railsim.plot.style import Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
-View = tuple[int, int]  # the axes of the vehicle to the right and upwards on the page
+View = tuple[int, int]  # axes of the vehicle along the width and the height of the page
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
 TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
 LABELS = ("$x$ (m), forward", "$y$ (m), to the right", "$z$ (m), down")
