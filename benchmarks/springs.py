@@ -13,8 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from railsim.definitions.loading import load_spring
-from railsim.report.document import as_png
-from railsim.report.springs import collected, figures, page
+from railsim.report.springs import files
 from railsim.springs.design import design
 from railsim.springs.nests import evaluate, task_of
 from railsim.springs.search import candidates, search
@@ -33,8 +32,7 @@ def best(function: Callable[[], object], times: int) -> float:
 
 def whole_page() -> None:
     """Everything that ``railsim spring verify --out`` computes and draws."""
-    results = collected(suspension)
-    page(results, {name: as_png(figure) for name, figure in figures(results).items()})
+    files(suspension)
 
 
 def command() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, Faults
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
 from railsim.table import Amount, Column, Table
@@ -71,12 +71,11 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
             for peak in curve.median_peaks:
                 rows.setdefault((where, peak.quantity.name), {})[label] = peak
     first = next(iter(results))
-    empty = [label for label, result in results.items() if not len(result["time"])]
-    if empty:
-        raise InputError(
-            Fault(label, "time", f"holds no instants ({results[label].status})", "leave it out")
-            for label in empty
-        )
+    Faults(
+        Fault(label, "time", f"holds no instants ({result.status})", "leave it out")
+        for label, result in results.items()
+        if not len(result["time"])
+    ).check()
     return tuple(
         Comparison(found[first].quantity, where, found)
         for (where, _), found in rows.items()
@@ -114,7 +113,7 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
     Raises InputError: results over different plans, or that have no part of the track in common.
     """
     (first, base), *others = results.items()
-    faults = []
+    faults = Faults()
     for label, result in others:
         if curvature_sections(result.track()) != curvature_sections(base.track()):
             found = f"runs over another plan than {first}"
@@ -122,8 +121,7 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
         elif not _shared(base, result).any():
             found = f"has no part of the track in common with {first}"
             faults.append(Fault(label, "distance", found, "results that share a part of the track"))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     found_ones = []
     for label, result in others:
         there = _shared(base, result)

@@ -1,8 +1,7 @@
 """Animation: a run or a mode as a page that plays, a GIF or a film.
 
 ==============  ============================================================================
-`scene.py`      a result, or a mode of ``railsim modes``, as bodies, poses, track and forces
-`wheels.py`     wheels on their rails: sections, points of contact, seats
+`scene.py`      a result, or a mode of ``railsim modes``, as bodies, poses, track, forces, wheels
 `page.py`       a scene as one self-contained HTML page (``page.html``, ``.css``, ``.js``)
 `movie.py`      a scene as GIF or MP4
 ==============  ============================================================================

@@ -98,10 +98,12 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats
         q = scene.pose[frame, k]
         frame_at = _track(scene, s0 + body.offset + q[0])
         face, edge = COLOURS[body.kind]
+        roll, pitch, yaw = gain * q[3:]
+        pitch = 0.0 if body.kind == "wheelset" else pitch  # its rims are round
         for points in _shape(body):
-            moved = _turned(points, gain * q[3], 0.0 if body.kind == "wheelset" else gain * q[4],
-                            gain * q[5])  # fmt: skip
-            moved += np.array([(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]])
+            moved = _turned(points, roll, pitch, yaw) + np.array(
+                [(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]]
+            )
             seen, depth = _seen(_space(frame_at, moved), at)
             found.append((depth, seen, face, edge))
     return found
@@ -118,20 +120,22 @@ def _shape(body: Drawn) -> list[Floats]:
     return [corners[list(face)] for face in FACES]
 
 
-def _track(scene: Scene, s: float) -> tuple[float, float, float, float]:
+def _track(scene: Scene, s: float) -> Floats:
+    """Position in plan, heading and cant of the track."""
     track = scene.track
-    x, y, heading, cant = (
-        float(np.interp(s, track["s"], track[name])) for name in ("x", "y", "heading", "cant")
-    )
-    return x, y, heading, cant
+    return np.array([np.interp(s, track["s"], track[n]) for n in ("x", "y", "heading", "cant")])
 
 
-def _space(at: tuple[float, float, float, float], points: Floats) -> Floats:
+def _rotated(a: Floats, b: Floats, angle: float) -> tuple[Floats, Floats]:
+    """Coordinates in a plane after a turn from the first axis to the second."""
+    return np.cos(angle) * a - np.sin(angle) * b, np.sin(angle) * a + np.cos(angle) * b
+
+
+def _space(at: Floats, points: Floats) -> Floats:
     """Points of the track frame in space."""
     x, y, heading, cant = at
-    across = np.cos(cant) * points[:, 1] - np.sin(cant) * points[:, 2]
-    down = np.sin(cant) * points[:, 1] + np.cos(cant) * points[:, 2]
     ahead = points[:, 0]
+    across, down = _rotated(points[:, 1], points[:, 2], cant)
     return np.column_stack([
         x + np.cos(heading) * ahead - np.sin(heading) * across,
         y + np.sin(heading) * ahead + np.cos(heading) * across, down,
@@ -141,20 +145,17 @@ def _space(at: tuple[float, float, float, float], points: Floats) -> Floats:
 def _turned(points: Floats, roll: float, pitch: float, yaw: float) -> Floats:
     """Rz(yaw) Rx(roll) Ry(pitch)."""
     x, y, z = points.T
-    x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
-    y, z = np.cos(roll) * y - np.sin(roll) * z, np.sin(roll) * y + np.cos(roll) * z
-    x, y = np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y
+    z, x = _rotated(z, x, pitch)
+    y, z = _rotated(y, z, roll)
+    x, y = _rotated(x, y, yaw)
     return np.column_stack([x, y, z])
 
 
-def _seen(points: Floats, at: tuple[float, float, float, float]) -> tuple[Floats, float]:
+def _seen(points: Floats, at: Floats) -> tuple[Floats, float]:
     """Points on the screen, right and down [m], and their mean depth."""
-    turn = at[2] + AZIMUTH
-    x, y, z = points[:, 0] - at[0], points[:, 1] - at[1], points[:, 2] + 1.4
-    forward = np.cos(turn) * x + np.sin(turn) * y
-    right = np.cos(turn) * y - np.sin(turn) * x
-    down = np.cos(ELEVATION) * z - np.sin(ELEVATION) * forward
-    depth = np.cos(ELEVATION) * forward + np.sin(ELEVATION) * z
+    x, y, z = points.T
+    forward, right = _rotated(x - at[0], y - at[1], -(at[2] + AZIMUTH))
+    down, depth = _rotated(z + 1.4, forward, ELEVATION)
     return np.column_stack([right, down]), float(np.mean(depth))
 
 

@@ -35,10 +35,9 @@ def write_page(
 
 def scene_data(scene: Scene) -> dict[str, Any]:
     """Return a scene as plain lists, rounded to what a screen shows (0.01 mm, 0.01 mrad)."""
-    forces = None
+    forces = patches = None
     if scene.Q is not None and scene.Y is not None:
         forces = {"Q": _list(scene.Q * 1e-3, 2), "Y": _list(scene.Y * 1e-3, 2)}
-    patches = None
     if scene.patches is not None:
         patches = {name: _list(scene.patches[name], 5) for name in "yz"}
         patches["N"] = _list(scene.patches["N"] * 1e-3, 2)
@@ -53,10 +52,10 @@ def scene_data(scene: Scene) -> dict[str, Any]:
         "time": _list(scene.time, 4), "distance": _list(scene.distance, 3),
         "pose": _list(scene.pose, 5),
         "track": {name: _list(values, 5) for name, values in scene.track.items()}, "forces": forces,
-        "contact": None if scene.contact is None else _list(scene.contact, 5),
+        "contact": _list(scene.contact, 5),
         "sections": [[{k: _list(v, 5) for k, v in section.items()} for section in pair]
                      for pair in scene.sections],
-        "seats": None if scene.seats is None else _list(scene.seats, 5), "patches": patches,
+        "seats": _list(scene.seats, 5), "patches": patches,
     }  # fmt: skip
 
 
@@ -74,4 +73,6 @@ def _words(name: str) -> str:
 
 
 def _list(values: Any, decimals: int) -> Any:
+    if values is None:
+        return None
     return np.round(np.nan_to_num(np.asarray(values)), decimals).tolist()

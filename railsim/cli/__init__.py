@@ -19,7 +19,7 @@ from typing import Any, cast
 import click
 from click.shell_completion import CompletionItem
 
-from railsim.cli.common import echo, print_json
+from railsim.cli.common import DONE, ENDED_EARLY, FAILED, LIMIT_EXCEEDED, WRONG_INPUT
 from railsim.cli.interrupts import (
     Interrupted,
     raise_pending_signal,
@@ -27,6 +27,7 @@ from railsim.cli.interrupts import (
     silence,
     usable_streams,
 )
+from railsim.cli.terminal import echo, print_json
 from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
 from railsim.threads import use_one_thread
 from railsim.version import __version__
@@ -37,7 +38,6 @@ COMPLETE = "_RAILSIM_COMPLETE"  # by which a shell asks for completions
 # The compiler's objects live as long as the process: to look through them for garbage takes 0.15 s
 # of a start and 0.3 s of the end
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
-DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 
 # name of a command, and what it does
 COMMANDS = {
@@ -123,7 +123,7 @@ def railsim() -> None:
     \b
     Example:
       railsim run coach_manchester curve_r250 --speed 20
-    """  # noqa: D301 - click reads the escape
+    """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -206,25 +206,19 @@ def _failed(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int
 def _called(arguments: list[str]) -> int:
     """Call a command; if it fails after a lost interrupt, the interrupt is the reason."""
     try:
-        status = _invoked(arguments)
-    except Exception:
-        raise_pending_signal()
-        raise
-    if status not in (DONE, ENDED_EARLY, LIMIT_EXCEEDED):
-        raise_pending_signal()
-    return status
-
-
-def _invoked(arguments: list[str]) -> int:
-    try:
         with railsim.make_context("railsim", arguments) as context:
-            status = railsim.invoke(context)
+            status = railsim.invoke(context) or DONE
     except click.exceptions.Exit as end:
-        return end.exit_code
+        status = end.exit_code
     except click.ClickException as error:
         where: click.Context | None = getattr(error, "ctx", None)
         if where is not None:
             echo(where.get_usage(), err=True)
         echo(f"railsim: {error.format_message()}", err=True)
-        return _failed(arguments, WRONG_INPUT, {"error": error.format_message()})
-    return status if isinstance(status, int) else DONE
+        status = _failed(arguments, WRONG_INPUT, {"error": error.format_message()})
+    except Exception:
+        raise_pending_signal()
+        raise
+    if status not in (DONE, ENDED_EARLY, LIMIT_EXCEEDED):
+        raise_pending_signal()
+    return int(status)

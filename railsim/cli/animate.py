@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import Output, option, output_options
 from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import TABLE_BYTES, read_text
 
@@ -40,7 +39,7 @@ def command(file: str, fps: int, gain: float, output: Output, **how: Any) -> Non
     \b
     Example:
       railsim animate run.h5 --out run.html
-    """  # noqa: D301 - click reads the escape  # fmt: skip
+    """
     from railsim.animation import write_movie, write_page
 
     path, overwrite = output.file(file, ENDINGS, suffix=".html"), output.overwrite

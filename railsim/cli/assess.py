@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Speed, allow_code_option, fail_option, flag, option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import (
+    DONE,
+    LIMIT_EXCEEDED,
+    Output,
+    allow_code_option,
+    as_speed,
+    fail_option,
+    flag,
+    option,
+    output_options,
+)
 from railsim.errors import Fault, Faults, InputError
 
 if TYPE_CHECKING:
@@ -17,6 +26,7 @@ if TYPE_CHECKING:
     from railsim.result import Result
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
+SERVICE = ("admissible_speed", "cant_deficiency", "category")  # keys of the service table
 FILES = (
     "assessment.json",
     "assessment.csv",
@@ -37,7 +47,7 @@ FILES = (
     kind=click.Choice(["normal", "simplified"]),
     default="normal",
 )
-@option("--admissible-speed", "Admissible speed in m/s, instead of the vehicle's.", "V", Speed())
+@option("--admissible-speed", "Admissible speed in m/s, instead of the vehicle's.", "V", as_speed)
 @option("--cant-deficiency", "Admissible cant deficiency in m.", "I", float)
 @option(
     "--category",
@@ -50,16 +60,7 @@ FILES = (
 @fail_option
 @output_options("Folder for assessment.json, .csv and .png.")
 @allow_code_option
-def command(
-    files: tuple[str, ...],
-    standard: str,
-    fail: bool,
-    admissible_speed: float | None,
-    cant_deficiency: float | None,
-    category: str | None,
-    output: Output,
-    **how: Any,
-) -> int:
+def command(files: tuple[str, ...], standard: str, fail: bool, output: Output, **how: Any) -> int:
     """Assess results: running behaviour, comfort, wear or derailment.
 
     Runs of one vehicle are assessed together, those of several vehicles one after the other; a
@@ -70,19 +71,14 @@ def command(
     Example:
       railsim assess coach_manchester_curve_r500_29.h5
       railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.assessment import assess
     from railsim.assessment.tables import assessment_lines
-    from railsim.cli import DONE, LIMIT_EXCEEDED
     from railsim.cli.gathered import opened
 
     results = opened(_paths(files))
     output.reserve(*FILES)
-    changes = {
-        "admissible_speed": admissible_speed,
-        "cant_deficiency": cant_deficiency,
-        "category": category,
-    }
+    changes = {name: how.pop(name) for name in SERVICE}
     assessments = assess(results, standard, service=_service(results, changes), **how)
     write_assessments(output, assessments)
     lines = [line for one in assessments for line in assessment_lines(one, quiet=output.quiet)]

@@ -4,9 +4,15 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import code_options, flag, names_of, option, workers_option
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
+from railsim.cli.common import (
+    Output,
+    code_options,
+    flag,
+    names_of,
+    option,
+    output_options,
+    workers_option,
+)
 from railsim.cli.study import ManyValues
 
 SHOWN = 40
@@ -38,13 +44,13 @@ def command(
     Example:
       railsim assess-track track/track.toml --vehicles coach_25t coach_manchester \\
           --speeds 40 --out judged
-    """  # noqa: D301 - click reads the escape
-    from railsim.plot.assessed_track import heat_strip
+    """
+    from railsim.plot.study import heat_strip
     from railsim.report.assessed_track import assessed_track_page
     from railsim.studies.assess_track import assess_track
     from railsim.studies.rows import speed_of
 
-    with progress_bar("assess-track", quiet=output.quiet) as progress:
+    with output.progress("assess-track") as progress:
         found = assess_track(
             recording,
             vehicles,
@@ -55,9 +61,10 @@ def command(
             **how,
         )
     output.written += found.write()
-    output.write("heat_strip.png", lambda: heat_strip(found))
-    output.write("report.html", lambda: assessed_track_page(found))
-    table = found.table()
+    table, strip = found.table(), heat_strip(found.cells, found.shares)
+    output.write("heat_strip.png", heat_strip(found.cells, found.shares))
+    page = assessed_track_page(found.table(), found.share, strip, found.notes, found.sections)
+    output.write("report.html", page)
     more = len(table) - SHOWN
     table.rows = table.rows[:SHOWN]
     further = [f"and {more} further places in places.csv"] if more > 0 else []

@@ -2,9 +2,7 @@
 
 import click
 
-from railsim.cli.common import flag
-from railsim.cli.output import Output, answer_options
-from railsim.cli.progress import progress_bar
+from railsim.cli.common import Output, answer_options, flag
 
 
 @click.command()
@@ -22,10 +20,10 @@ def command(quick: bool, output: Output) -> None:
     Example:
       railsim bench
       railsim bench --quick --json > bench.json
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.bench.runs import benchmark, table
 
-    with progress_bar("bench", quiet=output.quiet) as progress:
+    with output.progress("bench") as progress:
         found = benchmark(errors=not quick, progress=progress)
     facts, versions = found["hardware"], found["versions"].items()
     machine = (

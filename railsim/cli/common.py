@@ -1,22 +1,22 @@
-"""What the commands share: options, tables, machine-readable output."""
+"""What the commands share: options, the definitions that they name, and how they answer."""
 
 import json
-import os
-import shutil
-import sys
-import textwrap
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import fields
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from railsim.text import printable
+from railsim.cli.progress import progress_bar
+from railsim.cli.terminal import echo, plain, print_json, show
+from railsim.errors import Faults, InputError, input_error
+from railsim.files.access import check_file, check_folder, make_folder, whole_file, write_folder
 
 if TYPE_CHECKING:
+    from railsim.definitions import Settings, Track, Vehicle
     from railsim.definitions.base import Remark
     from railsim.definitions.file_definition import FileDefinition
     from railsim.table import Table
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4  # exit statuses
 COUNT = click.IntRange(min=1)
 
 
@@ -39,49 +40,26 @@ def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
     return click.option(*name.split(), is_flag=True, help=words, **more)
 
 
-class Speed(click.ParamType):  # type: ignore[type-arg]
-    """A speed in m/s, or with a unit: ``72km/h``."""
+def together(*options: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Return several options as one decorator, in this order."""
 
-    name = "speed"
+    def add(function: Any) -> Any:
+        for one in reversed(options):
+            function = one(function)
+        return function
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Return the speed in m/s."""
-        from railsim.units import speed_in_si
-
-        try:
-            return float(speed_in_si(str(value)))
-        except ValueError:
-            self.fail(f"'{value}' is not a speed, such as 20 or 72km/h", param, ctx)
+    return add
 
 
-def echo(text: object = "", *, err: bool = False) -> None:
-    """Print a line, on stderr with `err`; what would steer the terminal is shown as its code."""
-    click.echo(printable(str(text)), err=err)
+def as_speed(text: object) -> float:
+    """Return a speed in m/s, or with a unit: ``72km/h``; a type of options."""
+    from railsim.units import speed_in_si
 
-
-def show(*parts: "str | Table") -> None:
-    """Print lines and tables; a terminal gets both in its width, coloured unless ``NO_COLOR``."""
-    terminal = sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if terminal else None
-    for part in parts:
-        if isinstance(part, str):
-            for line in part.split("\n"):
-                echo(in_width(line, width))
-        else:  # texts of tables are literal already
-            lines = part.lines(width, colour=terminal and not os.environ.get("NO_COLOR"))
-            click.echo("\n".join(lines))
-
-
-def in_width(line: str, width: int | None) -> str:
-    """Return a line, in several ones where a terminal is narrower, under its first word."""
-    if width is None or len(line) <= width or not line.strip():
-        return line
-    indent = " " * (len(line) - len(line.lstrip()) + 2)
-    return textwrap.fill(
-        line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-    )
+    try:
+        return float(speed_in_si(str(text)))
+    except ValueError:
+        words = f"'{text}' is not a speed, such as 20 or 72km/h"
+        raise click.BadParameter(words) from None
 
 
 def names_of(kind: str) -> Callable[..., list[Any]]:
@@ -142,15 +120,11 @@ optional_track = click.argument(
 )
 
 
-def extent_options(function: F) -> F:
-    """Add ``--start``, ``--duration``, ``--until``."""
-    for option, metavar, words in (
-        ("--until", "S", "End of the run in m along the track."),
-        ("--duration", "T", "Length of the run in s."),
-        ("--start", "S", "Start in m along the track; default 0."),
-    ):
-        function = click.option(option, type=float, metavar=metavar, help=words)(function)
-    return function
+extent_options = together(
+    option("--start", "Start in m along the track; default 0.", "S", float),
+    option("--duration", "Length of the run in s.", "T", float),
+    option("--until", "End of the run in m along the track.", "S", float),
+)
 
 
 def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
@@ -173,17 +147,17 @@ allow_code_option = flag(
 )
 
 
-def code_options(function: F) -> F:
-    """Add ``--allow-code`` and ``--law``, which permit laws of one's own."""
-    files = option(
+code_options = together(
+    allow_code_option,
+    option(
         "--law",
         "Execute the laws of this file, or of this name; may be given several times.",
         "FILE",
         multiple=True,
         expose_value=False,
         callback=_allow,
-    )
-    return allow_code_option(files(function))
+    ),
+)
 
 
 def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F], F]:
@@ -200,29 +174,26 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
             own = {key: values.pop(key) for key in keys if key in values}
             return function(**values, **{name: kind(**own)})
 
-        for option in reversed(options):
-            command = option(command)
-        return command  # type: ignore[return-value]
+        return together(*options)(command)  # type: ignore[return-value]
 
     return add
 
 
-def linearisation_options(function: F) -> F:
-    """Add ``--linearisation`` and ``--amplitude``."""
-    linearisation = option(
+linearisation_options = together(
+    option(
         "--linearisation",
         "Contact: its derivative, or its first harmonic for --amplitude.",
         kind=click.Choice(["tangent", "harmonic"]),
         default="tangent",
-    )
-    amplitude = option(
+    ),
+    option(
         "--amplitude",
         "Lateral amplitude of the wheelsets in m, for harmonic.",
         "A",
         float,
         default=3e-3,
-    )
-    return linearisation(amplitude(function))
+    ),
+)
 
 
 @contextmanager
@@ -233,7 +204,6 @@ def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
     holds: spring, mechanism; `name`: the definition's own name, which faults found by computing
     bear.
     """
-    from railsim.errors import InputError
     from railsim.files.sources import find_file, read_source
 
     try:
@@ -248,17 +218,211 @@ def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
         ) from None
 
 
-def print_json(data: Any) -> None:
-    """Print data as JSON; numbers that JSON lacks become null."""
-    click.echo(json.dumps(plain(data), indent=2, allow_nan=False))
+MOST_VALUES = 2000
 
 
-def plain(data: Any) -> Any:
-    """Return data as JSON can hold it: names as text, numbers that it lacks as null."""
-    if isinstance(data, dict):
-        return {str(key): plain(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [plain(value) for value in data]
-    if isinstance(data, float):
-        return data if abs(data) < float("inf") else None
-    return data
+class Inputs(NamedTuple):
+    """Definitions of an analysis."""
+
+    vehicle: "Vehicle"
+    track: "Track"
+    settings: "Settings"
+
+
+@dataclass(frozen=True)
+class Given:
+    """Values of ``--load``, ``--settings``, ``--set``."""
+
+    load: str | None = None
+    settings: str | None = None
+    assignments: tuple[str, ...] = ()
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """The assignments with that of the load case."""
+        load = () if self.load is None else (f"vehicle.load={self.load}",)
+        return (*self.assignments, *load)
+
+    def inputs(self, vehicle: str, track: str | None, changes: Sequence[str] = ()) -> Inputs:
+        """Load vehicle, track (by default ``straight``) and settings, with further assignments.
+
+        Raises InputError: everything that is wrong in any of them.
+        """
+        from railsim.definitions.loading import load_settings, load_track, load_vehicle
+        from railsim.files.overrides import split_overrides
+
+        faults, parts = Faults(), dict[str, list[str]](vehicle=[], track=[], settings=[])
+        with faults.caught():
+            parts = split_overrides([*self.overrides, *changes])
+        with faults.caught():
+            coach = load_vehicle(vehicle, parts["vehicle"])
+        with faults.caught():
+            rails = load_track("straight" if track is None else track, parts["track"])
+        with faults.caught():
+            settings = load_settings(self.settings, parts["settings"])
+        faults.check()
+        return Inputs(coach, rails, settings)
+
+
+def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
+    """Add ``--load``, ``--settings`` and ``--set``; the command takes them as `given`.
+
+    `settings`: what counts of the settings file, by default all.
+    """
+    words = f"Settings file: {settings}." if settings else "Settings file."
+    options: list[Any] = [option("--settings", words, "F"), set_option]
+    return collected("given", Given, *[load_option] * load, *options)
+
+
+def as_values(ctx: click.Context, param: click.Parameter, text: str | None) -> list[float] | None:
+    """Return the values of an option, if it is given, see `values_of`; a callback of options."""
+    return values_of(text, param.opts[0]) if text else None
+
+
+def values_of(text: str, option: str) -> list[float]:
+    """Return the values of ``A:B:N`` (N values from A to B) or ``A,B,C``.
+
+    Examples
+    --------
+    >>> values_of("10:20:3", "--speeds"), values_of("0.2,0.4", "--friction")
+    ([10.0, 15.0, 20.0], [0.2, 0.4])
+    """
+    allowed = "first:last:number, such as 10:60:26, or values with commas between"
+    try:
+        if ":" in text:
+            first, last, number = text.split(":")
+            count = int(number)
+            if not 1 <= count <= MOST_VALUES:
+                raise ValueError
+            a, b = float(first), float(last)
+            step = (b - a) / (count - 1) if count > 1 else 0.0
+            values = [a + k * step for k in range(count)]
+        else:
+            values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise input_error(option, f"found '{text}'", allowed) from None
+    if not all(abs(value) < float("inf") for value in values):
+        raise input_error(option, f"found '{text}'", "finite numbers")
+    return values
+
+
+@dataclass
+class Output:
+    """Values of ``--out``, ``--overwrite``, ``--json``, ``--quiet``.
+
+    `written`: files written so far.
+    """
+
+    out: str | None = None
+    overwrite: bool = False
+    as_json: bool = False
+    quiet: bool = False
+    written: list[Path] = field(default_factory=list, init=False)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of ``--out``."""
+        return Path(self.out) if self.out else None
+
+    def reserve(self, *names: str) -> Path | None:
+        """Refuse the folder before anything is computed, if these files cannot be written."""
+        if self.folder is not None:
+            check_folder(self.folder, names, overwrite=self.overwrite)
+        return self.folder
+
+    def file(self, default: str | Path, endings: Sequence[str] = (), suffix: str = "") -> Path:
+        """Return the file of ``--out``, by default another with this suffix; refuse it early."""
+        path = Path(self.out or default)
+        if not self.out and path.name and suffix:
+            path = path.with_suffix(suffix)
+        check_file(path, overwrite=self.overwrite, endings=endings)
+        return path
+
+    def write(self, name: str, content: Any) -> None:
+        """Write a file into the folder, if there is one.
+
+        `name`: its name; `content`: bytes, a text, a `Table` (as CSV), a figure, or plain data (as
+        JSON); a function that returns one of them is called only where something is written.
+        """
+        if self.folder is None:
+            return
+        make_folder(self.folder)
+        path = self.folder / name
+        content = content() if callable(content) else content
+        if hasattr(content, "savefig"):
+            from railsim.plot.style import save
+
+            save(content, path, overwrite=True)
+        else:
+            with whole_file(path) as partial:
+                partial.write_bytes(_bytes(content))
+        self.written.append(path)
+
+    def write_all(self, content: Mapping[str, Any]) -> None:
+        """Write files into the folder, all of them or none; contents as of `write`."""
+        if self.folder is not None:
+            data = {name: _bytes(one) for name, one in content.items()}
+            self.written += write_folder(self.folder, data, overwrite=self.overwrite)
+
+    def answer(
+        self, record: Any, parts: "Iterable[str | Table]" = (), remarks: Iterable[object] = ()
+    ) -> None:
+        """Print the record as JSON; or texts and tables, remarks, and what was written."""
+        if self.as_json:
+            print_json(record)
+            return
+        show(*parts, *(() if self.quiet else (f"remark: {remark}" for remark in remarks)))
+        for path in self.written:
+            echo(path)
+
+    def finish(
+        self,
+        names: Sequence[str],
+        found: Any,
+        parts: "Iterable[str | Table]",
+        remarks: Iterable[object] = (),
+    ) -> None:
+        """Write the record and the plot of a result under two names, and answer with them."""
+        record = found.record()
+        self.write(names[0], record)
+        self.write(names[1], found.plot)
+        self.answer(record, parts, remarks)
+
+    def progress(self, words: str) -> AbstractContextManager[Callable[[float], None]]:
+        """Show progress under these words, see `railsim.cli.progress.progress_bar`."""
+        return progress_bar(words, quiet=self.quiet)
+
+    def remark(self, text: object) -> None:
+        """Print a remark on stderr, as during a computation."""
+        echo(f"remark: {text}", err=True)
+
+    def wrote(self, path: str | Path, **facts: Any) -> None:
+        """Answer with the only file that a command has written; ``--quiet`` not at all."""
+        if self.as_json or not self.quiet:
+            self.written.append(Path(path))
+            self.answer({"file": str(path), **facts})
+
+
+def _bytes(content: Any) -> bytes:
+    from railsim.table import Table
+
+    if isinstance(content, bytes):
+        return content
+    if isinstance(content, Table):
+        content = content.csv()
+    elif not isinstance(content, str):
+        content = json.dumps(plain(content), indent=1, allow_nan=False) + "\n"
+    return str(content).encode()
+
+
+def output_options(out: str = "") -> Callable[[F], F]:
+    """Add ``--overwrite``, ``--json``, ``--quiet``, and ``--out DIR`` where `out` says for what.
+
+    The command takes them as `output`.
+    """
+    folder = [option("--out", out, "DIR")] if out else []
+    return collected("output", Output, *folder, overwrite_option, json_option, quiet_option)
+
+
+answer_options = collected("output", Output, json_option, quiet_option)
+"""Adds ``--json`` and ``--quiet``; the command takes them as `output`."""

@@ -2,13 +2,12 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import option, print_json, show
+from railsim.cli.common import Output, option, output_options
 from railsim.cli.gathered import gather, opened
-from railsim.cli.output import Output, output_options
 from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
@@ -48,14 +47,14 @@ def command(files: tuple[str, ...], over: str, output: Output) -> None:
       railsim compare manchester.h5 flexicoil.h5 --out comparison --overwrite
       railsim compare curves
       railsim compare before after --out changes
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.compare import compare, comparison_table, comparison_tables, difference_table
     from railsim.plot.overlay import difference_figure, overlay
 
     groups = _groups(files, output)
     output.reserve(*(_named(name, title) for title in groups for name in FILES))
-    records = []
-    for number, (title, results) in enumerate(groups.items()):
+    records, parts = [], list[Any]()
+    for title, results in groups.items():
         rows = compare(results)
         differing, why = _differing(results)
         record = {
@@ -81,19 +80,14 @@ def command(files: tuple[str, ...], over: str, output: Output) -> None:
         if differing:
             first = next(iter(results))
             output.write(differences, lambda d=differing, of=first: difference_figure(d, of))
-        if output.as_json:
-            continue
         if title:
-            show(*[""] * (number > 0), title)
+            parts += [*[""] * bool(parts), title]
         for one in comparison_tables(rows, results):
-            show(one, "")
-        for label, result in results.items():
-            show(*(f"{label}: remark: {remark}" for remark in result.remarks))
-        show(*([difference_table(differing)] if differing else []), *why)
-    if output.as_json:
-        print_json(records[0] if list(groups) == [""] else {"groups": records})
-    else:
-        output.tell()
+            parts += [one, ""]
+        for label, result in () if output.quiet else results.items():
+            parts += [f"{label}: remark: {remark}" for remark in result.remarks]
+        parts += [difference_table(differing)] if differing else why
+    output.answer(records[0] if list(groups) == [""] else {"groups": records}, parts)
 
 
 def _named(name: str, title: str) -> str:
@@ -137,8 +131,7 @@ def _of_one(folder: str) -> dict[str, Group]:
             alike.setdefault(rest, {})[vehicle] = found.paths[record["name"]]
     pairs = {title: _results(paths) for title, paths in alike.items() if len(paths) > 1}
     if not pairs:
-        kept = len(found.paths)
-        why = "no two runs differ in nothing but the vehicle" if kept else "no result files"
+        why = "no two runs differ in nothing but the vehicle" if found.paths else "no result files"
         allowed = "give the result files that are to be compared; `railsim plot` shows a study"
         raise input_error(folder, why, allowed)
     return pairs

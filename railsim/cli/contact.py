@@ -1,15 +1,13 @@
 """``railsim contact``: contact geometry of a wheelset, equivalent conicity, patches, creep."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import COUNT, collected, echo, flag, option
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
+from railsim.cli.common import COUNT, Output, as_values, flag, option, output_options
+from railsim.cli.terminal import echo
 from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import check_folder
 
@@ -39,69 +37,35 @@ RANGES = {
 """What an option's number may be, and its unit."""
 
 
-@dataclass(frozen=True)
-class Geometry:
-    """Profiles on their track; values once, or for left and right."""
-
-    wheel: tuple[str, ...]
-    rail: tuple[str, ...]
-    radius: tuple[float, ...]
-    gauge: float
-    inclination: float
-    back_to_back: float
-    load: float
-    max_shift: float
-
-    def check(self) -> None:
-        """Refuse more values than there are sides, and numbers that mean nothing, all at once."""
-        Faults(
-            Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for each side")
-            for name, values in vars(self).items()
-            if isinstance(values, Sequence) and len(values) > 2
-        ).check()
-        faults = Faults()
-        for name, (low, high, unit) in RANGES.items():
-            values = getattr(self, name)
-            for value in values if isinstance(values, Sequence) else (values,):
-                if not low <= value <= high:
-                    option, allowed = name.replace("_", "-"), f"{low:g} to {high:g} {unit}"
-                    faults.append(Fault(f"--{option}", "", f"found {value:g}", allowed))
-        faults.check()
-
-
 @click.command()
 @click.argument("profiles", nargs=-1, metavar="[WHEEL] [RAIL]")
-@collected(
-    "geometry",
-    Geometry,
-    option(
-        "--wheel",
-        "Wheel profile, name or file; give it twice for different left and right wheels.",
-        "W",
-        multiple=True,
-        default=("S1002",),
-    ),
-    option(
-        "--rail",
-        "Rail profile, name or file; twice for left and right.",
-        "R",
-        multiple=True,
-        default=("60E1",),
-    ),
-    option("--gauge", "Track gauge (m).", default=1.435),
-    option("--inclination", "Rail inclination (1).", default=0.025),
-    option("--back-to-back", "Distance between the flange backs (m).", default=1.360),
-    option(
-        "--radius",
-        "Rolling radius (m); twice for left and right.",
-        kind=float,
-        multiple=True,
-        default=(0.46,),
-    ),
-    option("--load", "Vertical wheel load (N).", default=60e3),
-    option("--max-shift", "Largest lateral displacement (m).", default=0.010),
+@option(
+    "--wheel",
+    "Wheel profile, name or file; give it twice for different left and right wheels.",
+    "W",
+    multiple=True,
+    default=("S1002",),
 )
-@option("--gauges", "Also the conicity over N gauges from A to B (m).", "A:B:N")
+@option(
+    "--rail",
+    "Rail profile, name or file; twice for left and right.",
+    "R",
+    multiple=True,
+    default=("60E1",),
+)
+@option("--gauge", "Track gauge (m).", default=1.435)
+@option("--inclination", "Rail inclination (1).", default=0.025)
+@option("--back-to-back", "Distance between the flange backs (m).", default=1.360)
+@option(
+    "--radius radii",
+    "Rolling radius (m); twice for left and right.",
+    kind=float,
+    multiple=True,
+    default=(0.46,),
+)
+@option("--load", "Vertical wheel load (N).", default=60e3)
+@option("--max-shift", "Largest lateral displacement (m).", default=0.010)
+@option("--gauges", "Also the conicity over N gauges from A to B (m).", "A:B:N", callback=as_values)
 @option("--overlay", "With --out: also a wheel or rail profile drawn over the right one.", "P")
 @flag("--exact", "Check the patches by boundary elements (about ten seconds).")
 @option(
@@ -122,15 +86,19 @@ class Geometry:
 @output_options("Folder for pictures and tables; created if it does not exist.")
 def command(
     profiles: tuple[str, ...],
-    geometry: Geometry,
-    gauges: str | None,
+    wheel: tuple[str, ...],
+    rail: tuple[str, ...],
+    radii: tuple[float, ...],
+    gauges: list[float] | None,
     overlay: str | None,
     creep: bool,
     friction: float,
     build_creep_table: bool,
     workers: int,
     output: Output,
-    **how: Any,
+    exact: bool,
+    normal: Any,
+    **numbers: float,
 ) -> None:
     """Contact geometry of a wheelset on its rails.
 
@@ -144,8 +112,7 @@ def command(
       railsim contact S1002 60E1 --gauges 1.430:1.450:5
       railsim contact measured.whl 54E1 --overlay S1002 --out worn
       railsim contact --creep --friction 0.35 --out creep
-    """  # noqa: D301 - click reads the escape
-    from railsim.cli.inputs import values_of
+    """
     from railsim.contact import tables
     from railsim.contact.creep_curves import forces_by_law
     from railsim.contact.summary import conicity_over_gauge, contact_summary
@@ -156,38 +123,34 @@ def command(
         return
     if len(profiles) > 2:
         raise click.UsageError("give a wheel and a rail; --wheel and --rail twice for both sides")
-    geometry = replace(
-        geometry, wheel=profiles[:1] or geometry.wheel, rail=profiles[1:] or geometry.rail
-    )
-    geometry.check()
+    wheel, rail = profiles[:1] or wheel, profiles[1:] or rail
+    _check({"wheel": wheel, "rail": rail, "radius": radii}, numbers)
     if creep and not 0.0 < friction <= 1.0:
         raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
-    over = values_of(gauges, "--gauges") if gauges else []
-    if len(over) == 1:
+    if gauges and len(gauges) == 1:
         raise click.UsageError("--gauges needs two gauges at least")
     compared = load_profile(overlay) if overlay else None
     written = [*PICTURES, *TABLES]
     written += [*CREEP] if creep else []
-    written += [*MAP] if over else []
+    written += [*MAP] if gauges else []
     written += [OVERLAY] if compared else []
     output.reserve(*written)
-    numbers = {name: getattr(geometry, name) for name in RANGES}
-    radii = numbers.pop("radius")
-    with progress_bar("contact", quiet=output.quiet):
+    with output.progress("contact"):
         found = contact_summary(
-            _profiles(geometry.wheel, "wheel"),
-            _profiles(geometry.rail, "rail"),
+            _profiles(wheel, "wheel"),
+            _profiles(rail, "rail"),
             radii=(radii[0], radii[-1]),
+            exact=exact,
+            normal=normal,
             **numbers,
-            **how,
         )
     described = _described(found)
     _write(output, found)
-    if over:
-        by_gauge = conicity_over_gauge(found, over)
-        described.data.update(gauges=over, conicity_over_gauge=by_gauge.tolist())
-        described.parts.extend(["", tables.conicity_map_table(found, over, by_gauge)])
-        _write_map(output, found, over, by_gauge)
+    if gauges:
+        by_gauge = conicity_over_gauge(found, gauges)
+        described.data.update(gauges=gauges, conicity_over_gauge=by_gauge.tolist())
+        described.parts.extend(["", tables.conicity_map_table(found, gauges, by_gauge)])
+        _write_map(output, found, gauges, by_gauge)
     if creep:
         patch = found.main_patch(friction)
         rows = forces_by_law(patch)
@@ -201,10 +164,26 @@ def command(
         right = found.pairs[1]
         own = right.wheel if compared.kind == "wheel" else right.rail
         output.write(OVERLAY, lambda: overlay_figure([compared, own]))
-    if not output.as_json:
+    if not (output.as_json or output.quiet):
         for note in found.notes:
             echo(note, err=True)
     output.answer(described.data, described.parts)
+
+
+def _check(by_side: Mapping[str, Sequence[Any]], numbers: Mapping[str, float]) -> None:
+    """Refuse more values than there are sides, and numbers that mean nothing, all at once."""
+    Faults(
+        Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for each side")
+        for name, values in by_side.items()
+        if len(values) > 2
+    ).check()
+    faults = Faults()
+    for name, (low, high, unit) in RANGES.items():
+        for value in by_side[name] if name in by_side else [numbers[name]]:
+            if not low <= value <= high:
+                option, allowed = name.replace("_", "-"), f"{low:g} to {high:g} {unit}"
+                faults.append(Fault(f"--{option}", "", f"found {value:g}", allowed))
+    faults.check()
 
 
 def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
@@ -308,7 +287,7 @@ def _build_creep_table(workers: int, output: Output) -> None:
 
     folder = output.folder or Path("creep_table")
     check_folder(folder)
-    with progress_bar("creep table", quiet=output.quiet) as show:
+    with output.progress("creep table") as show:
         for done, count in build_nodes(folder, workers):
             show(done / count)
     nodes = gather_nodes(folder)

@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
-    Speed,
+    Given,
+    Inputs,
+    Output,
+    as_speed,
+    as_values,
     code_options,
+    given_options,
     linearisation_options,
     option,
     optional_track,
+    output_options,
+    values_of,
     vehicle_argument,
     workers_option,
 )
-from railsim.cli.inputs import Given, Inputs, given_options, values_of
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
 from railsim.errors import input_error
 
 if TYPE_CHECKING:
@@ -38,17 +42,18 @@ FILES = ("critical_speed.json", "critical_speed.png")
     kind=click.Choice(METHODS),
     default="ramp",
 )
-@option("--from low", "Lowest speed in m/s, or with a unit.", "V", Speed(), default=5.0)
-@option("--to high", "Highest speed in m/s, or with a unit.", "V", Speed(), default=120.0)
+@option("--from low", "Lowest speed in m/s, or with a unit.", "V", as_speed, default=5.0)
+@option("--to high", "Highest speed in m/s, or with a unit.", "V", as_speed, default=120.0)
 @option("--points", "Speeds of a bifurcation diagram.", "N", int, default=16)
 @option(
-    "--excitation",
+    "--excitation excitations",
     "Disturbances from which hunting is sought, in m; default: 1 to 8 mm.",
     "A,B,...",
+    callback=as_values,
 )
 @linearisation_options
-@option("--conicity", "Straight cones as wheels; several: a map.", "G or A:B:N")
-@option("--friction", "Friction; several values: a map.", "MU or A:B:N")
+@option("--conicity", "Straight cones as wheels; several: a map.", "G or A:B:N", callback=as_values)
+@option("--friction", "Friction; several values: a map.", "MU or A:B:N", callback=as_values)
 @option(
     "--over",
     "A map over a key of the vehicle, track or settings; at most two parameters.",
@@ -65,9 +70,8 @@ def command(
     given: Given,
     output: Output,
     method: str,
-    excitation: str | None,
-    conicity: str | None,
-    friction: str | None,
+    conicity: list[float] | None,
+    friction: list[float] | None,
     over: tuple[str, ...],
     **how: Any,
 ) -> None:
@@ -84,32 +88,33 @@ def command(
       railsim critical-speed coach_manchester --method all --out stability --overwrite
       railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
-    """  # noqa: D301 - click reads the escape
-    load, workers = partial(given.inputs, vehicle, track), how.pop("workers")
+    """
+    workers = how.pop("workers")
+    load = partial(given.inputs, vehicle, track)
     inputs, ranges = load(), _ranges(conicity, friction, over)
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))
-    if excitation:
-        how["excitations"] = values_of(excitation, "--excitation")
+    if how["excitations"] is None:
+        del how["excitations"]
     points = [
         _point(inputs, load, dict(zip(ranges, values, strict=True)))
         for values in product(*ranges.values())
     ]
     output.reserve(*FILES)
-    with progress_bar("critical speed", quiet=output.quiet) as progress:
-        how["progress"] = progress
-        if len(points) > 1:
-            _map(points, ranges, how, workers, output)
-        else:
-            _one(points[0], how, output)
-
-
-def _one(point: "MapPoint", how: dict[str, Any], output: Output) -> None:
+    if len(points) > 1:
+        _map(points, ranges, how, workers, output)
+        return
     from railsim.stability.critical_speed import critical_speed
 
-    cones = point.at.get("conicity")
-    found = critical_speed(
-        point.vehicle, point.track, settings=point.settings, conicity=cones, **how
-    )
+    at = points[0]
+    with output.progress("critical speed") as progress:
+        found = critical_speed(
+            at.vehicle,
+            at.track,
+            settings=at.settings,
+            conicity=at.at.get("conicity"),
+            progress=progress,
+            **how,
+        )
     output.finish(FILES, found, [found.table(), *filter(None, [found.verdict()])], found.remarks)
 
 
@@ -123,16 +128,16 @@ def _map(
     from railsim.plot.stability import map_figure
     from railsim.studies.stability_map import map_speeds, map_table, stability_map
 
-    progress = how.pop("progress")
-    found = stability_map(
-        points,
-        {**how, "over_amplitude": False},
-        folder=output.folder,
-        workers=workers,
-        overwrite=output.overwrite,
-        progress=progress,
-        on_remark=output.remark,
-    )
+    with output.progress("critical speed") as progress:
+        found = stability_map(
+            points,
+            {**how, "over_amplitude": False},
+            folder=output.folder,
+            workers=workers,
+            overwrite=output.overwrite,
+            progress=progress,
+            on_remark=output.remark,
+        )
     axes = {name: values for name, values in ranges.items() if len(values) > 1}
     title = f"{points[0].vehicle.name}: critical speed"
     output.write(FILES[0], found)
@@ -142,11 +147,11 @@ def _map(
 
 
 def _ranges(
-    conicity: str | None, friction: str | None, over: tuple[str, ...]
+    conicity: list[float] | None, friction: list[float] | None, over: tuple[str, ...]
 ) -> dict[str, list[float]]:
     """Values by parameter; of a map two parameters at most."""
-    texts = {"conicity": conicity, "friction": friction}
-    found = {name: values_of(text, f"--{name}") for name, text in texts.items() if text}
+    found = {"conicity": conicity or [], "friction": friction or []}
+    found = {name: values for name, values in found.items() if values}
     for text in over:
         key, equals, values = text.partition("=")
         if not equals:

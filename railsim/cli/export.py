@@ -1,9 +1,10 @@
 """``railsim export``: a result in the files of other programs."""
 
+from typing import Any
+
 import click
 
-from railsim.cli.common import option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import Output, option, output_options
 
 
 @click.command()
@@ -19,14 +20,7 @@ from railsim.cli.output import Output, output_options
     default="si",
 )
 @output_options()
-def command(
-    file: str,
-    quantities: tuple[str, ...],
-    between: tuple[float, float] | None,
-    rate: float | None,
-    units: str,
-    output: Output,
-) -> None:
+def command(file: str, quantities: tuple[str, ...], units: str, output: Output, **how: Any) -> None:
     """Write a result, or some of its quantities, as CSV, for MATLAB and Octave, or as Parquet.
 
     CSV and Parquet have a column for each wheel, body or sensor of each quantity; a MATLAB file
@@ -36,10 +30,10 @@ def command(
     Example:
       railsim export run.h5 --out run.mat
       railsim export run.h5 Q Y --between 300 400 --rate 50 --units shown --out curve.csv
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.result import open_run
     from railsim.result.export import ENDINGS, export, selected
 
-    out, shown = output.file("", ENDINGS), units == "shown"
-    part = selected(open_run(file), quantities, between=between, rate=rate, shown_units=shown)
+    out = output.file("", ENDINGS)
+    part = selected(open_run(file), quantities, shown_units=units == "shown", **how)
     output.wrote(export(part, out, overwrite=output.overwrite))

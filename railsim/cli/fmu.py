@@ -5,21 +5,23 @@ from typing import Any
 import click
 
 from railsim.cli.common import (
-    Speed,
+    Given,
+    Output,
+    as_speed,
     code_options,
     extent_options,
+    given_options,
     option,
+    output_options,
     track_argument,
     vehicle_argument,
 )
-from railsim.cli.inputs import Given, given_options
-from railsim.cli.output import Output, output_options
 
 
 @click.command()
 @vehicle_argument
 @track_argument
-@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", Speed())
+@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", as_speed)
 @option("--inputs", "Actuators that are commanded; default all.", "A,B")
 @option("--outputs", "Quantities and signals; default Q, Y, lateral.", "X,Y")
 @option("--out", "The unit.", "F.fmu", required=True)
@@ -46,7 +48,7 @@ def command(
     Example:
       railsim fmu coach_manchester curve_r250 --speed 20 --out coach.fmu
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.errors import argument_error
     from railsim.fmi import OUTPUTS, fmu
     from railsim.studies.case import load_case

@@ -6,8 +6,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import code_options, flag, option, vehicle_argument
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import Output, code_options, flag, option, output_options, vehicle_argument
 from railsim.errors import input_error
 from railsim.files.access import make_folder
 
@@ -62,7 +61,7 @@ def command(
     \b
     Example:
       railsim identify coach_25t run12.toml -p coil_spring.stiffness.z,bodies.carbody.mass --out fit
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.identification import identify
 
     folder, quiet = output.reserve(*FILES), output.quiet or output.as_json

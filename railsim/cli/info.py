@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli.common import (
-    Speed,
+    Output,
+    as_speed,
     collected,
     flag,
     json_option,
@@ -18,7 +19,6 @@ from railsim.cli.common import (
     set_option,
 )
 from railsim.cli.gathered import STUDY_FILES, described_runs
-from railsim.cli.output import Output
 from railsim.files.access import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ DRAWN = "--draw is for vehicles and tracks"
     "Speed for the cant deficiency in the curves of a track, m/s or with a unit; may be "
     "given several times.",
     "V",
-    Speed(),
+    as_speed,
     multiple=True,
 )
 @flag(
@@ -59,7 +59,7 @@ def command(
     Example:
       railsim info coach_manchester --draw coach.png --overwrite
       railsim info curve_r250 --speed 20 --speed 25
-    """  # noqa: D301 - click reads the escape
+    """
     path = Path(file)
     result = path.suffix.lower() in RESULTS
     runs = os.path.isdir(file) or path.name in STUDY_FILES

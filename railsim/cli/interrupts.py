@@ -21,7 +21,7 @@ from io import TextIOWrapper
 from types import FrameType
 from typing import TextIO
 
-from railsim.cli.common import echo
+from railsim.cli.terminal import echo
 from railsim.files.access import remove_partial_files
 
 # Ctrl-C, and on POSIX what `kill` sends, and what a terminal that is closed

@@ -4,9 +4,15 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import code_options, names_of, option, rails_option, set_option
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
+from railsim.cli.common import (
+    Output,
+    code_options,
+    names_of,
+    option,
+    output_options,
+    rails_option,
+    set_option,
+)
 from railsim.errors import input_error
 
 FILES = ("irregularity.json", "irregularity.png")
@@ -49,13 +55,10 @@ def command(
     measured: str,
     vehicle: str | None,
     track: str | None,
-    spectrum: str,
-    scale: float,
-    wavelengths: tuple[float, float],
-    noise: float,
     simulations: int,
     assignments: tuple[str, ...],
     output: Output,
+    **given: Any,
 ) -> None:
     """Irregularities of a track and wheel forces from accelerations of a vehicle.
 
@@ -69,14 +72,14 @@ def command(
     Example:
       railsim irregularity run.toml --vehicle coach_25t --out track
       railsim info track/track.toml
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.definitions.loading import load_track, load_vehicle
     from railsim.measurement import load_measurement
     from railsim.observation import Assumed, irregularity
     from railsim.observation.estimate import FILES as WRITTEN
     from railsim.plot.observation import irregularity_figure
 
-    assumed = Assumed(spectrum, scale, wavelengths, noise)
+    assumed = Assumed(**given)
     assumed.check()
     folder = output.reserve(*FILES, *WRITTEN)
     measurement = load_measurement(measured, assignments)
@@ -86,7 +89,7 @@ def command(
         raise input_error("--vehicle", "not given", "the vehicle that measured")
     case = getattr(how, "load", None)
     load = [f"load={case}"] if case else []
-    with progress_bar(measurement.name, quiet=output.quiet) as progress:
+    with output.progress(measurement.name) as progress:
         found = irregularity(
             measurement,
             load_vehicle(name, load),

@@ -5,8 +5,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import collected, json_option, option, overwrite_option
-from railsim.cli.output import Output
+from railsim.cli.common import Output, collected, json_option, option, overwrite_option
 
 
 @click.command()
@@ -22,7 +21,7 @@ def command(kinds: tuple[str, ...], draw: str | None, output: Output) -> None:
     \b
     Example:
       railsim list vehicles
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.description.library import KINDS, LAWS, MEANING, PROFILES, library_entries
     from railsim.errors import Fault, Faults, nearest
     from railsim.table import Column, Table

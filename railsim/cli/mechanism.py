@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import COUNT, faults_in, flag, option, set_option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import COUNT, Output, faults_in, flag, option, output_options, set_option
 
 if TYPE_CHECKING:
     from railsim.mechanisms.analysis import Analysis
@@ -54,7 +53,7 @@ def command(
       railsim mechanism atr95_lift_4 --optimise --starts 20 --seed 1
       railsim mechanism atr95_lift_5 atr95_lift_4 --at height=0.8955
       railsim mechanism tilting_one_spring --case bordolese_5000 --json
-    """  # noqa: D301 - click reads the escape
+    """
     if searched and len(files) > 1:
         raise click.UsageError("--optimise takes one FILE")
     if not searched and (starts is not None or seed is not None):
@@ -79,7 +78,10 @@ def command(
                 cases = {name: analyse(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
     if output.out is not None:
-        content = _content(results, cases, optimum)
+        from railsim.report.mechanisms import Collected
+        from railsim.report.mechanisms import files as written
+
+        content = written(Collected(results, cases, optimum))
         if optimum is not None:
             from railsim.mechanisms.optimised_file import optimised_text
 
@@ -171,23 +173,3 @@ def _result_parts(result: "Analysis", at: Sequence[dict[str, Any]]) -> "list[str
         tables.scatter_table(scatter(definition) if definition.tolerances else []),
     )
     return parts + [part for table in found if len(table) for part in ("", table)]
-
-
-def _content(
-    results: Sequence["Analysis"], cases: dict[str, "Analysis"], optimum: "Optimum | None"
-) -> dict[str, bytes]:
-    """Page, pictures, animation and table, by the names of their files."""
-    from railsim.mechanisms.comparison import compare
-    from railsim.report import mechanisms as report
-    from railsim.report.document import as_png
-
-    comparison = compare(results) if len(results) > 1 else None
-    collected = report.Collected(results, cases, comparison, optimum)
-    drawn = {name: as_png(figure) for name, figure in report.figures(collected).items()}
-    content = {f"{name}.png": png for name, png in drawn.items()}
-    content["animation.gif"] = report.animation(collected.result)
-    content["positions.csv"] = report.positions(collected.result)
-    if collected.result.timed is not None:
-        content["motion.csv"] = report.motion_table(collected.result)
-    content[REPORT] = report.page(collected, drawn).encode()
-    return content

@@ -10,17 +10,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
-    Speed,
+    Given,
+    Inputs,
+    Output,
+    as_speed,
+    as_values,
     code_options,
     flag,
+    given_options,
     linearisation_options,
     option,
     optional_track,
+    output_options,
+    values_of,
     vehicle_argument,
 )
-from railsim.cli.inputs import Given, Inputs, given_options, values_of
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
 from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
@@ -35,8 +39,8 @@ CYCLE = {"frames": 40, "cycles": 1}
 @click.command()
 @vehicle_argument
 @optional_track
-@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", Speed(), default=20.0)
-@option("--speeds", "N speeds from A to B: a root locus.", "A:B:N")
+@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", as_speed, default=20.0)
+@option("--speeds", "N speeds from A to B: a root locus.", "A:B:N", callback=as_values)
 @option(
     "--over",
     "Root locus over a key of the vehicle, track or settings at --speed.",
@@ -72,7 +76,7 @@ def command(
     vehicle: str,
     track: str | None,
     speed: float,
-    speeds: str | None,
+    speeds: list[float] | None,
     over: str | None,
     animate: str | None,
     given: Given,
@@ -91,7 +95,7 @@ def command(
       railsim modes coach_manchester --speeds 10:80:36 --linearisation harmonic --out modes
       railsim modes coach_manchester --speed 40 --animate "front hunting" --out modes
       railsim modes coach_manchester --speed 40 --over track.friction=0.1:0.6:11
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.linear.modes import Modes, RootLocus, modes, root_locus
 
     if speeds is not None and over is not None:
@@ -103,13 +107,12 @@ def command(
         raise input_error("--animate", wrong, "one speed, and --out DIR")
     page = ALL if animate is None else ANIMATION
     folder = output.reserve(*FILES, *[page] * (speeds is None and over is None))
-    with progress_bar("modes", quiet=output.quiet):
+    with output.progress("modes"):
         found: Modes | RootLocus
         if over is not None:
             found = _over(load, over, speed, how)
         elif speeds is not None:
-            values = values_of(speeds, "--speeds")
-            found = root_locus(coach, rails, settings=settings, speeds=values, **how)
+            found = root_locus(coach, rails, settings=settings, speeds=speeds, **how)
         else:
             found = modes(coach, rails, settings=settings, speed=speed, **how)
     if folder is not None and isinstance(found, Modes):

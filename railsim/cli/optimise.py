@@ -7,15 +7,15 @@ import click
 
 from railsim.cli.common import (
     COUNT,
+    Output,
     code_options,
     flag,
     names_of,
     option,
+    output_options,
     scheduler_option,
     workers_option,
 )
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
@@ -58,12 +58,12 @@ def command(study: str, output: Output, **how: Any) -> None:
     Example:
       railsim optimise examples/primary_and_yaw_damper.toml --out compromise
       railsim optimise my_study.toml --evaluations 200 --method nsga2 --seed 3
-    """  # noqa: D301 - click reads the escape
+    """
     if how["workers"] != 1 and how["scheduler"] is None:
         begin_server()  # which imports on another core while this process does
     from railsim.studies.optimise import optimise
 
-    with progress_bar("optimise", quiet=output.quiet) as progress:
+    with output.progress("optimise") as progress:
         found = optimise(
             study,
             out=str(output.out),

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import option
+from railsim.cli.common import Output, option, output_options
 from railsim.cli.gathered import folder_of, gather
-from railsim.cli.output import Output, output_options
 from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files.access import PICTURES, RESULTS
 
@@ -78,7 +77,7 @@ def command(
       railsim plot run.h5 Y Q:1 --over time --by wheelset --out forces.pdf
       railsim plot curve_r250 --out curve.png
       railsim plot my_track.toml recording --out recording.png
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.plot.style import save
 
     folder = folder_of(file)
@@ -87,7 +86,7 @@ def command(
     path = output.file(default, PICTURES, suffix=".png")
     options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
-        figure = _study_figure(str(folder), selections, options)
+        figure = _study_figure(str(folder), selections, against, family, kind)
     elif wrong := [option for option, value in options.items() if value]:
         found = f"'{file}' is no study's folder"
         raise input_error(wrong[0], found, "a folder of results")
@@ -103,7 +102,11 @@ def command(
 
 
 def _study_figure(
-    file: str, selections: tuple[str, ...], options: "dict[str, str | None]"
+    file: str,
+    selections: tuple[str, ...],
+    against: str | None,
+    family: str | None,
+    kind: str | None,
 ) -> "Figure":
     from railsim.plot.study import curves_figure, map_figure, ranking_figure
     from railsim.report.spread import columns, parameters
@@ -121,20 +124,17 @@ def _study_figure(
     )
     varied = {name: _quantity(column) for name, column in parameters(records).items()}
     faults += [
-        Fault(
-            option, "", f"'{options[option]}' was not varied", nearest(str(options[option]), varied)
-        )
-        for option in ("--against", "--family")
-        if options[option] and options[option] not in varied
+        Fault(option, "", f"'{name}' was not varied", nearest(name, varied))
+        for option, name in (("--against", against), ("--family", family))
+        if name and name not in varied
     ]
     faults.check()
     quantities = [_quantity(known[name]) for name in names]
     # most values first, numbers before words
     order = sorted(varied, key=lambda n: (not varied[n].numeric, -len(varied[n].different)))
-    x = options["--against"] or next((n for n in order if n != options["--family"]), None)
-    rest = [name for name in order if name != x]
-    family = options["--family"] or next(iter(rest), None)
-    kind = options["--kind"] or ("curves" if x and varied[x].numeric else "ranking")
+    x = against or next((name for name in order if name != family), None)
+    family = family or next((name for name in order if name != x), None)
+    kind = kind or ("curves" if x and varied[x].numeric else "ranking")
     if kind == "ranking" or x is None:
         return ranking_figure(quantities, [str(record["name"]) for record in records])
     if kind == "map":
@@ -149,8 +149,8 @@ def _quantity(column: "dict[str, Any]") -> "Column":
     from railsim.plot.study import Column
 
     words, unit = column["words"], column["unit"]
-    sentence = " " in words  # a name in a file stays as it is
-    words = f"{words[:1].upper()}{words[1:]}" if sentence else words
+    if " " in words:  # a name in a file stays as it is
+        words = words[:1].upper() + words[1:]
     return Column(f"{words} ({unit})" if unit else words, column["values"])
 
 

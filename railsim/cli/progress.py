@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from threading import Event, Thread, main_thread
 from typing import Any
 
-from railsim.cli.common import echo
 from railsim.cli.interrupts import raise_pending_signal
+from railsim.cli.terminal import echo
 from railsim.text import counted_remarks
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing

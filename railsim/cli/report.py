@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import Output, option, output_options
 from railsim.files.access import write_text
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def command(files: tuple[str, ...], title: str | None, curves: int, output: Outp
     Example:
       railsim report curves --out report.html
       railsim report manchester.h5 flexicoil.h5 --out coaches.html --overwrite
-    """  # noqa: D301 - click reads the escape
+    """
     path = output.file("", ENDINGS)
     write_report(files, path, title=title, curves=curves)
     output.wrote(path)

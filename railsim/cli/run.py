@@ -6,18 +6,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
-    Speed,
+    DONE,
+    ENDED_EARLY,
+    Given,
+    Output,
+    as_speed,
     code_options,
     extent_options,
     flag,
+    given_options,
     option,
-    show,
+    output_options,
     track_argument,
     vehicle_argument,
 )
-from railsim.cli.inputs import Given, given_options
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
+from railsim.cli.terminal import show
 from railsim.errors import Fault, Faults
 
 if TYPE_CHECKING:
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 @click.command()
 @vehicle_argument
 @track_argument
-@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", Speed())
+@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", as_speed)
 @option("--out", "Result file; default VEHICLE_TRACK_SPEED.h5.", "R.h5")
 @extent_options
 @option("--continue before", "Begin where this result of the same inputs ended.", "R.h5")
@@ -62,8 +65,7 @@ def command(
       railsim run coach_manchester curve_r250 --speed 20 --overwrite
       railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.3 --out dry.h5
       railsim run coach_manchester curve_r250 --speed 20 --check-step --overwrite
-    """  # noqa: D301 - click reads the escape
-    from railsim.cli import DONE, ENDED_EARLY
+    """
     from railsim.definitions.track.layout import track_remarks
     from railsim.result.facts import run_facts
     from railsim.result.tables import result_parts
@@ -81,7 +83,7 @@ def command(
     quiet, overwrite = output.quiet, output.overwrite
     if not (quiet or output.as_json):
         show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
-    with progress_bar(case.name, quiet=quiet) as progress:
+    with output.progress(case.name) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **run_facts(result)}
     remarks = [f"{track}: {remark}" for remark in track_remarks(case.track)]
@@ -99,7 +101,7 @@ def command(
             step_table,
         )
 
-        with progress_bar("half the step", quiet=quiet) as progress:
+        with output.progress("half the step") as progress:
             half = half_step(result, progress=progress)
         differences = step_differences(result, half)
         record["half_step"] = [difference_record(row) for row in differences]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, faults_in, flag, option, set_option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import Output, faults_in, flag, option, output_options, set_option, together
+from railsim.cli.terminal import echo
 from railsim.files.access import TABLES, is_file, write_text
 
 if TYPE_CHECKING:
@@ -32,13 +32,16 @@ def command() -> None:
       railsim spring verify turasas_axlebox --out suspension --overwrite
       railsim spring fatigue turasas_axlebox --json
       railsim spring vehicle turasas_axlebox --out my_coach.toml --overwrite
-    """  # noqa: D301 - click reads the escape
+    """
 
 
-def _spring_command(function: Any) -> Any:
-    """Make a command of the group with a file, a folder for pages and the common options."""
-    options = output_options(f"Folder for the pictures and the page {REPORT}.")
-    return command.command()(click.argument("file")(set_option(options(function))))
+# a command of the group with a file, a folder for pages and the common options
+_spring_command = together(
+    command.command(),
+    click.argument("file"),
+    set_option,
+    output_options(f"Folder for the pictures and the page {REPORT}."),
+)
 
 
 @_spring_command
@@ -53,7 +56,7 @@ def design(file: str, search: bool, assignments: tuple[str, ...], output: Output
     Example:
       railsim spring design turasas_axlebox
       railsim spring design turasas_axlebox --search --set search.objective=fatigue
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.springs.design import design as designed
     from railsim.springs.summary import design_data, search_data
     from railsim.springs.tables import design_table, search_table
@@ -95,7 +98,7 @@ def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
     Example:
       railsim spring verify turasas_axlebox --out suspension --overwrite
       railsim spring verify turasas_axlebox --set inner.wire_diameter=0.028 --json
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.design_checks import check_table
     from railsim.springs import tables
     from railsim.springs.datasheet import data_sheets
@@ -126,7 +129,7 @@ def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
     Example:
       railsim spring fatigue turasas_axlebox
       railsim spring fatigue turasas_axlebox --set fatigue.max_load=80e3 --json
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.springs.summary import fatigue_data
     from railsim.springs.tables import fatigue_table
     from railsim.springs.verification import dynamic_loads
@@ -158,7 +161,7 @@ def vehicle(
     Example:
       railsim spring vehicle turasas_axlebox --out my_coach.toml --overwrite
       railsim run my_coach.toml curve_r250 --speed 20 --overwrite
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.definitions.loading import load_spring
     from railsim.errors import input_error, nearest
     from railsim.springs.vehicle_table import vehicle_part, vehicle_text
@@ -202,13 +205,9 @@ def _write_pages(
     """Write pictures and page into the folder of ``--out``, if there is one."""
     if output.folder is None:
         return
-    from railsim.report.document import as_png
-    from railsim.report.springs import collected, figures, page
+    from railsim.report.springs import files
 
-    results = collected(suspension, search)
-    drawn = {name: as_png(figure) for name, figure in figures(results).items()}
-    files: dict[str, Any] = {f"{name}.png": png for name, png in drawn.items()}
-    output.write_all({**files, REPORT: page(results, drawn)})
+    output.write_all(files(suspension, search))
 
 
 def _load_remarks(

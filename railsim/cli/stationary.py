@@ -1,10 +1,22 @@
 """``railsim stationary``: stationary tests on twisted and canted track."""
 
+from typing import Any
+
 import click
 
-from railsim.cli.common import code_options, fail_option, flag, option, rails_option
-from railsim.cli.inputs import Given, given_options
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import (
+    DONE,
+    LIMIT_EXCEEDED,
+    Given,
+    Output,
+    code_options,
+    fail_option,
+    flag,
+    given_options,
+    option,
+    output_options,
+    rails_option,
+)
 
 FILES = ("stationary.json", "stationary.png")
 
@@ -21,13 +33,13 @@ FILES = ("stationary.json", "stationary.png")
 @code_options
 def command(
     vehicle: str,
-    cant: float | None,
     rolling: bool,
     limits: str,
     track: str | None,
     fail: bool,
     given: Given,
     output: Output,
+    **how: Any,
 ) -> int:
     """Compare a vehicle on twisted track and on cant with limits.
 
@@ -39,15 +51,14 @@ def command(
     Example:
       railsim stationary coach_manchester
       railsim stationary coach_manchester --cant 0.15 --rolling
-    """  # noqa: D301 - click reads the escape
-    from railsim.cli import DONE, LIMIT_EXCEEDED
+    """
     from railsim.definitions.loading import load_stationary_limits
     from railsim.studies.stationary import stationary
 
     body, rails, settings = given.inputs(vehicle, track)
     output.reserve(*FILES)
     found = stationary(
-        body, rails, load_stationary_limits(limits), cant=cant, held=not rolling, settings=settings
+        body, rails, load_stationary_limits(limits), held=not rolling, settings=settings, **how
     )
     remarks = [f"wheelsets {'held' if found.held else 'free'} across the track"]
     if not all(v.checked for v in found.values if v.limit is not None):

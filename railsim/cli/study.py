@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import chdir
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,20 +11,23 @@ import click
 
 from railsim.cli.common import (
     COUNT,
+    DONE,
+    ENDED_EARLY,
+    FAILED,
+    Given,
+    Output,
     code_options,
-    collected,
-    echo,
     extent_options,
     flag,
+    given_options,
     names_of,
     option,
+    output_options,
     scheduler_option,
-    show,
     workers_option,
 )
-from railsim.cli.inputs import Given, given_options
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import RunLines, progress_bar
+from railsim.cli.progress import RunLines
+from railsim.cli.terminal import echo, show
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
@@ -72,76 +75,33 @@ def _is_number(text: str) -> bool:
     return True
 
 
-@dataclass(frozen=True)
-class Asked:
-    """The options that say which runs: lists of files, values, keys."""
-
-    vehicles: tuple[str, ...]
-    tracks: tuple[str, ...]
-    speeds: tuple[str, ...]
-    grid: tuple[str, ...]
-    start: float | None
-    duration: float | None
-    until: float | None
-
-    def inputs(self, given: Given) -> dict[str, Any]:
-        """Return them by the keys of a study file."""
-        from railsim.errors import Faults
-        from railsim.studies.plan import parse_grid
-
-        faults, grid = Faults(), dict[str, list[str]]()
-        for text in self.grid:
-            with faults.caught():
-                key, values = parse_grid(text)
-                grid.setdefault(key, []).extend(values)
-        faults.check()
-        found = {name: list(getattr(self, name)) for name in ("vehicles", "tracks", "speeds")}
-        return {
-            **found,
-            "grid": grid,
-            "assignments": list(given.overrides),
-            "settings": given.settings,
-            "start": self.start or 0.0,
-            "duration": self.duration,
-            "until": self.until,
-        }
-
-
 @click.command(cls=ManyValues)
 @click.argument("file", required=False, metavar="[STUDY]", shell_complete=names_of("study"))
-@collected(
-    "asked",
-    Asked,
-    option(
-        "--vehicles",
-        "Vehicles: files or names.",
-        "F...",
-        multiple=True,
-        shell_complete=names_of("vehicle"),
-    ),
-    option(
-        "--tracks",
-        "Tracks: files or names.",
-        "F...",
-        multiple=True,
-        shell_complete=names_of("track"),
-    ),
-    option(
-        "--speeds",
-        "Speeds in m/s, or with a unit (72km/h); ranges first:last:number; permitted: the "
-        "lower of the vehicle's and the track's speed.",
-        "V...",
-        multiple=True,
-    ),
-    option(
-        "--grid",
-        "Values of further keys, or ranges first:last:number; paths begin with vehicle., "
-        "track. or settings.",
-        "KEY.PATH=A,B,C...",
-        multiple=True,
-    ),
-    extent_options,
+@option(
+    "--vehicles",
+    "Vehicles: files or names.",
+    "F...",
+    multiple=True,
+    shell_complete=names_of("vehicle"),
 )
+@option(
+    "--tracks", "Tracks: files or names.", "F...", multiple=True, shell_complete=names_of("track")
+)
+@option(
+    "--speeds",
+    "Speeds in m/s, or with a unit (72km/h); ranges first:last:number; permitted: the "
+    "lower of the vehicle's and the track's speed.",
+    "V...",
+    multiple=True,
+)
+@option(
+    "--grid",
+    "Values of further keys, or ranges first:last:number; paths begin with vehicle., "
+    "track. or settings.",
+    "KEY.PATH=A,B,C...",
+    multiple=True,
+)
+@extent_options
 @option(
     "--quantities",
     "Function called with each result; it returns further numbers by name.",
@@ -176,7 +136,6 @@ class Asked:
 @code_options
 def command(
     file: str | None,
-    asked: Asked,
     scenario: str | None,
     given: Given,
     output: Output,
@@ -203,9 +162,10 @@ def command(
           --grid vehicle.bodies.carbody.mass=36e3,40e3,44e3,48e3 --together 8 --out mass
       railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
-    """  # noqa: D301 - click reads the escape
+    """
     kept = {name: how.pop(name) for name in ("keep", "compress", "single")}
-    taken = {**vars(asked), **kept, "keep": kept["keep"] != "all", "settings": given.settings}
+    asked = {name: how.pop(name) for name in OF_FILE if name != "settings"}
+    taken = {**asked, **kept, "keep": kept["keep"] != "all", "settings": given.settings}
     taken |= {"STUDY": file, "quantities": quantities, "plots": how["plots"], "vehicles": None}
     taken["together"] = how["together"] > 1
     campaign = partial(
@@ -217,7 +177,7 @@ def command(
     )
     if scenario is not None:
         overrides = given.overrides
-        return campaign(scenario, asked.vehicles, output, assignments=overrides, resume=resume)
+        return campaign(scenario, asked["vehicles"], output, assignments=overrides, resume=resume)
     folder, base = Path(str(output.out)), Path.cwd()
     done = not output.overwrite and (folder / "study.json").exists()
     if not done and how["workers"] != 1 and how["scheduler"] is None:
@@ -226,7 +186,13 @@ def command(
     from railsim.studies.study import run_study, stored_spec
     from railsim.studies.user_function import given_again
 
-    inputs = asked.inputs(given)
+    inputs = {
+        **asked,
+        "grid": _grid(asked["grid"]),
+        "assignments": given.overrides,
+        "settings": given.settings,
+        "start": asked["start"] or 0.0,
+    }
     if resume and file is None and not any(inputs.values()):
         spec, base = stored_spec(folder)
         spec = spec.changed(quantities=given_again(spec.quantities, quantities))
@@ -241,7 +207,7 @@ def command(
         spec = _spec(file, inputs, quantities, kept)
     lines = RunLines()
     # names of files in a study that goes on count from where it was started
-    with chdir(base), progress_bar("study", quiet=output.quiet) as progress:
+    with chdir(base), output.progress("study") as progress:
         outcome = run_study(
             spec,
             folder,
@@ -266,6 +232,20 @@ def command(
     return _status(outcome)
 
 
+def _grid(texts: Sequence[str]) -> dict[str, list[str]]:
+    """Values by the keys of ``--grid``."""
+    from railsim.errors import Faults
+    from railsim.studies.plan import parse_grid
+
+    faults, grid = Faults(), dict[str, list[str]]()
+    for text in texts:
+        with faults.caught():
+            key, values = parse_grid(text)
+            grid.setdefault(key, []).extend(values)
+    faults.check()
+    return grid
+
+
 def _campaign(
     scenario: str,
     vehicles: Sequence[str],
@@ -282,7 +262,6 @@ def _campaign(
     of `railsim.studies.campaign`.
     """
     from railsim.assessment.tables import assessment_lines
-    from railsim.cli import DONE
     from railsim.cli.assess import write_assessments
     from railsim.errors import Fault, Faults
     from railsim.studies.campaign import campaign
@@ -294,7 +273,7 @@ def _campaign(
         faults.append(Fault("--vehicles", "", "not given", "give one vehicle at least"))
     faults.check()
     lines = RunLines()
-    with progress_bar(scenario, quiet=output.quiet) as progress:
+    with output.progress(scenario) as progress:
         done = campaign(
             scenario,
             list(vehicles),
@@ -359,7 +338,6 @@ def _print_end(outcome: "Outcome") -> None:
 
 
 def _status(outcome: "Outcome") -> int:
-    from railsim.cli import DONE, ENDED_EARLY, FAILED
 
     if outcome.failed:
         return FAILED

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import echo, print_json, remarks_on
-from railsim.cli.output import Output, answer_options
+from railsim.cli.common import DONE, WRONG_INPUT, Output, answer_options, remarks_on
+from railsim.cli.terminal import echo, print_json
 from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
@@ -26,12 +26,15 @@ def command(files: tuple[str, ...], output: Output) -> int:
     \b
     Example:
       railsim validate my_coach.toml curve_r250
-    """  # noqa: D301 - click reads the escape
-    from railsim.cli import DONE, WRONG_INPUT
-
+    """
     reports = [_report(file) for file in files]
     if output.as_json:
-        print_json([_record(report) for report in reports])
+        print_json(
+            [
+                one | {"faults": [asdict(fault) | {"text": str(fault)} for fault in one["faults"]]}
+                for one in reports
+            ]
+        )
     else:
         for report in reports:
             _print(report, output.quiet)
@@ -39,18 +42,14 @@ def command(files: tuple[str, ...], output: Output) -> int:
 
 
 def _report(file: str) -> dict[str, Any]:
-    from railsim.errors import InputError
+    from railsim.errors import Fault, InputError
 
+    faults, kind, remarks = list[Fault](), None, list[dict[str, str]]()
     try:
         kind, remarks = checked(file)
     except InputError as error:
-        return {"file": file, "kind": None, "faults": list(error.faults), "remarks": []}
-    return {"file": file, "kind": kind, "faults": [], "remarks": remarks}
-
-
-def _record(report: dict[str, Any]) -> dict[str, Any]:
-    faults = [{**asdict(fault), "text": str(fault)} for fault in report["faults"]]
-    return {**report, "faults": faults}
+        faults = list(error.faults)
+    return {"file": file, "kind": kind, "faults": faults, "remarks": remarks}
 
 
 def _print(report: dict[str, Any], quiet: bool) -> None:

@@ -6,8 +6,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import code_options, fail_option, names_of, option
-from railsim.cli.output import Output, output_options
+from railsim.cli.common import (
+    DONE,
+    LIMIT_EXCEEDED,
+    Output,
+    code_options,
+    fail_option,
+    names_of,
+    option,
+    output_options,
+)
 from railsim.files.access import RESULTS
 
 if TYPE_CHECKING:
@@ -47,9 +55,8 @@ def command(
     Example:
       railsim validate-model run12.toml run12.h5 --out comparison
       railsim validate-model run12.toml run13.toml study/
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.assessment.model_validation import validate_model
-    from railsim.cli import DONE, LIMIT_EXCEEDED
     from railsim.measurement import load_measurement
 
     output.reserve(*FILES)

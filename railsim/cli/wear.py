@@ -1,15 +1,22 @@
 """``railsim wear``, ``railsim rail-wear``: profiles over distance or tonnage as they wear."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from railsim.cli.common import Speed, allow_code_option, option, track_argument, vehicle_argument
-from railsim.cli.inputs import Given, given_options
-from railsim.cli.output import Output, output_options
-from railsim.cli.progress import progress_bar
+from railsim.cli.common import (
+    Given,
+    Output,
+    allow_code_option,
+    as_speed,
+    given_options,
+    option,
+    output_options,
+    track_argument,
+    vehicle_argument,
+)
 
 if TYPE_CHECKING:
     from railsim.studies.wear_loop import WearStep
@@ -33,7 +40,7 @@ law_option = option(
     "A track, its speed in m/s or with a unit, and its share of the distance in any unit; may "
     "be repeated.",
     "TRACK V SHARE",
-    (str, Speed(), float),
+    (str, as_speed, float),
     required=True,
     multiple=True,
 )
@@ -59,7 +66,7 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
     Example:
       railsim wear coach_manchester --route curve_r500 20 0.3 --route straight 40 0.7 \\
           --distance 6000 --step 1000 --out worn
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.definitions.loading import load_wheel_limits
     from railsim.studies.wear_loop import Route, wear_loop, wear_rows
 
@@ -67,18 +74,13 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
     ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
     (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
     named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
-    of = Wearing(
-        coach.name,
-        "km",
-        1e3,
-        "--distance",
+    _carry_out(
+        WHEELS,
         {"vehicle": coach.name, "routes": named},
-        [(w.track.name, w.speed, w.share) for w in ways],
-        "mean of all wheels; y from the nominal rolling circle, negative towards the flange",
-        lambda **more: wear_loop(coach, ways, limits=ends, settings=settings, **more),
+        partial(wear_loop, coach, ways, limits=ends, settings=settings),
         lambda found: {"rows": wear_rows(found, coach, ways[0].track)},
+        **how,
     )
-    _carry_out(of, **how)
 
 
 @click.command()
@@ -88,7 +90,7 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
     "A vehicle, its speed in m/s or with a unit, and its share of the tonnage in any unit; "
     "may be repeated.",
     "VEHICLE V SHARE",
-    (str, Speed(), float),
+    (str, as_speed, float),
     required=True,
     multiple=True,
 )
@@ -111,49 +113,56 @@ def rails(track: str, traffic: Mix, given: Given, **how: Any) -> None:
     Example:
       railsim rail-wear curve_r500 --traffic coach_manchester 20 3 --traffic wagon_y25 20 1 \\
           --tonnage 0.1 --step 0.05 --out worn
-    """  # noqa: D301 - click reads the escape
+    """
     from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
 
     inputs = [given.inputs(vehicle, track) for vehicle, _, _ in traffic]
     mix = [Traffic(i.vehicle, v, share) for i, (_, v, share) in zip(inputs, traffic, strict=True)]
     _, worn, settings = inputs[0]
     named = [{"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix]
-    of = Wearing(
-        worn.name,
-        "Mt",
-        1e9,
-        "--tonnage",
-        {"track": worn.name, "traffic": named},
-        [(t.vehicle.name, t.speed, t.share) for t in mix],
-        "both rails; y from the middle of the rail, negative towards the gauge side",
-        lambda **more: rail_wear(worn, mix, settings=settings, **more),
-        rail_rows,
-    )
-    _carry_out(of, **how)
+    record = {"track": worn.name, "traffic": named}
+    _carry_out(RAILS, record, partial(rail_wear, worn, mix, settings=settings), rail_rows, **how)
 
 
-@dataclass(frozen=True)
-class Wearing:
-    """What wears, and how it is shown.
+class Worn(NamedTuple):
+    """What wears: by what amount it is told, and how it is shown."""
 
-    `name`, `unit`, `scale`, `option`: heading; unit of distance or tonnage, its factor to SI, and
-    the option that gives it; `record`: what stands first in the record; `shares`: runs, speeds and
-    shares; `note`: what is averaged, and where y begins; `loop`, `rows`: the study; its steps to
-    the rows of each profile.
-    """
-
-    name: str
+    amount: str  # distance or tonnage: the option and the column
     unit: str
-    scale: float
-    option: str
-    record: Mapping[str, Any]
-    shares: Sequence[tuple[str, float, float]]
-    note: str
-    loop: "Callable[..., list[WearStep]]"
-    rows: "Callable[[list[WearStep]], Rows]"
+    scale: float  # of the unit, to SI
+    note: str  # what is averaged, and where y begins
 
 
-def _carry_out(of: Wearing, distance: float, step: float, law: str, output: Output) -> None:
+WHEELS = Worn(
+    "distance",
+    "km",
+    1e3,
+    "mean of all wheels; y from the nominal rolling circle, negative towards the flange",
+)
+RAILS = Worn(
+    "tonnage",
+    "Mt",
+    1e9,
+    "both rails; y from the middle of the rail, negative towards the gauge side",
+)
+
+
+def _carry_out(
+    of: Worn,
+    given: Mapping[str, Any],
+    loop: "Callable[..., list[WearStep]]",
+    rows_of: "Callable[[list[WearStep]], Rows]",
+    *,
+    distance: float,
+    step: float,
+    law: str,
+    output: Output,
+) -> None:
+    """Run a study of wear, write and print it.
+
+    `given`: name of what wears, and its runs with speeds and shares; they stand first in the
+    record; `rows_of`: makes rows of each profile from the steps.
+    """
     from railsim.assessment.wear import wear_law
     from railsim.errors import RailsimError
     from railsim.profiles import save_profile
@@ -170,8 +179,8 @@ def _carry_out(of: Wearing, distance: float, step: float, law: str, output: Outp
 
     ended = None
     try:
-        with progress_bar("wear", quiet=output.quiet) as progress:
-            of.loop(
+        with output.progress("wear") as progress:
+            loop(
                 step=of.scale * step,
                 steps=steps,
                 law=law,
@@ -184,8 +193,8 @@ def _carry_out(of: Wearing, distance: float, step: float, law: str, output: Outp
         if not found:
             raise
         ended = error
-    rows = of.rows(found)
-    record: dict[str, Any] = {**of.record, "step": of.scale * step, "law": law, **rows}
+    rows = rows_of(found)
+    record: dict[str, Any] = {**given, "step": of.scale * step, "law": law, **rows}
     record |= {"remarks": remarks, "ended": None if ended is None else str(ended)}
     output.write(RECORD, record)
     for done in found:
@@ -194,46 +203,48 @@ def _carry_out(of: Wearing, distance: float, step: float, law: str, output: Outp
                 name = _file_name(of, done.distance + done.length, side)
                 output.written.append(save_profile(worn, folder / name))
     if "rows" in rows:
-        from railsim.plot.wear import wear_figure
+        from railsim.plot.study import wear_figure
 
         wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
-        title = f"{of.name}: wear of the wheels"
+        title = f"{given['vehicle']}: wear of the wheels"
         output.write(PICTURE, lambda: wear_figure(wheels, rows["rows"], title))
     if ended is None or not output.as_json:
-        output.answer(record, _parts(of, wear_law(law).source, rows))
+        output.answer(record, _parts(of, given, wear_law(law).source, rows))
     if ended is not None:
         raise ended
 
 
-def _file_name(of: Wearing, amount: float, side: str = "wheel") -> str:
+def _file_name(of: Worn, amount: float, side: str = "wheel") -> str:
     return f"{side}_{amount / of.scale:g}_{of.unit}.csv"
 
 
-def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
+def _number_of_steps(of: Worn, distance: float, step: float) -> int:
     from railsim.errors import Fault, Faults, input_error
 
     Faults(
         Fault(option, "", f"found {value:g}", "above 0")
-        for option, value in ((of.option, distance), ("--step", step))
+        for option, value in ((f"--{of.amount}", distance), ("--step", step))
         if not 0.0 < value < float("inf")
     ).check()
     steps = round(min(distance / step, MOST_STEPS + 1.0))
     if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
-        whole = of.option.removeprefix("--")
-        found = f"found {step:g} {of.unit} with a {whole} of {distance:g} {of.unit}"
-        allowed = f"the {whole} divided by a whole number from 1 to {MOST_STEPS}"
+        found = f"found {step:g} {of.unit} with a {of.amount} of {distance:g} {of.unit}"
+        allowed = f"the {of.amount} divided by a whole number from 1 to {MOST_STEPS}"
         raise input_error("--step", found, allowed)
     return steps
 
 
-def _parts(of: Wearing, source: str, rows: Rows) -> "list[str | Table]":
+def _parts(of: Worn, given: Mapping[str, Any], source: str, rows: Rows) -> "list[str | Table]":
     from railsim.table import Column, Table
 
-    total = sum(share for _, _, share in of.shares)
-    shares = ", ".join(f"{share / total:.0%} {name} at {v:g} m/s" for name, v, share in of.shares)
-    parts: list[str | Table] = [of.name, f"  {shares}", f"  {source}, {of.note}"]
+    worn, runs = given.values()
+    total = sum(run["share"] for run in runs)
+    shares = ", ".join(
+        f"{share / total:.0%} {name} at {v:g} m/s" for name, v, share in map(dict.values, runs)
+    )
+    parts: list[str | Table] = [worn, f"  {shares}", f"  {source}, {of.note}"]
     columns = [
-        Column("distance", "distance" if of.unit == "km" else "tonnage", of.unit, "g"),
+        Column("distance", of.amount, of.unit, "g"),
         Column("area", "worn area", "mm2", ".2f"),
         Column("deepest", "", "mm", ".3f"),
         Column("deepest_y", "at y", "mm", ".1f"),

@@ -16,7 +16,7 @@ from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
-from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, key, note, styled
+from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
 LEAST_SPEEDS = 3  # for curves over the speed
@@ -90,10 +90,10 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
         return None
     zones = sorted({zone.zone for zone in reports})
     names = list(dict.fromkeys(row.criterion.name for zone in reports for row in zone.rows))
-    looks: dict[str, dict[str, Any]] = {}
-    for k, name in enumerate(names):
-        marker = "o^"[k // len(DISTINCT) % 2]
-        looks[name] = {"color": distinct(k), "marker": marker, "ls": "", "ms": 4}
+    looks: dict[str, dict[str, Any]] = {
+        name: {"color": distinct(k), "marker": "o^"[k // len(DISTINCT) % 2], "ls": "", "ms": 4}
+        for k, name in enumerate(names)
+    }
     x, height = "middle of the section (km)", 1.8 + 2.4 * len(assessments)
     figure, grid = _by_zone(assessments, zones, x, height, sharex="col")
     for axes, assessment in zip(grid, assessments, strict=True):
@@ -208,8 +208,7 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     The line is the middle of the car, the band all its measuring points; behind the mean comfort
     the classes of the standard.
     """
-    figure = Picture(10.2, 4.4)
-    mean, index = figure.subplots(1, 2)
+    figure, mean, index = _comfort_axes(assessments, 10.2, 4.4, "speed (km/h)")
     kinds: dict[tuple[str, str, str], list[tuple[float, Sequence[PointComfort]]]] = {}
     for a in assessments:
         for run, points in a.comfort.items():
@@ -224,8 +223,6 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
         _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
         for way, line in (("lateral", "-"), ("vertical", "--")):
             _over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)  # type: ignore[misc]
-    mean.set(xlabel="speed (km/h)", ylabel="$N_{MV}$", title="Mean comfort, EN 12299")
-    index.set(xlabel="speed (km/h)", ylabel="$W_z$", title="Sperling")
     for ax in (mean, index):
         ax.set_ylim(bottom=0.0)
     _classes(mean, assessments)
@@ -233,9 +230,21 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     ways = key("$W_z$ lateral", color="0.3"), key("$W_z$ vertical", color="0.3", ls="--")
     handles = [*mean.get_legend_handles_labels()[0], band, *ways]
     figure.legend(handles=handles, loc="outside right upper")
-    title = list(dict.fromkeys(kind[k] for k in (0, 1) for kind in kinds))
-    figure.suptitle("\n".join(map(unformatted, title[:4])), x=0.012, ha="left")
     return figure
+
+
+def _comfort_axes(
+    assessments: Sequence[Assessment], width: float, height: float, over: str
+) -> tuple[Picture, Axes, Axes]:
+    """Axes of mean comfort and of Sperling's index under the names of vehicles and tracks."""
+    names = [a.vehicle for a in assessments]
+    names += [track for a in assessments for _, track, _ in a.driven.values()]
+    shown = [*dict.fromkeys(names)][:4]
+    figure = Picture(width, height, "\n".join(map(unformatted, shown)))
+    mean, index = figure.subplots(1, 2)
+    mean.set(xlabel=over, ylabel="$N_{MV}$", title="Mean comfort, EN 12299")
+    index.set(xlabel=over, ylabel="$W_z$", title="Sperling")
+    return figure, mean, index
 
 
 Runs = Sequence[tuple[float, Sequence[PointComfort]]]
@@ -263,30 +272,22 @@ def _classes(axes: Axes, assessments: Sequence[Assessment]) -> None:
         if bottom < top:
             axes.axhspan(bottom, min(end, top), color="0.5", alpha=0.05 + 0.06 * number, lw=0)
             at, look = (0.99, bottom + 0.02 * top), {"fontsize": 7.5, "color": "0.35"}
-            frame = ("axes fraction", "data")
-            note(axes, name, at, (0, 0), "right", frame=frame, **look)
+            note(axes, name, at, (0, 0), "right", frame=BESIDE, **look)
         bottom = end
     axes.set_ylim(0.0, top)
 
 
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean comfort and Sperling's index along the car, a line for each run."""
-    figure = Picture(9.6, 3.8)
-    mean, index = figure.subplots(1, 2)
-    number = 0
-    for assessment in assessments:
-        for run, points in assessment.comfort.items():
-            ordered = sorted(points, key=lambda point: point.place)
-            x = [point.place for point in ordered]
-            colour = distinct(number)
-            mean.plot(x, [p.mean.N_MV for p in ordered], "o-", color=colour, label=run)
-            for way, line in (("lateral", "-"), ("vertical", "--")):
-                values = [p.sperling[way] for p in ordered]
-                index.plot(x, values, "o", ls=line, color=colour)
-            number += 1
-    mean.set(xlabel="along the car, forwards (m)", ylabel="$N_{MV}$")
-    mean.set(title="Mean comfort, EN 12299")
-    index.set(xlabel="along the car, forwards (m)", ylabel="$W_z$", title="Sperling")
+    figure, mean, index = _comfort_axes(assessments, 9.6, 3.8, "along the car, forwards (m)")
+    runs = [pair for assessment in assessments for pair in assessment.comfort.items()]
+    for number, (run, points) in enumerate(runs):
+        ordered = sorted(points, key=lambda point: point.place)
+        x = [point.place for point in ordered]
+        colour = distinct(number)
+        mean.plot(x, [p.mean.N_MV for p in ordered], "o-", color=colour, label=run)
+        for way, line in (("lateral", "-"), ("vertical", "--")):
+            index.plot(x, [p.sperling[way] for p in ordered], "o", ls=line, color=colour)
     index.plot([], [], "-", color="0.3", label="lateral")
     index.plot([], [], "--", color="0.3", label="vertical")
     for ax in (mean, index):
@@ -294,9 +295,6 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
         ax.margins(y=0.15)
     handles = [handle for ax in (mean, index) for handle in ax.get_legend_handles_labels()[0]]
     figure.legend(handles=handles, loc="outside right upper")
-    names = [a.vehicle for a in assessments]
-    names += [track for a in assessments for _, track, _ in a.driven.values()]
-    figure.suptitle("\n".join(map(unformatted, list(dict.fromkeys(names))[:4])), x=0.012, ha="left")
     return figure
 
 
@@ -340,25 +338,22 @@ def _life_model(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) -> 
     axes.plot([], [], "o", color="0.3", ms=4, label="50 % of the time below")
     axes.plot([], [], "^", color="0.3", ms=4, label="95 %")
     axes.set(xlabel=r"wear number $T\gamma$ (N)", ylabel="damage a pass, WLRM ($10^{-6}$)")
-    _legend(axes)
+    axes.legend(loc="best")
 
 
 def _shakedown_map(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) -> None:
     """Worst patch of every wheel against the elastic shakedown limit."""
     mu = np.linspace(0.0, 0.6, 200)
     axes.plot(mu, shakedown_limit(mu), color=LIMIT, lw=1.2, label="elastic shakedown limit")
+    known = False
     for k, (_, wheels) in enumerate(runs):
         found = [
             (w.utilised_friction, w.pressure_ratio) for w in wheels if w.pressure_ratio is not None
         ]
         if found:
             axes.plot(*zip(*found, strict=True), "o", color=distinct(k), ms=4)
-    if not any(w.pressure_ratio is not None for _, wheels in runs for w in wheels):
+            known = True
+    if not known:
         axes.set_title("needs outputs.contact_patches", fontsize=9)
     axes.set(xlabel="utilised friction $T/N$", ylabel="$p_0/k$", xlim=(0.0, None), ylim=(0.0, None))
-    _legend(axes)
-
-
-def _legend(axes: Axes) -> None:
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="best")
+    axes.legend(loc="best")

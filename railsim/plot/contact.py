@@ -5,7 +5,6 @@ mm, degrees, MPa.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,6 +27,10 @@ SIDE_COLOURS = {"left": DISTINCT[1], "right": DISTINCT[0]}
 ZONE_COLOURS = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DISTINCT[1]}
 TABLE_LINES = ("-", "--")
 LIFT = 14.0  # height at which the wheel is drawn above its rail [mm]
+EXPLAINED = (
+    "lines join points that touch,\nnumbers are the wheelset's\ndisplacement to the right (mm);"
+    f"\nthe wheel is raised by {LIFT:.0f} mm"
+)
 
 
 @styled()
@@ -43,18 +46,17 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     """
     measured = [p for pair in pairs for p in (pair.wheel, pair.rail) if p.measured is not None]
     unique = list(dict.fromkeys(measured))
-    rows = 1 + bool(unique)
-    height = 3.0 + 2.4 * bool(unique)
+    rows, height = (2, 5.4) if unique else (1, 3.0)
     edges = 0.06, 0.45 / height, 0.99, 1.0 - 0.3 / height, 0.14, 0.28
     figure = Picture(9.6, height, edges=edges)
     grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
     for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
         axes = figure.add_subplot(grid[0, side])
         _draw_pair(axes, geometry, pair, side)
-        words = f"{name}: {pair.wheel.name} on {pair.rail.name}"
-        axes.set_title(unformatted(words))
-        if side == 0:
-            _explain(axes)
+        axes.set_title(unformatted(f"{name}: {pair.wheel.name} on {pair.rail.name}"))
+        if side == 0:  # within the rail's head
+            look = {"fontsize": 6.5, "frame": "axes fraction"}
+            note(axes, EXPLAINED, (0.5, 0.16), (0, 0), "center", "center", **look)
     if unique:
         _draw_smoothing(figure.add_subplot(grid[1, :]), unique)
     return figure
@@ -92,21 +94,10 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
     axes.set(xlabel="lateral position $y$ (mm)", ylabel="height (mm)")
 
 
-def _explain(axes: Axes) -> None:
-    """Say within the rail's head what lines and numbers are."""
-    words = (
-        "lines join points that touch,\nnumbers are the wheelset's\ndisplacement to the right (mm);"
-        f"\nthe wheel is raised by {LIFT:.0f} mm"
-    )
-    look = {"fontsize": 6.5, "frame": "axes fraction"}
-    note(axes, words, (0.5, 0.16), (0, 0), "center", "center", **look)
-
-
 def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
-    """How far smoothing moved the points, along the contour's normal."""
+    """How far smoothing moved the points of measured profiles, along the contour's normal."""
     for colour, profile in zip(DISTINCT, profiles, strict=False):
-        if profile.measured is None:
-            continue
+        assert profile.measured is not None
         moved = profile.measured - np.stack((profile.y, profile.z))
         tangent = np.stack((np.gradient(profile.y), np.gradient(profile.z)))
         tangent /= np.hypot(*tangent)
@@ -132,10 +123,8 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
         (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
     )
     for panel, values, label in panels:
-        for side, name in enumerate(SIDES):
-            panel.plot(
-                y, values[:, side], color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name
-            )
+        for own, name in zip(values.T, SIDES, strict=True):
+            panel.plot(y, own, color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name)
         panel.set_ylabel(label)
     axes[0, 1].legend(loc="upper center")
     axes[0, 0].set_ylabel("rolling radius difference $\\Delta r$ (mm)")
@@ -288,5 +277,5 @@ def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:
     for patch in contact.patches:
         # seen from above, the patch's width is foreshortened by its angle
         width = 2e3 * patch.b * np.cos(patch.angle)
-        look: Any = {"fill": False, "ls": line, "lw": 1.2, "color": ZONE_COLOURS[patch.zone]}
-        axes.add_patch(Ellipse((1e3 * patch.y, 0.0), width, 2e3 * patch.a, **look))
+        at, colour = (1e3 * patch.y, 0.0), ZONE_COLOURS[patch.zone]
+        axes.add_patch(Ellipse(at, width, 2e3 * patch.a, fill=False, ls=line, lw=1.2, color=colour))

@@ -4,7 +4,6 @@ Seen as the wheel looks at the rail from above: forward is up, right is right.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -54,6 +53,9 @@ def creep_curves_figure(
         _draw_curves(panel, patch, direction, scale, laws, (nx, ny))
         if exact_points:
             _draw_exact(panel, patch, direction, exact_points)
+        if len(_components(direction)) > 1:
+            words, look = "solid $T_x$, dashed $T_y$", {"fontsize": 8, "frame": "axes fraction"}
+            note(panel, words, (0.985, 0.03), (0, 0), "right", "bottom", **look)
         panel.set_title(name)
         panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
         panel.set_xlim(0.0, LARGEST)
@@ -62,10 +64,7 @@ def creep_curves_figure(
     for panel in panels[3:]:
         panel.set_xlabel("magnitude of the normalised creepage")
     handles, labels = panels[0].get_legend_handles_labels()
-    where: Any = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.0)}
-    figure.legend([*handles], [*labels], ncols=len(labels), **where)
-    for panel in panels:
-        _name_components(panel)
+    figure.legend(handles, labels, ncols=len(labels), loc="lower center", bbox_to_anchor=(0.5, 0.0))
     return figure
 
 
@@ -102,18 +101,13 @@ def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: in
     unit = patch.unit_creepages(direction)
     sizes = np.linspace(0.0, 1.0, count + 1)[1:] ** 1.5 * LARGEST
     forces = np.array([exact_force(patch, s * unit)[:2] for s in sizes])
-    look: Any = {"ms": 3.6, "mfc": "none", "mec": "0.1", "mew": 0.9, "clip_on": False}
     label = "full theory"
     for column, _ in _components(direction):
-        panel.plot(sizes, forces[:, column] / (patch.mu * patch.N), "o", label=label, **look)
+        shares = forces[:, column] / (patch.mu * patch.N)
+        panel.plot(
+            sizes, shares, "o", label=label, ms=3.6, mfc="none", mec="0.1", mew=0.9, clip_on=False
+        )
         label = "_"
-
-
-def _name_components(panel: Axes) -> None:
-    """Say which lines are longitudinal where a picture has both."""
-    if any(line.get_linestyle() == "--" for line in panel.get_lines()):
-        words, look = "solid $T_x$, dashed $T_y$", {"fontsize": 8, "frame": "axes fraction"}
-        note(panel, words, (0.985, 0.03), (0, 0), "right", "bottom", **look)
 
 
 @styled()
@@ -170,18 +164,20 @@ def _draw_traction(panel: Axes, solution: ExactCreepForce, top: float) -> QuadMe
         middle = 0.5 * (x[:-1] + x[1:])
         border = np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
         across, border = 1e3 * np.array([strips[j] - half, strips[j] + half]), 1e3 * border
-        colours: Any = {"cmap": "YlOrBr", "vmin": 0.0, "vmax": top, "rasterized": True}
-        image = panel.pcolormesh(across, border, size[j][:, None], **colours)
+        image = panel.pcolormesh(
+            across, border, size[j][:, None], cmap="YlOrBr", vmin=0.0, vmax=top, rasterized=True
+        )
         held = np.flatnonzero(solution.sticks[j])
         if held.size:
-            hatched: Any = {"facecolor": "none", "edgecolor": STICK, "hatch": "////", "lw": 0.0}
             ends = border[held[-1] + 1], border[held[0]]
-            panel.fill_between(across, *ends, alpha=0.6, **hatched)
+            panel.fill_between(
+                across, *ends, alpha=0.6, facecolor="none", edgecolor=STICK, hatch="////", lw=0.0
+            )
     every = [max(count // 9, 1) for count in solution.x.shape]
     shown = tuple(slice(step // 2, None, step) for step in every)
     y, x, t_y, t_x = (v[shown] for v in (solution.y, solution.x, solution.t_y, solution.t_x))
-    look: Any = {"color": "0.1", "width": 0.006, "pivot": "mid"}
-    panel.quiver(1e3 * y, 1e3 * x, t_y, t_x, scale=12e6 * top, **look)
+    at, scale = (1e3 * y, 1e3 * x), 12e6 * top
+    panel.quiver(*at, t_y, t_x, scale=scale, color="0.1", width=0.006, pivot="mid")
     a = float(solution.x.max()) / float(np.cos(np.pi / (2 * solution.x.shape[1])))
     b = float(strips[-1]) + half
     panel.add_patch(Ellipse((0.0, 0.0), 2e3 * b, 2e3 * a, fill=False, color="0.2", lw=1.0))

@@ -30,8 +30,7 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     """
     mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
     heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
-    figure = Picture(10.2, sum(heights))
-    figure.suptitle(title or found.title.replace(": ", "\n", 1), x=0.012, ha="left")
+    figure = Picture(10.2, sum(heights), title or found.title.replace(": ", "\n", 1))
     rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     _plan(figure.add_subfigure(rows[1]).subplots(), found)
     if mapped:
@@ -39,13 +38,13 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     axes = figure.add_subfigure(rows[0]).subplots(2, 2)
     order = np.argsort(found.radius)
     radius = found.radius[order]
-    attack, words = 1e3 * found.attack[..., 0], "angle of attack, leading wheelset (mrad)"
-    _lines(axes[0, 0], found, order, attack, words)
     guiding = 1e-3 * np.abs(_leading_outer(found, found.Y))
-    words = "guiding force Y of the leading outer wheel (kN)"
-    _lines(axes[0, 1], found, order, guiding, words)
-    wear, words = np.sum(found.T_gamma, axis=(-2, -1)), r"wear number $T_\gamma$ of all wheels (N)"
-    _lines(axes[1, 0], found, order, wear, words)
+    for one, values, words in (
+        (axes[0, 0], 1e3 * found.attack[..., 0], "angle of attack, leading wheelset (mrad)"),
+        (axes[0, 1], guiding, "guiding force Y of the leading outer wheel (kN)"),
+        (axes[1, 0], found.T_gamma.sum((-2, -1)), r"wear number $T_\gamma$ of all wheels (N)"),
+    ):
+        _lines(one, found, order, values, words)
     _steering(axes[1, 1], found, order)
     for one in axes.flat:
         if not found.converged.any():
@@ -72,15 +71,15 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
     radius, deficiency = found.radius[order], 1e3 * found.cant_deficiency
     wear = _leading_outer(found, found.T_gamma)[order]
     largest = float(np.nanmax(wear)) if np.isfinite(wear).any() else 1.0
-    columns = np.arange(len(radius))
+    columns, rows = np.arange(len(radius)), np.arange(len(deficiency))
     for m, axes in enumerate(figure.subplots(1, number, squeeze=False)[0]):
         axes.grid(visible=False)
-        look: Any = {"shading": "nearest", "vmin": 0.0, "vmax": largest, "cmap": "viridis"}
-        picture = axes.pcolormesh(columns, np.arange(len(deficiency)), wear[:, :, m].T, **look)
+        shown = wear[:, :, m]
+        picture = axes.pcolormesh(columns, rows, shown.T, shading="nearest", vmin=0.0, vmax=largest)
         axes.set_xticks(columns, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
-        axes.set_yticks(np.arange(len(deficiency)), [f"{value:g}" for value in deficiency])
-        if wear[:, :, m].size <= NUMBERS:
-            _numbers(axes, wear[:, :, m], largest)
+        axes.set_yticks(rows, [f"{value:g}" for value in deficiency])
+        if shown.size <= NUMBERS:
+            _numbers(axes, shown, largest)
         axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "")
         axes.set(title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
     figure.colorbar(picture, ax=figure.axes, label=r"$T_\gamma$ (N)", fraction=0.03)
@@ -102,17 +101,17 @@ def _ticks(radius: Floats) -> list[float]:
 
 def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: str) -> None:
     """Values over radius; friction by colour, cant deficiency by line."""
+    radius = found.radius[order]
     styles: list[Any] = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5))]
     for m, mu in enumerate(found.friction):
         for i, deficiency in enumerate(found.cant_deficiency):
             shown = np.where(found.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
             label = f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm"
-            line = {"color": distinct(m), "ls": styles[i % len(styles)]}
-            axes.plot(found.radius[order], shown, marker=".", ms=4, label=label, **line)
+            colour, line = distinct(m), styles[i % len(styles)]
+            axes.plot(radius, shown, ls=line, color=colour, marker=".", ms=4, label=label)
             timed = found.converged[:, i, m][order] == 2
-            words_timed = "by time integration" if timed.any() else None
-            look: Any = {"ms": 6, "mfc": "none", "color": distinct(m), "label": words_timed}
-            axes.plot(found.radius[order][timed], shown[timed], "o", **look)
+            how = "by time integration" if timed.any() else None
+            axes.plot(radius[timed], shown[timed], "o", color=colour, ms=6, mfc="none", label=how)
     axes.set_title(words)
 
 
@@ -153,7 +152,7 @@ def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
-        look: Any = {"color": colours[name], "marker": ".", "ms": 4, "label": name}
-        axes.plot(found.radius[order], 1e3 * found.lateral[order, 0, 0, w], **look)
+        lateral = 1e3 * found.lateral[order, 0, 0, w]
+        axes.plot(found.radius[order], lateral, color=colours[name], marker=".", ms=4, label=name)
     axes.set_title("lateral displacement (mm), first deficiency and friction")
     axes.legend(fontsize=7.5)

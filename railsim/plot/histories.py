@@ -5,7 +5,6 @@ lateral displacement and yaw, with the curve shaded and the limits of EN 14363 w
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -99,7 +98,7 @@ def _figure(
 ) -> Figure:
     rows, columns = len(grid), len(grid[0])
     width = 7.0 if columns == 1 else 3.0 + 3.4 * min(columns, 4)
-    figure = style.Picture(width, 1.3 + 2.1 * rows)
+    figure = style.Picture(width, 1.3 + 2.1 * rows, title(result))
     axes = figure.subplots(
         rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
     )
@@ -116,7 +115,6 @@ def _figure(
                 axes[i, j].set_xlabel(result.quantities[over].label)
                 axes[i, j].tick_params(labelbottom=True)
     drawn = [panel for row in grid for panel in row if panel is not None]
-    figure.suptitle(title(result), x=0.012, ha="left")
     handles = _legend(result, drawn, by)
     if handles:
         figure.legend(handles=handles, loc="outside lower left", ncols=4 if columns == 1 else 6)
@@ -144,9 +142,9 @@ def _draw(
             colour = wheelsets[line.labels["wheelset"]]
         else:
             colour = style.distinct(index)
+        values, above = line.values[window] * quantity.scale, 3.0 - 0.01 * index
         # the leading wheelset stays visible
-        look: Any = {"color": colour, "ls": style.SIDE_LINES[side], "zorder": 3.0 - 0.01 * index}
-        axes.plot(horizontal, line.values[window] * quantity.scale, **look)
+        axes.plot(horizontal, values, color=colour, ls=style.SIDE_LINES[side], zorder=above)
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = capitalised(quantity)
     drawn = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
@@ -190,8 +188,17 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     shown = value * quantity.scale
     axes.axhline(shown, color=style.LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
     shift, va = ((-3, 2.5), "bottom") if value < 0 else ((-3, -2.5), "top")
-    look: Any = {"fontsize": 7.5, "color": style.LIMIT, "frame": ("axes fraction", "data")}
-    style.note(axes, words, (1.0, shown), shift, "right", va, **look)
+    style.note(
+        axes,
+        words,
+        (1.0, shown),
+        shift,
+        "right",
+        va,
+        frame=style.BESIDE,
+        fontsize=7.5,
+        color=style.LIMIT,
+    )
 
 
 def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:

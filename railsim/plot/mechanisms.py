@@ -1,18 +1,20 @@
-"""Pictures of a mechanism: drawing, kinematics, ratios, forces, pressures, motion.
+"""Pictures of mechanisms: drawing, kinematics, forces, motion, cases and files side by side.
 
 Every function takes results of `railsim.mechanisms` and returns a figure in the field's habits: mm,
 degrees, N, MPa.  Lines can be distinguished without colour too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
+from railsim.arrays import Floats
 from railsim.definitions.mechanism.parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
@@ -20,31 +22,19 @@ from railsim.mechanisms.drawing import Line, centres, joint_points, lines, point
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
-from railsim.mechanisms.links import actuators, links
+from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.quantities import force_unit, quantity
-from railsim.plot.mechanism_axes import (
-    DASHES,
-    MAIN,
-    curves,
-    label_of,
-    line_style,
-    mark_zone,
-    single,
-    three_rows,
-    values_of,
-    way,
-)
-from railsim.plot.mechanism_comparison import (
-    cases_figure,
-    comparison_figure,
-    held_figure,
-    search_figure,
-)
 from railsim.plot.point_names import name_points
-from railsim.plot.style import ABOVE, LIMIT, Picture, note
+from railsim.plot.style import ABOVE, BESIDE, DISTINCT, LIMIT, Picture, distinct, note
 
-# drawn beside this module, offered here
-__all__ = ["cases_figure", "comparison_figure", "held_figure", "search_figure"]
+if TYPE_CHECKING:
+    from railsim.mechanisms.optimum import Optimum
+
+DASHES: tuple[Any, ...] = (
+    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (11, 3)),
+    (0, (1, 3)), (0, (9, 2, 3, 2)),
+)  # fmt: skip
+MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
 WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8}
@@ -52,6 +42,71 @@ WIDTHS |= {"actuator": 3.2, "spring": 1.0, "damper": 1.6}
 CENTRE: dict[str, Any] = {"marker": "$\\oplus$", "color": "k", "ms": 8, "ls": "", "zorder": 5}
 """Centre of gravity."""
 STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
+
+
+def line_style(i: int) -> dict[str, Any]:
+    """Colour and dashes of the line of a number."""
+    return {"color": distinct(i), "ls": DASHES[i % len(DASHES)]}
+
+
+def label_of(name: str, result: Analysis, words: str = "") -> str:
+    """Label of an axis for a named result."""
+    unit = quantity(name, result.definition).unit
+    text = words or name.replace("_", " ")
+    return f"{text} ({unit.replace('deg', '°')})" if unit else text
+
+
+def values_of(name: str, result: Analysis) -> Floats:
+    """Values of a named result in the unit shown."""
+    found: Floats = np.asarray(result.output[name]) * quantity(name, result.definition).scale
+    return found
+
+
+def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
+    """Shade the zone and mark the work height over a quantity."""
+    if not result.zone or over not in result.zone["low"]:
+        return
+    scale = quantity(over, result.definition).scale
+    low, work, high = (result.zone[k][over] * scale for k in ("low", "work", "high"))
+    axes.axvspan(min(low, high), max(low, high), color="0.93", lw=0, zorder=0)
+    axes.axvline(work, color="0.5", lw=0.8, ls=(0, (4, 2)), zorder=1)
+
+
+def way(result: Analysis) -> str:
+    """Name of the result that says how far the output has moved along its axis."""
+    return "x" if result.model.axis == 0 else "height"
+
+
+def single(width: float, height: float) -> tuple[Picture, Axes]:
+    """A figure with one pair of axes."""
+    figure = Picture(width, height)
+    return figure, figure.subplots()
+
+
+def curves(
+    axes: Axes, result: Analysis, over: str, lines: Iterable[tuple[Any, str]], label: str
+) -> None:
+    """Draw lines (values, name) over a result, with labels, legend and the zone."""
+    for i, (values, name) in enumerate(lines):
+        axes.plot(values_of(over, result), values, label=name, **line_style(i))
+    mark_zone(axes, result, over)
+    axes.set(xlabel=label_of(over, result, "driver" if over == "travel" else ""), ylabel=label)
+    axes.legend(ncols=3)
+
+
+def three_rows(
+    over: Any, courses: Mapping[str, Course], scale: float, labels: Iterable[str]
+) -> tuple[Picture, Any]:
+    """A figure of courses, their first and their second derivatives."""
+    figure = Picture(7.6, 5.6)
+    rows = figure.subplots(3, 1, sharex=True)
+    for i, (name, course) in enumerate(courses.items()):
+        for axes, values in zip(rows, vars(course).values(), strict=True):
+            axes.plot(over, np.round(values * scale, 9), label=name, **line_style(i))  # no noise
+    for axes, label in zip(rows, labels, strict=True):
+        axes.set_ylabel(label)
+    rows[0].legend(ncols=3)
+    return figure, rows
 
 
 def drawing_figure(result: Analysis) -> Figure:
@@ -89,15 +144,12 @@ def drawing_figure(result: Analysis) -> Figure:
     for one in axes:
         one.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
     for xy in centres(motion).values():
-        axes[0].plot(*(xy[0] * 1e3), **CENTRE)
-        if named is not axes[0]:
-            named.plot(*(xy[0] * 1e3), **CENTRE)
+        for one in axes:
+            one.plot(*(xy[0] * 1e3), **CENTRE)
     axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), title="driver at")
-    if small:
-        mark_points(named, motion, box)
-    else:
+    if not small:
         named.margins(0.12)
-        mark_points(named, motion, None)
+    mark_points(named, motion, box if small else None)
     return figure
 
 
@@ -105,10 +157,16 @@ def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> 
     """Draw the lines of a mechanism at one of its positions [mm]."""
     made = []
     for i, line in enumerate(drawn):
-        look: Any = {"color": colour, "lw": WIDTHS[line.kind], "ls": STYLES.get(line.kind, "-")}
-        look |= {"marker": "o" if line.kind in ("body", "link") else "", "ms": 2.5}
-        named = label if i == 0 else None
-        made += axes.plot(*(line.xy[k] * 1e3).T, solid_capstyle="round", label=named, **look)
+        made += axes.plot(
+            *(line.xy[k] * 1e3).T,
+            color=colour,
+            lw=WIDTHS[line.kind],
+            ms=2.5,
+            ls=STYLES.get(line.kind, "-"),
+            marker="o" if line.kind in ("body", "link") else "",
+            solid_capstyle="round",
+            label=label if i == 0 else None,
+        )
     return made
 
 
@@ -179,8 +237,8 @@ def angles_figure(result: Analysis) -> Figure:
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
         axes.axhline(limit, color=LIMIT, lw=0.9)
-        look: Any = {"fontsize": 8, "color": LIMIT, "frame": ("axes fraction", "data")}
-        note(axes, "limit", (1.0, limit), (0, 0), "right", "bottom", **look)
+        at = (1.0, limit)
+        note(axes, "limit", at, (0, 0), "right", "bottom", frame=BESIDE, fontsize=8, color=LIMIT)
     return figure
 
 
@@ -321,4 +379,108 @@ def time_figure(result: Analysis) -> Figure:
         c.legend()
     c.set(xlabel="time (s)", ylabel="speed of the output (mm/s)")
     d.set(xlabel="time (s)", ylabel="acceleration (mm/s²)")
+    return figure
+
+
+def cases_figure(results: Mapping[str, Analysis]) -> Figure:
+    """Unknown force over the driver, for all cases of a mechanism."""
+    figure, axes = single(6.6, 3.6)
+    first = next(iter(results.values()))
+    assert first.definition.solve is not None
+    for i, (name, result) in enumerate(results.items()):
+        travel, force = values_of("travel", result), values_of("force", result)
+        axes.plot(travel, force, label=name, **line_style(i))
+    axes.axhline(0.0, color="0.4", lw=0.8)
+    axes.set(xlabel=label_of("travel", first, "driver"))
+    axes.set(ylabel=label_of("force", first, f"force of '{first.definition.solve.unknown}'"))
+    axes.legend()
+    return figure
+
+
+def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) -> Figure:
+    """Ratio and force of several mechanisms over the height.
+
+    With `zoom`, in the zone only, and below it what they are above the first one.
+    """
+    first = next(iter(results.values()))
+    figure = Picture(7.6, 6.4 if zoom else 3.8)
+    panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
+    for column, name in enumerate(("ratio", "force")):
+        base = _over_height(first, name, zoom)
+        for i, (label, result) in enumerate(results.items()):
+            if (curve := _over_height(result, name, zoom)) is None:
+                continue
+            panels[0, column].plot(*curve, label=label, **line_style(i))
+            if zoom and base is not None:
+                above = curve[1] - np.interp(curve[0], *base)
+                panels[1, column].plot(curve[0], above, **line_style(i))
+        if not zoom:
+            mark_zone(panels[0, column], first, way(first))
+        panels[-1, column].set_xlabel(label_of(way(first), first))
+    panels[0, 0].set_ylabel("ratio dy/dL")
+    panels[0, 1].set_ylabel("force (N)")
+    if zoom:
+        panels[1, 0].set_ylabel("ratio over the first's")
+        panels[1, 1].set_ylabel("force over the first's (N)")
+    panels[0, 0].legend(fontsize=7.5)
+    return figure
+
+
+def held_figure(results: Mapping[str, Analysis]) -> Figure:
+    """Pressures that several mechanisms need, and their contact forces at the held pressures."""
+    figure = Picture(7.6, 3.8)
+    left, right = figure.subplots(1, 2)
+    for i, (label, result) in enumerate(results.items()):
+        if "pressure" not in result.output or "height" not in result.output:
+            continue
+        height = values_of(way(result), result)
+        left.plot(height, values_of("pressure", result), label=label, **line_style(i))
+        if result.contact is not None:
+            held = f"{label}, {result.contact.pressure / 1e6:.4f} MPa"
+            right.plot(height, result.contact.curve, label=held, **line_style(i))
+    right.axhline(0.0, color="0.4", lw=0.8)
+    first = next(iter(results.values()))
+    for axes, text in ((left, "pressure needed (MPa)"), (right, "static contact force (N)")):
+        mark_zone(axes, first, way(first))
+        axes.set(xlabel=label_of(way(first), first), ylabel=text)
+        axes.legend(fontsize=7.5)
+    left.set_ylim(bottom=0.0)
+    return figure
+
+
+def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Floats] | None:
+    """A result over the height, with `zoom` in the zone only; None where there is none."""
+    if name not in result.output or "height" not in result.output:
+        return None
+    x, y = values_of(way(result), result), values_of(name, result)
+    if zoom and result.zone:
+        low, high = (result.zone[k][way(result)] * 1e3 for k in ("low", "high"))
+        inside = (x >= low) & (x <= high)
+        x, y = x[inside], y[inside]
+    return x, y
+
+
+def search_figure(optimum: "Optimum") -> Figure:
+    """Objective at the end of every start, feasible or not, and the best."""
+    figure, axes = single(6.4, 3.6)
+    starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
+    top = max((s.objective for s in starts), default=1.0)
+    lost = [replace(s, objective=top) for s in optimum.starts if not np.isfinite(s.objective)]
+    for shown, marker, fill, label in (
+        ([s for s in starts if s.feasible], "o", "k", "all constraints kept"),
+        ([s for s in starts if not s.feasible], "x", "k", "a constraint broken"),
+        (lost, "s", "w", "not assembled"),
+    ):
+        if shown:
+            ends = zip(*((s.number, s.objective) for s in shown), strict=True)
+            axes.plot(*ends, marker, mfc=fill, color="0.3", ms=5, label=label)
+    if optimum.objective > 0.0:
+        axes.axhline(optimum.objective, color=MAIN, label=f"best {optimum.objective:.4g}")
+    if optimum.objective_before > 0.0:
+        before = f"file {optimum.objective_before:.4g}"
+        axes.axhline(optimum.objective_before, color=SECOND, ls=DASHES[1], label=before)
+    axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set(xlabel="start", ylabel="objective")
+    axes.legend()
     return figure

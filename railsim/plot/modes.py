@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from railsim.arrays import Complexes
 from railsim.linear.modes import Mode, Modes, RootLocus
-from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, grid_of, say, styled
 
 SHOWN = 25.0  # Hz, oscillations up to which are drawn
 BARS = 14  # components of a shape that are drawn
@@ -34,8 +34,7 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     title : str
         By default vehicle, track and contact.
     """
-    figure = Picture(10.2, 7.4)
-    figure.suptitle(title or locus.title.replace(": ", "\n", 1), x=0.012, ha="left")
+    figure = Picture(10.2, 7.4, title or locus.title.replace(": ", "\n", 1))
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
     damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
     plane = figure.add_subplot(grid[1, 1])
@@ -118,18 +117,15 @@ def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
         How many modes are drawn.
     """
     drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
-    rows = max(1, (len(drawn) + 1) // 2)
-    figure = Picture(10.2, 0.9 + 2.1 * rows)
-    figure.suptitle(title or modes.title.replace(": ", "\n", 1), x=0.012, ha="left")
-    grid = figure.add_gridspec(rows, 2)
+    title = title or modes.title.replace(": ", "\n", 1)
+    figure, cells = grid_of(max(1, len(drawn)), 2 if drawn else 1, 10.2, 2.1, 0.9, title)
     if not drawn:
-        say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")
+        say(cells[0], f"no oscillation below {SHOWN:g} Hz")
         return figure
-    for k, mode in enumerate(drawn):
-        axes = figure.add_subplot(grid[k // 2, k % 2])
+    for axes, mode in zip(cells, drawn, strict=True):
         _shape(axes, mode)
-        if k + 2 >= len(drawn):
-            axes.set_xlabel("share of the kinetic energy (%)")
+    for axes in cells[-2:]:
+        axes.set_xlabel("share of the kinetic energy (%)")
     handles = [Patch(color=colour, label=label) for colour, label in PHASES.items()]
     figure.legend(handles=handles, loc="outside lower center", ncol=len(PHASES), fontsize=8)
     return figure

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation import Irregularity
-from railsim.plot.style import styled
+from railsim.plot.style import Picture, styled
 
 SHOWN = 3  # alignment, level, cross level
 POINTS = 8000
@@ -17,7 +17,7 @@ def irregularity_figure(found: Irregularity) -> Figure:
 
     The bottom shows over the wavelength which share of the assumed variance the channels explain.
     """
-    figure = Figure(figsize=(9.0, 9.0), layout="constrained")
+    figure = Picture(9.0, 9.0)
     axes = figure.subplots(SHOWN + 1, 1)
     every = max(1, len(found.s) // POINTS)
     s = found.s[::every]

@@ -58,7 +58,8 @@ def overlay(
     alike = all(other == ends[0] for other in ends)
     shown = spans(plans[0], first["distance"], first[over]) if alike else []
     same_radii = all(plan == plans[0] for plan in plans)
-    figure, cells = _cells(max(map(len, drawn.values())), 1.3, first.quantities[over].label)
+    count, words = max(map(len, drawn.values())), first.quantities[over].label
+    figure, cells, across = _cells(count, 1.3, words)
     together = zip_longest(*drawn.values())
     for number, (axes, same) in enumerate(zip(cells, together, strict=True)):
         for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
@@ -69,25 +70,22 @@ def overlay(
         panel = next(panel for panel in same if panel is not None)
         _label(axes, panel.quantity, _heading(panel))
         draw_limit(axes, panel.quantity, results.values())
-        shade(axes, shown, named=same_radii and number < _across(len(cells)))
+        shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     _legend(figure, list(results), {line.labels.get("side") for line in lines}, 0)
     return figure
 
 
-def _across(count: int) -> int:
-    return 1 if count < 3 else 2
-
-
-def _cells(count: int, margin: float, words: str) -> tuple[Picture, list[Axes]]:
-    """A figure with axes for some quantities, the last of each column with their words."""
-    across = _across(count)
-    wide = 7.0 if across == 1 else 9.8
-    figure, cells = grid_of(count, across, lambda rows: (wide, margin + 2.1 * rows), sharex=True)
+def _cells(
+    count: int, margin: float, words: str, title: str = ""
+) -> tuple[Picture, list[Axes], int]:
+    """A figure with axes for quantities, the last of a column with their words; the columns."""
+    across, wide = (1, 7.0) if count < 3 else (2, 9.8)
+    figure, cells = grid_of(count, across, wide, 2.1, margin, title, sharex=True)
     for axes in cells[max(0, count - across) :]:
         axes.set_xlabel(words)
         axes.tick_params(labelbottom=True)
-    return figure, cells
+    return figure, cells, across
 
 
 def _legend(figure: Figure, labels: Sequence[str], sides: set[str | None], first: int) -> None:
@@ -112,9 +110,8 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     """
     labels = list(dict.fromkeys(one.result for one in found))
     names = list(dict.fromkeys(one.quantity.name for one in found))
-    figure, cells = _cells(len(names), 1.5, "distance (m)")
-    words = f"Leading wheelset: difference from {unformatted(first)}"
-    figure.suptitle(words, x=0.012, ha="left")
+    title = f"Leading wheelset: difference from {unformatted(first)}"
+    figure, cells, _ = _cells(len(names), 1.5, "distance (m)", title)
     for axes, name in zip(cells, names, strict=True):
         own = [one for one in found if one.quantity.name == name]
         for one in own:

@@ -24,7 +24,7 @@ CHANNELS: dict[str, tuple[str, str, Callable[[Floats], Floats]]] = {
     "gauge": ("g", "Gauge, positive when wider", lambda v: v[2] - v[0]),
 }
 LOOKS = {"as read": {"color": "0.6", "lw": 0.8}, "as it acts": {"color": DISTINCT[0], "lw": 1.0}}
-BESIDE = {"erri_b176_low": (DISTINCT[2], (0, (5, 2))), "erri_b176_high": (DISTINCT[1], (0, (5, 2)))}
+ERRI = {"erri_b176_low": (DISTINCT[2], (0, (5, 2))), "erri_b176_high": (DISTINCT[1], (0, (5, 2)))}
 WAVELENGTHS = (1.0, 200.0)  # m, that are shown
 SEGMENTS = 8  # of a recording at least, for its spectrum; half overlapping
 LONGEST = 400.0  # m, of a segment
@@ -40,8 +40,7 @@ def recording_figure(before: Floats, after: Floats, title: str) -> Figure:
     ERRI B176, formerly ORE; in the titles the standard deviations in the bands D1 and D2 of EN
     13848-1.
     """
-    figure = Picture(10.6, 9.6)
-    figure.suptitle(unformatted(title), x=0.012, ha="left")
+    figure = Picture(10.6, 9.6, unformatted(title))
     grid = figure.subplots(4, 2, width_ratios=[1.7, 1.0], sharex="col")
     for (channel, (symbol, words, of)), (over, density) in zip(CHANNELS.items(), grid, strict=True):
         for (name, look), rows in zip(LOOKS.items(), (before, after), strict=True):
@@ -90,7 +89,7 @@ def _spectrum(
 def _beside(axes: Axes, channel: str) -> None:
     """The spectra of ERRI B176 between their wavelengths of 3 and 70 m."""
     wavelength = np.geomspace(3.0, 70.0, 80)
-    for name, (colour, line) in BESIDE.items():
+    for name, (colour, line) in ERRI.items():
         spectrum = SPECTRA[name]
         S = 2.0 * np.pi * spectrum.density(channel, 2.0 * np.pi / wavelength)
         if channel == "cross_level":  # of the angle; a height over the cant base

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError, input_error, nearest
+from railsim.errors import Faults, InputError, input_error, nearest
 from railsim.notation import Quantity
 from railsim.result import Result
 from railsim.result.labels import all_labels, chosen_names
@@ -55,15 +55,11 @@ def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Pane
     Raises InputError: a quantity or label does not exist, or there are too many lines to tell
     apart.
     """
-    faults: list[Fault] = []
-    found: list[Panel] = []
+    faults, found = Faults(), list[Panel]()
     for selection in selections:
-        try:
+        with faults.caught():
             found.extend(_panels(result, selection))
-        except InputError as error:
-            faults.extend(error.faults)
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return found
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 NAMES: Any = {"fontsize": 7.5, "color": "0.25"}
+SCALES = {"load": 1e-3, "K_sys": 1e-3, "deflection": 1e3, "rotation": float(np.degrees(1.0))}
 SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 
@@ -39,16 +40,14 @@ def stiffness_figure(result: Verification) -> Figure:
     figure = Picture(7.6, 3.2, edges=(0.085, 0.15, 0.985, 0.97, 0.06))
     over_load, over_deflection = figure.subplots(1, 2, sharey=True)
     curve = _curve(result)
-    loads = [case.load * 1e-3 for case in result.cases]
-    deflections = [case.deflection * 1e3 for case in result.cases]
-    for axes, x, marks, label in (
-        (over_load, curve["load"] * 1e-3, loads, "load $P$ (kN)"),
-        (over_deflection, curve["deflection"] * 1e3, deflections, "deflection $\\Delta z$ (mm)"),
+    for axes, name, label in (
+        (over_load, "load", "load $P$ (kN)"),
+        (over_deflection, "deflection", "deflection $\\Delta z$ (mm)"),
     ):
+        x = curve[name] * SCALES[name]
         axes.plot(x, curve["K_sys"] * 1e-3, color=MAIN, label="system stiffness $P/\\Delta z$")
         axes.plot(x, curve["rate"] * 1e-3, color=SECOND, ls="--", label="tangent stiffness")
-        stiffnesses = [(case.K_sys * 1e-3, case.name) for case in result.cases]
-        _mark(axes, [(mark, *point) for mark, point in zip(marks, stiffnesses, strict=True)])
+        _mark(axes, result, name, "K_sys")
         axes.set_xlabel(label)
     over_load.set_ylabel("stiffness (N/mm)")
     over_load.set_ylim(bottom=0.0)
@@ -64,15 +63,10 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     heights = figure.add_subplot(grid[1, :])
     curve = _curve(result)
     load = curve["load"] * 1e-3
-    deflection.plot(load, curve["deflection"] * 1e3, color=MAIN)
-    marks = [(case.load * 1e-3, case.name) for case in result.cases]
-    _mark(
-        deflection,
-        [(P, 1e3 * c.deflection, n) for (P, n), c in zip(marks, result.cases, strict=True)],
-    )
+    for axes, name in ((deflection, "deflection"), (rotation, "rotation")):
+        axes.plot(load, curve[name] * SCALES[name], color=MAIN)
+        _mark(axes, result, "load", name)
     deflection.set_ylabel("deflection $\\Delta z$ (mm)")
-    rotation.plot(load, np.degrees(curve["rotation"]), color=MAIN)
-    _mark(rotation, [(c.load * 1e-3, np.degrees(c.rotation), c.name) for c in result.cases])
     rotation.axhline(0.0, color=FAINT, lw=0.8)
     rotation.set_ylabel("rotation of the arm (°)")
     solid = solid_heights(suspension)
@@ -100,14 +94,14 @@ def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     listed = coils_by_wire(suspension, result)
     for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True):
         colour = SPRING_COLOURS[name]
-        wires = [row["wire_diameter"] for row in listed[name] if row["active_coils"] < 12.0]
-        coils = [row["active_coils"] for row in listed[name] if row["active_coils"] < 12.0]
-        if wires:
+        rows = [row for row in listed[name] if row["active_coils"] < 12.0]
+        if rows:
+            wires = np.array([row["wire_diameter"] for row in rows])
             d = np.linspace(0.95 * wires[0], 1.05 * wires[-1], 200)
             n = suspension.material.G * d**4 / (8.0 * K_V * spring.mean_diameter**3)
             label = f"{name}, $D$ {spring.mean_diameter * 1e3:.6g} mm, {K_V * 1e-3:.1f} N/mm"
             axes.plot(d * 1e3, n, color=colour, label=label)
-            axes.plot(np.array(wires) * 1e3, coils, ".", color=colour, ms=5)
+            axes.plot(1e3 * wires, [row["active_coils"] for row in rows], ".", color=colour, ms=5)
         if spring.wire_diameter is not None and spring.active_coils is not None:
             axes.plot(
                 spring.wire_diameter * 1e3, spring.active_coils, "o", mfc="w", mec=colour, ms=8
@@ -187,11 +181,10 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     shown = next((result for result in results if result.name == tare), results[0])
     ends = sorted(shown.single.items(), key=lambda item: abs(item[1][1] - item[1][0]))
     names = [name.replace("_", " ").replace(".", ": ") for name, _ in ends]
-    low = np.array([end[0] for _, end in ends]) * 1e3
-    high = np.array([end[1] for _, end in ends]) * 1e3
+    lows, highs = 1e3 * np.array([end for _, end in ends]).reshape(-1, 2).T
     rows = np.arange(len(ends))
-    single.barh(rows, low, color=DISTINCT[4], height=0.6, label="lower limit")
-    single.barh(rows, high, color=DISTINCT[0], height=0.6, label="upper limit")
+    single.barh(rows, lows, color=DISTINCT[4], height=0.6, label="lower limit")
+    single.barh(rows, highs, color=DISTINCT[0], height=0.6, label="upper limit")
     single.set_yticks(rows, names)
     single.set_ylim(-0.6, max(len(rows), 4) - 0.4)
     single.grid(axis="y", visible=False)
@@ -203,8 +196,9 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     for column, result in zip(columns, ordered, strict=True):
         worst, likely = (result.lowest, result.highest), (-result.random, result.random)
         for pair, colour in ((worst, FAINT), (likely, MAIN)):
-            look: Any = {"color": colour, "lw": 7, "solid_capstyle": "butt"}
-            every.plot([column] * 2, 1e3 * np.array(pair), **look)
+            every.plot(
+                [column] * 2, 1e3 * np.array(pair), color=colour, lw=7, solid_capstyle="butt"
+            )
     every.plot([], [], color=FAINT, lw=5, label="worst case")
     every.plot([], [], color=MAIN, lw=5, label="statistical (RSS)")
     names = [unformatted(result.name) for result in ordered]
@@ -234,13 +228,13 @@ def _curve(result: Verification) -> dict[str, Floats]:
     }  # fmt: skip
 
 
-def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
+def _mark(axes: Axes, result: Verification, over: str, what: str) -> None:
     """Mark the load cases on a rising curve, their names above and below it in turn."""
-    for i, (x, y, name) in enumerate(sorted(points)):
-        above = i % 2 == 0
-        axes.plot(x, y, "o", color=MAIN, ms=4)
-        where = ((-4, 3), "right", "bottom") if above else ((4, -3), "left", "top")
-        note(axes, unformatted(name), (x, y), *where, **NAMES)
+    for i, case in enumerate(sorted(result.cases, key=lambda case: getattr(case, over))):
+        point = getattr(case, over) * SCALES[over], getattr(case, what) * SCALES[what]
+        axes.plot(*point, "o", color=MAIN, ms=4)
+        where = ((4, -3), "left", "top") if i % 2 else ((-4, 3), "right", "bottom")
+        note(axes, unformatted(case.name), point, *where, **NAMES)
 
 
 def _draw_arm(
@@ -253,22 +247,23 @@ def _draw_arm(
 ) -> None:
     """Side view in millimetres, the axle to the right of the hinge."""
     phi, length = case.rotation, 1e3 * arm.length
+    right, up = np.eye(2)
     along = np.array([np.cos(phi), np.sin(phi)])
     across = np.array([-np.sin(phi), np.cos(phi)])
     axle = hinge + length * along
-    frame = _moved(hinge, 0.0, top_edge)
+    frame = hinge + top_edge * up
     half = 0.62e3 * suspension.outer.mean_diameter
     seats = [axle + 1e3 * float(coil.seat) * across for coil in arm.coils]
     steel = {"color": "0.25", "solid_capstyle": "butt"}
-    _line(axes, hinge, _moved(hinge, length, 0.0), color=FAINT, lw=0.9, ls=(0, (6, 3)))
+    _line(axes, hinge, hinge + length * right, color=FAINT, lw=0.9, ls=(0, (6, 3)))
     _line(axes, hinge, frame, lw=2.2, **steel)
-    _line(axes, _moved(frame, -60.0, 0.0), _moved(frame, length + half, 0.0), lw=2.2, **steel)
+    _line(axes, frame - 60.0 * right, frame + (length + half) * right, lw=2.2, **steel)
     _line(axes, axle, seats[0], lw=3.0, **steel)
     for seat in seats:
         _line(axes, seat - half * along, seat + half * along, lw=1.8, **steel)
     _line(axes, hinge, axle, lw=4.5, **steel)
     for spring, coil, seat in zip(suspension.springs.values(), arm.coils, seats, strict=True):
-        top = _moved(hinge, length, 1e3 * float(coil.seat + coil.H0 - coil.start))
+        top = hinge + length * right + 1e3 * float(coil.seat + coil.H0 - coil.start) * up
         d, n = built(spring)
         turns = checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils)
         # a spring that does not work yet stands on its seat with its free height
@@ -279,18 +274,13 @@ def _draw_arm(
         _draw_spring(axes, seat, head, along, 1e3 * spring.mean_diameter, wire, float(turns))
     for centre, radius, face in ((hinge, 26.0, "0.82"), (hinge, 9.0, "w"), (axle, 60.0, "0.92")):
         axes.add_patch(Circle(tuple(centre), radius, fc=face, ec="0.25", lw=1.0, zorder=3))
-    look = {"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4}
-    tail = _moved(axle, 0.0, -62.0 - 110.0 * case.load / 8e4)
-    axes.annotate("", tuple(_moved(axle, 0.0, -62.0)), tuple(tail), arrowprops=look)
+    arrow = {"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4}
+    tail = axle - (62.0 + 110.0 * case.load / 8e4) * up
+    axes.annotate("", tuple(axle - 62.0 * up), tuple(tail), arrowprops=arrow)
     degrees = f"{np.degrees(phi):+.2f}°".replace("-", "−") if case.theta > 1e-5 else "0°"
     words = f"{unformatted(case.name)}  {case.load * 1e-3:.1f} kN"
     words += f"\n{case.deflection * 1e3:.1f} mm, {degrees}"
-    note(axes, words, _moved(frame, -60.0, 30.0), (0, 0), va="bottom", fontsize=9, color="k")
-
-
-def _moved(point: Floats, right: float, up: float) -> Floats:
-    moved: Floats = point + np.array([right, up])
-    return moved
+    note(axes, words, frame - 60.0 * right + 30.0 * up, (0, 0), va="bottom", fontsize=9, color="k")
 
 
 def _line(axes: Axes, start: Floats, end: Floats, **style: Any) -> None:

@@ -1,12 +1,14 @@
-"""Pictures of stability: amplitude over speed with its branches, maps of critical speeds."""
+"""Pictures of stability: amplitude over speed, maps of critical speeds; a vehicle on a twist."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from railsim.linear.stationary import TwistLoop
+from railsim.notation import SIDES
 from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, say, styled
 from railsim.stability.branches import THRESHOLD, Branch
 from railsim.stability.result import Conicity, CriticalSpeed
@@ -34,10 +36,10 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     title : str
         By default vehicle, rails, friction and creep law.
     """
+    title = title or _title(found)
     if not found.branches:
-        return _linear_figure(found, title or _title(found))
-    figure = Picture(10.2, 7.2)
-    figure.suptitle(title or _title(found), x=0.012, ha="left")
+        return _linear_figure(found, title)
+    figure = Picture(10.2, 7.2, title)
     grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
@@ -86,14 +88,12 @@ def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
     return 0.9 * min(marks), min(found.high, 1.25 * max(marks))
 
 
-@styled()
 def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     """What there is without a branch: linear critical speeds over amplitude, the conicity."""
     words = "no linear critical speed in the range"
     if found.linear is not None:
         words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
-    figure = Picture(8.4, 4.4)
-    figure.suptitle(f"{title}\n{words}", x=0.012, ha="left")
+    figure = Picture(8.4, 4.4, f"{title}\n{words}")
     left, right = figure.subplots(1, 2, sharey=True)
     left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
     left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
@@ -109,8 +109,15 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
 
 def _mark(axes: Axes, found: CriticalSpeed) -> None:
     """Linear critical speeds as lines, the lowest speeds of sustained hunting as circles."""
-    for words, speed, line in _linear_speeds(found):
-        axes.axvline(speed, color="0.1", lw=0.9, ls=line, label=f"{words}: {speed:.2f} m/s")
+    if (lost := found.linear) is not None:
+        lines: list[tuple[str, float | None, Any]] = [
+            (f"linear, {found.contact.words()}", lost.speed, "-"),
+            ("the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))),
+        ]
+        for words, speed, dashes in lines:
+            if speed is not None:
+                label = f"{words}: {speed:.2f} m/s"
+                axes.axvline(speed, color="0.1", lw=0.9, ls=dashes, label=label)
     line = found.linear_over_amplitude
     if line is not None and line.smallest is not None:
         speeds = np.array(line.speed, dtype=float)
@@ -124,14 +131,6 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
                 color=BRANCHES["down" if method == "bifurcation" else method][0],
                 label=f"lowest by {method}: {lowest.speed:.2f} m/s",
             )  # fmt: skip
-
-
-def _linear_speeds(found: CriticalSpeed) -> Iterator[tuple[str, float, Any]]:
-    lost = found.linear
-    if lost is not None:
-        yield f"linear, {found.contact.words()}", lost.speed, "-"
-        if lost.speed_on_rigid_rails is not None:
-            yield "the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))
 
 
 def _conicity(axes: Axes, conicity: Conicity) -> None:
@@ -175,8 +174,7 @@ def map_figure(
     title : str
     """
     first, *others = axes_values
-    figure = Picture(8.4, 4.6)
-    figure.suptitle(title, x=0.012, ha="left")
+    figure = Picture(8.4, 4.6, title)
     axes = figure.subplots()
     for method, values in speeds.items():
         for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):
@@ -191,4 +189,27 @@ def map_figure(
         return figure
     axes.set_ylim(0.0, None)
     axes.legend()
+    return figure
+
+
+@styled()
+def twist_figure(loops: Mapping[str, TwistLoop], limit: float, title: str) -> Figure:
+    """DQ/Q0 of the worst wheel of each twist over the twist, from both directions.
+
+    `loops`: By the name of the twist. `limit`: Of dQ/Q0 [1].
+    """
+    figure = Picture(9.6, 3.8)
+    figure.suptitle(title)
+    panels = figure.subplots(1, max(1, len(loops)), sharey=True, squeeze=False)[0]
+    for panel, (name, loop) in zip(panels, loops.items(), strict=False):
+        wheelset, side = loop.worst
+        way = np.append(0.0, loop.share) if len(loop.share) > 2 else loop.share
+        unloading = loop.unloading[:, wheelset, side]
+        values = np.append(0.0, unloading) if len(loop.share) > 2 else unloading
+        panel.plot(100.0 * way, values, "o-", ms=2.5)
+        panel.axhline(limit, color="0.3", ls="--", lw=0.8)
+        panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
+        panel.set(title=f"{name},\nwheelset {wheelset + 1} {SIDES[side]}")
+        panel.set(xlabel="of the twist (%)")
+    panels[0].set_ylabel("$(Q_0 - Q)/Q_0$")
     return figure

@@ -1,16 +1,25 @@
-"""Pictures of a study: values over what was varied, families of curves, heat maps, rankings."""
+"""Pictures of studies: values over what was varied, optimisations, wear, a track that was judged.
 
-from collections.abc import Sequence
+Families of curves, heat maps and rankings of the runs of a study; the Pareto front of an
+optimisation and what its values depend on; a wheel that wears; limits over a track.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from railsim.plot.style import DISTINCT, Picture, grid_of, styled
+from railsim.arrays import Flags, Floats
+from railsim.plot.style import DISTINCT, LIMIT, Picture, grid_of, note, styled
 from railsim.text import unformatted
+
+if TYPE_CHECKING:
+    from railsim.profiles import Profile
 
 MOST_RANKED = 25
 FEW = 6  # members of a family that have colours of their own; more get those of a scale
@@ -168,9 +177,8 @@ def _text(value: Any) -> str:
 
 
 def _panels(count: int) -> tuple[Picture, list[Axes]]:
-    across = 1 if count == 1 else 2
-    wide = 6.8 if across == 1 else 10.0
-    return grid_of(count, across, lambda rows: (wide, 1.0 + 2.9 * rows))
+    across, wide = (1, 6.8) if count == 1 else (2, 10.0)
+    return grid_of(count, across, wide, 2.9, 1.0)
 
 
 def _colours(count: int) -> list[Any]:
@@ -184,6 +192,187 @@ def _legend(figure: Figure, axes: Axes, title: str) -> None:
     handles, labels = axes.get_legend_handles_labels()
     longest = max(map(len, labels), default=1)
     fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
-    columns = min(fitting, 8, len(labels))
-    where: Any = {"loc": "outside lower left", "alignment": "left"}
-    figure.legend(handles, labels, ncols=columns, title=title, **where)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower left",
+        alignment="left",
+        title=title,
+        ncols=min(fitting, 8, len(labels)),
+    )
+
+
+MOST_PAIRS = 6
+NARROW = 0.05  # of the widest bar, below which its ends bear no words
+NUMBERED = 12  # designs of a front that are numbered
+
+
+@styled()
+def front_figure(
+    values: Floats, labels: Sequence[str], feasible: Flags, front: Sequence[int], chosen: int | None
+) -> Figure:
+    """All designs, the front and the chosen one, for each pair of objectives.
+
+    `values` (float64[design, objective]). `labels`: Objectives with their units. `feasible`
+    (bool[design]). `front`: Designs of the front.
+    """
+    single = values.shape[1] == 1
+    if single:
+        values = np.column_stack([np.arange(1.0, len(values) + 1.0), values])
+        labels = ["design", *labels]
+    pairs = list(combinations(range(values.shape[1]), 2))[:MOST_PAIRS]
+    columns = min(3, len(pairs))
+    figure, cells = grid_of(len(pairs), columns, 6.4 if columns == 1 else 4.4 * columns, 4.4, 0.0)
+    for axes, (i, j) in zip(cells, pairs, strict=True):
+        _pair(axes, values[:, [i, j]], feasible, list(front), chosen)
+        axes.set(xlabel=labels[i], ylabel=labels[j])
+    if single:
+        cells[0].set_title("Designs in the order of computation")
+    cells[0].legend(loc="best")
+    return figure
+
+
+def _pair(
+    axes: Axes, values: Floats, feasible: Flags, front: list[int], chosen: int | None
+) -> None:
+    others = np.ones(len(values), bool)
+    others[front] = False
+    axes.plot(*values[others & feasible].T, "o", color="0.72", ms=3.5, label="designs")
+    if (~feasible).any():
+        axes.plot(*values[~feasible].T, "x", color="0.6", ms=4, label="infeasible")
+    # a line joins the front only where it orders it
+    line = "-" if values.shape[1] == 2 and _ordered(values[front]) else ""
+    axes.plot(*values[front].T, "o", ls=line, color=DISTINCT[0], ms=4.5, label="front")
+    if chosen is not None:
+        axes.plot(*values[chosen], "o", mfc="none", mec=LIMIT, mew=1.6, ms=11, label="chosen")
+    if len(front) <= NUMBERED:
+        for number in front:
+            note(axes, str(number + 1), values[number], (4, 4))
+
+
+def _ordered(values: Floats) -> bool:
+    """Whether points that follow each other go one way in both directions."""
+    steps = np.diff(values, axis=0)
+    return bool(len(steps)) and all(
+        (steps[:, k] >= 0).all() or (steps[:, k] <= 0).all() for k in range(values.shape[1])
+    )
+
+
+@styled()
+def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Figure:
+    """Tornado about the chosen design, and Sobol indices over the whole range, for each quantity.
+
+    `found`: Records of `railsim.studies.sensitivity.Sensitivity`. `labels`: Quantities with their
+    units.
+    """
+    count = len(found[0]["low"])
+    figure = Picture(10.2, len(found) * (1.3 + 0.32 * count))
+    grid = figure.subplots(len(found), 2, squeeze=False)
+    for (left, right), one, label in zip(grid, found, labels, strict=True):
+        _tornado(left, one, label)
+        _indices(right, one)
+    handles, names = grid[0][1].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower right", ncols=2)
+    return figure
+
+
+def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
+    names = sorted(one["low"], key=lambda name: abs(one["high"][name] - one["low"][name]))
+    axes.use_sticky_edges = False
+    widest = max(abs(one["high"][name] - one["low"][name]) for name in names)
+    for row, name in enumerate(names):
+        low, high = one["low"][name], one["high"][name]
+        axes.barh(row, high - low, left=low, height=0.55, color=DISTINCT[4], zorder=2)
+        if abs(high - low) < NARROW * widest:
+            continue
+        for value, words in ((low, "low"), (high, "high")):
+            outer = (value >= max(low, high)) if words == "high" else (value > min(low, high))
+            shift, ha = ((4, 0), "left") if outer else ((-4, 0), "right")
+            note(axes, words, (value, row), shift, ha, "center")
+    axes.set_yticks(range(len(names)), [name.removeprefix("vehicle.") for name in names])
+    axes.set(xlabel=label, title="From bound to bound, the others as chosen")
+    axes.margins(x=0.15)
+
+
+def _indices(axes: Axes, one: Mapping[str, Any]) -> None:
+    names = sorted(one["total"], key=lambda name: one["total"][name])
+    rows = np.arange(len(names))
+    total = [one["total"][name] for name in names]
+    first = [one["first"][name] for name in names]
+    axes.barh(rows + 0.17, total, height=0.3, color=DISTINCT[0], label="with interactions")
+    axes.barh(rows - 0.17, first, height=0.3, color=DISTINCT[5], label="alone")
+    axes.set_yticks(rows, [name.removeprefix("vehicle.") for name in names])
+    axes.set(xlim=(0.0, max(1.0, *total, *first)), xlabel="share of the variance")
+    axes.set(title=f"Sobol indices (surrogate's error {100.0 * one['error']:.0f} %)")
+
+
+PROFILE = (-0.045, 0.035)  # m from the nominal rolling circle
+
+
+@styled()
+def wear_figure(
+    wheels: Sequence[tuple[float, "Profile"]],
+    rows: Sequence[Mapping[str, float | None]],
+    title: str,
+) -> Figure:
+    """New and worn profiles, depth of wear, equivalent conicity at 3 mm.
+
+    `wheels` ([m]): The new wheel, then the wheel after each step. `rows`: Of
+    `railsim.studies.wear_loop.wear_rows`. `title`: What was analysed.
+    """
+    new = wheels[0][1]
+    figure = Picture(8.6, 7.6, title)
+    outline, depth, conicity = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 0.8])
+    depth.sharex(outline)
+    outline.plot(1e3 * new.y, 1e3 * new.z, color="0.2", lw=1.2, label="new")
+    last = wheels[-1][1]
+    outline.plot(1e3 * last.y, 1e3 * last.z, color="C3", lw=1.0, label=_km(wheels[-1][0]))
+    outline.invert_yaxis()
+    outline.set_ylabel("z (mm)")
+    outline.legend()
+    for number, (distance, wheel) in enumerate(wheels[1:], start=1):
+        lost = 1e3 * (np.asarray(new.z) - np.asarray(wheel.z))
+        share = 0.25 + 0.75 * number / (len(wheels) - 1)
+        label = _km(distance) if number in (1, len(wheels) - 1) else None
+        depth.plot(1e3 * new.y, lost, color="C3", alpha=share, lw=1.0, label=label)
+    depth.set_xlim(1e3 * PROFILE[0], 1e3 * PROFILE[1])
+    depth.set_ylim(bottom=0.0)
+    depth.set(xlabel="y from the nominal rolling circle, flange negative (mm)")
+    depth.set(ylabel="depth of wear in z (mm)")
+    depth.legend()
+    values = [row["equivalent_conicity"] for row in rows]
+    kilometres = [1e-3 * distance for distance, _ in wheels]
+    conicity.plot(kilometres, [np.nan if v is None else v for v in values], "o-", ms=4)
+    conicity.set(xlabel="distance (km)", ylabel="conicity at 3 mm")
+    conicity.set_ylim(0.0, 1.15 * conicity.get_ylim()[1])
+    conicity.set_xlim(left=0.0)
+    return figure
+
+
+def _km(distance: float) -> str:
+    return f"{1e-3 * distance:g} km"
+
+
+LABELS = {"Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "floor y", "body_z": "floor z"}
+
+
+@styled()
+def heat_strip(cells: Floats, shares: Mapping[tuple[str, float, str], Floats]) -> Figure:
+    """Draw one row for each vehicle, speed and quantity; the colour is the share of the limit.
+
+    `cells`: begin of each along the track, all of one length [m].
+    """
+    figure = Picture(10.0, 1.2 + 0.24 * len(shares))
+    axes, rows = figure.subplots(), np.arange(len(shares) + 1)
+    if shares:
+        edges = np.append(cells, 2.0 * cells[-1] - cells[-2]) / 1e3
+        values = np.array([*shares.values()])
+        mesh = axes.pcolormesh(edges, rows, values, cmap="inferno_r", vmin=0.0, vmax=1.2)
+        figure.colorbar(mesh, ax=axes, label="share of the limit (1)")
+    words = [
+        f"{vehicle}, {3.6 * speed:.0f} km/h, {LABELS.get(q, q)}" for vehicle, speed, q in shares
+    ]
+    axes.set_yticks(rows[:-1] + 0.5, words)
+    axes.set(xlabel="s (km)")
+    axes.invert_yaxis()
+    return figure

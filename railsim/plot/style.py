@@ -6,7 +6,7 @@ side a dashed line.
 """
 
 import warnings
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -48,7 +48,8 @@ NARROW = 0.011  # share of the axes' width that a letter of a section's name tak
 
 LIMIT = "#b3122b"
 
-ABOVE = ("data", "axes fraction")  # coordinates of what stands at the upper edge of axes
+# coordinates of what stands at the upper edge of axes, of what stands at their sides
+ABOVE, BESIDE = ("data", "axes fraction"), ("axes fraction", "data")
 
 
 def distinct(number: int) -> str:
@@ -93,18 +94,12 @@ def wheelset_colours(names: Sequence[str]) -> dict[str, Any]:
         bogies.setdefault(name.split(".")[0], []).append(name)
     if len(bogies) == len(names):
         return {name: distinct(i) for i, name in enumerate(names)}
-    colours = {}
+    colours: dict[str, Any] = {}
     for i, members in enumerate(bogies.values()):
-        dark, light = HUES[i % len(HUES)]
-        for j, name in enumerate(members):
-            share = j / (len(members) - 1) if len(members) > 1 else 0.0
-            colours[name] = _blend(dark, light, share)
+        dark, light = map(to_rgb, HUES[i % len(HUES)])
+        shades = np.linspace(dark, light, len(members))
+        colours |= zip(members, map(tuple, shades), strict=True)
     return colours
-
-
-def _blend(dark: str, light: str, share: float) -> Any:
-    ends = zip(to_rgb(dark), to_rgb(light), strict=True)
-    return tuple((1.0 - share) * a + share * b for a, b in ends)
 
 
 @dataclass(frozen=True)
@@ -168,11 +163,11 @@ def side_keys(sides: Collection[str | None], **look: Any) -> list[Line2D]:
 
 
 def grid_of(
-    count: int, across: int, size: Callable[[int], tuple[float, float]], **how: Any
+    count: int, across: int, width: float, height: float, margin: float, title: str = "", **how: Any
 ) -> tuple[Picture, list[Axes]]:
-    """Return a figure with axes in rows, of a size by the number of rows, and the axes."""
+    """Return a figure with axes in rows, and the axes; `height` of a row, beside a margin."""
     rows = -(-count // across)
-    figure = Picture(*size(rows))
+    figure = Picture(width, margin + height * rows, title)
     cells = list(figure.subplots(rows, across, squeeze=False, **how).flat)
     for axes in cells[count:]:
         axes.remove()

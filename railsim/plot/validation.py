@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.arrays import Floats
@@ -18,10 +17,6 @@ LONGEST = 20_000  # values of a line
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
 
 
-def _axes(count: int, across: int, height: float) -> tuple[Figure, list[Axes]]:
-    return grid_of(count, across, lambda rows: (8.0, 0.6 + height * rows))
-
-
 def _shown(quantity: str) -> tuple[float, str]:
     found = quantity_of(quantity)
     return (found.scale, found.shown_unit) if found is not None else (1.0, "SI")
@@ -30,19 +25,17 @@ def _shown(quantity: str) -> tuple[float, str]:
 def scatter(validation: ModelValidation) -> Figure:
     """Draw simulated over measured section values with the bands of the mean and the deviation."""
     shown = validation.comparisons
-    figure, grid = _axes(len(shown), 3, 2.5)
+    figure, grid = grid_of(len(shown), 3, 8.0, 2.5, 0.6)
     for axes, one in zip(grid, shown, strict=True):
         scale = one.quantity.column.scale
-        measured = scale * np.array([pair.measured for pair in one.pairs])
-        simulated = scale * np.array([pair.simulated for pair in one.pairs])
-        both = np.concatenate([measured, simulated])
+        both = scale * np.array([(pair.measured, pair.simulated) for pair in one.pairs]).T
         ends = np.array([both.min(), both.max()])
         ends += np.array([-0.05, 0.05]) * max(np.ptp(ends), 1e-9)
         axes.plot(ends, ends, color="0.4", linewidth=0.8)
         for limit, style in ((one.mean_limit, "--"), (2.0 * one.limit, ":")):
             for sign in (-1.0, 1.0):
                 axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
-        axes.plot(measured, simulated, ".", color="C3" if one.verdict == "fail" else "C0")
+        axes.plot(*both, ".", color="C3" if one.verdict == "fail" else "C0")
         axes.set(xlim=ends, ylim=ends)
         unit = one.quantity.column.unit
         axes.set_title(f"{one.quantity.name}: {one.verdict}", fontsize="small")
@@ -54,7 +47,7 @@ def scatter(validation: ModelValidation) -> Figure:
 def differences(validation: ModelValidation) -> Figure:
     """Draw the distribution of the differences over the limit of their standard deviation."""
     shown = validation.comparisons
-    figure, grid = _axes(len(shown), 4, 1.8)
+    figure, grid = grid_of(len(shown), 4, 8.0, 1.8, 0.6)
     for axes, one in zip(grid, shown, strict=True):
         x = np.array([pair.difference for pair in one.pairs]) / one.limit
         reach = max(1.2, 1.05 * float(np.abs(x).max()))
@@ -84,7 +77,7 @@ def _over_arc(
     shown: Sequence[Any], part: Callable[..., Any], lines: Mapping[str, str], lw: float
 ) -> Figure:
     """Draw channels by the names of their attributes, in colours, over a part of the arc length."""
-    figure, grid = _axes(len(shown), 1, 1.3)
+    figure, grid = grid_of(len(shown), 1, 8.0, 1.3, 0.6)
     for axes, one in zip(grid, shown, strict=True):
         (scale, unit), (s, rows) = _shown(one.quantity), part(one)
         for name, colour in lines.items():
@@ -98,7 +91,7 @@ def _over_arc(
 def spectra(validation: ModelValidation) -> Figure:
     """Draw power spectral densities of measured and simulated channels of the first run."""
     shown = _first(validation.overlays)
-    figure, grid = _axes(len(shown), 3, 1.9)
+    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.6)
     for axes, one in zip(grid, shown, strict=True):
         for name, colour in (("measured", "k"), ("simulated", "C1")):
             axes.loglog(*_density(one, getattr(one, name)), color=colour, lw=0.9, label=name)
@@ -131,7 +124,7 @@ def fits(found: Identified) -> Figure:
 def residual_spectra(found: Identified) -> Figure:
     """Draw the cumulative periodograms of the residuals: a straight line where they are white."""
     shown = _first(found.channels)
-    figure, grid = _axes(len(shown), 3, 1.9)
+    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.6)
     low, high = found.band
     for axes, one in zip(grid, shown, strict=True):
         rest = one.measured - one.after

@@ -1,6 +1,6 @@
 """A vehicle as a picture: side, top and front view with every element, to see wrong coordinates."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 
-from railsim.definitions.base import Vector
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import Box, body_boxes
 from railsim.plot.style import Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
+View = tuple[int, int]  # axes of the vehicle along the width and the height of the page
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
 TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
 LABELS = ("$x$ (m), forward", "$y$ (m), to the right", "$z$ (m), down")
@@ -52,10 +52,9 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
         scales within each.
     """
     flat = flatten(vehicle)
-    kinds = list(dict.fromkeys(_kind(element) for element in flat.elements))
+    kinds = dict.fromkeys(element.definition.kind for element in flat.elements)
     colours = {kind: distinct(i) for i, kind in enumerate(kinds)}
-    figure = Picture(11.0, 9.0)
-    figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
+    figure = Picture(11.0, 9.0, unformatted(title or vehicle.name))
     grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
     end, boxes = _leading_end(flat), body_boxes(flat)
     cells = (grid[0, :], grid[1, :], grid[2, 0], grid[2, 1], grid[2, 2])
@@ -69,8 +68,8 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     return figure
 
 
-def _outline(box: Box, view: tuple[int, int]) -> Rectangle:
-    (x, y), (far_x, far_y) = ([corner[axis] for axis in view] for corner in box)
+def _outline(box: Box, view: View) -> Rectangle:
+    (x, y), (far_x, far_y) = np.array(box)[:, list(view)]
     return Rectangle((x, y), far_x - x, far_y - y, fc=FILL, ec=OUTLINE, lw=0.7, zorder=0.5)
 
 
@@ -82,13 +81,9 @@ def _leading_end(flat: FlatVehicle) -> tuple[float, float]:
     return min(near) - 0.8, first + 0.8
 
 
-def _kind(element: FlatElement) -> str:
-    return str(getattr(element.definition, "kind", "element"))
-
-
 def _draw_view(
     axes: Axes,
-    view: tuple[int, int],
+    view: View,
     flat: FlatVehicle,
     colours: dict[str, str],
     limits: tuple[float, float] | None,
@@ -97,9 +92,9 @@ def _draw_view(
     if upright == 2:
         axes.axhline(0.0, color="0.6", lw=0.8)
     for body in flat.of_kind("wheelset"):
-        _draw_wheelset(axes, body, across, upright)
+        _draw_wheelset(axes, body, view)
     for element in flat.elements:
-        _draw_element(axes, element, flat, view, colours[_kind(element)])
+        _draw_element(axes, element, flat, view, colours[element.definition.kind])
     for body in flat.of_kind("axlebox"):
         axes.plot(body.position[across], body.position[upright], **BOX)
     together: dict[tuple[float, float], list[str]] = {}
@@ -133,14 +128,14 @@ def _name_bodies(axes: Axes, together: dict[tuple[float, float], list[str]], abo
 
 
 def _draw_element(
-    axes: Axes, element: FlatElement, flat: FlatVehicle, view: tuple[int, int], colour: str
+    axes: Axes, element: FlatElement, flat: FlatVehicle, view: View, colour: str
 ) -> None:
     """Draw an element; a ring is one whose points coincide, a dotted line one without points."""
     for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
         if name:
-            _line(axes, (flat.body(name).position, point), *view, color=LEVER, lw=0.5)
+            _line(axes, (flat.body(name).position, point), view, color=LEVER, lw=0.5)
     ends = (element.point1, element.point2)
-    _line(axes, ends, *view, color=colour, zorder=3, **_look(element))
+    _line(axes, ends, view, color=colour, zorder=3, **_look(element))
 
 
 def _look(element: FlatElement) -> dict[str, Any]:
@@ -151,24 +146,25 @@ def _look(element: FlatElement) -> dict[str, Any]:
     return {"lw": 1.6, "marker": "o", "ms": 2.5}
 
 
-def _draw_wheelset(axes: Axes, body: FlatBody, across: int, upright: int) -> None:
+def _draw_wheelset(axes: Axes, body: FlatBody, view: View) -> None:
     assert body.wheelset is not None  # of its kind
     x, y, z = body.position
     half = 0.5 * body.wheelset.tape_circle_distance
-    if (across, upright) == SIDE:
+    if view == SIDE:
         radius = body.wheelset.radius[1]
         axes.add_patch(Circle((x, z), radius, fill=False, color=WHEEL, lw=0.9))
         axes.plot(x, z, marker=".", color=WHEEL)
         return
     ends = ((x, y - half, z), (x, y + half, z))
-    _line(axes, ends, across, upright, color=WHEEL, lw=2.0)
+    _line(axes, ends, view, color=WHEEL, lw=2.0)
     for end, radius in zip(ends, body.wheelset.radius, strict=True):
         tread = np.array([[-radius, 0.0, -radius], [radius, 0.0, radius]]) + end
-        _line(axes, [tuple(point) for point in tread], across, upright, color=WHEEL, lw=2.0)
+        _line(axes, tread, view, color=WHEEL, lw=2.0)
 
 
-def _line(axes: Axes, points: Sequence[Vector], across: int, upright: int, **style: object) -> None:
-    axes.plot([p[across] for p in points], [p[upright] for p in points], **style)  # type: ignore[arg-type]
+def _line(axes: Axes, points: Any, view: View, **style: Any) -> None:
+    """Draw a line through points in vehicle axes."""
+    axes.plot(*np.transpose(points)[list(view)], **style)
 
 
 def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D | Rectangle]:
@@ -179,6 +175,6 @@ def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D | Re
     if flat.of_kind("axlebox"):
         yield key("axlebox", **BOX)
     for kind, colour in colours.items():
-        of_kind = [element for element in flat.elements if _kind(element) == kind]
+        of_kind = [element for element in flat.elements if element.definition.kind == kind]
         label = f"{kind.replace('_', ' ')} ({len(of_kind)})"
         yield key(label, color=colour, **_look(of_kind[0]))

@@ -1,8 +1,9 @@
 """Page about a track judged by vehicles."""
 
-from typing import Protocol
+from collections.abc import Sequence
 
-from railsim.plot.assessed_track import Assessed, heat_strip
+from matplotlib.figure import Figure
+
 from railsim.report.document import Section, as_png, document, pictures
 from railsim.table import Table
 
@@ -16,28 +17,19 @@ METHOD = (
 )
 
 
-class Judged(Assessed, Protocol):
-    """What is reported, such as `railsim.studies.assess_track.TrackAssessment`."""
-
-    @property
-    def sections(self) -> Table: ...  # noqa: D102 - as there
-    @property
-    def notes(self) -> tuple[str, ...]: ...  # noqa: D102
-    def table(self) -> Table: ...  # noqa: D102
-
-
-def assessed_track_page(found: Judged) -> str:
-    """Return the page as HTML: places, heat strip, sections."""
-    places = found.table()
+def assessed_track_page(
+    places: Table, share: float, strip: Figure, notes: Sequence[str], sections: Table
+) -> str:
+    """Return the page as HTML: places beyond a share of a limit, heat strip, sections."""
     number = len(places)
-    text = f"At {number} places a vehicle exceeds {found.share:g} of a limit."
+    text = f"At {number} places a vehicle exceeds {share:g} of a limit."
     texts = [f"The first {MOST_ROWS} of {number}; all are in places.csv."]
     places.rows = places.rows[:MOST_ROWS]
-    heat = pictures({"heat": as_png(heat_strip(found))}, CAPTIONS)
-    sections = [
-        Section("Places", texts if number > MOST_ROWS else (), [places] if number else []),
-        Section("Along the track", figures=heat),
-        Section("Vehicles and geometry limits", found.notes, [found.sections]),
+    heat = pictures({"heat": as_png(strip)}, CAPTIONS)
+    parts = [
+        Section("Places", texts if number > MOST_ROWS else [], [places] if number else []),
+        Section("Along the track", drawings=heat),
+        Section("Vehicles and geometry limits", [*notes], [sections]),
     ]
     verdict = {"text": text, "ok": number == 0}
-    return document("Track judged by vehicles", sections, METHOD, verdict)
+    return document("Track judged by vehicles", parts, METHOD, verdict)

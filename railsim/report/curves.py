@@ -134,16 +134,14 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
         begins = starts[filled] - first
         of = np.repeat(np.arange(len(filled)), np.diff(np.append(begins, len(own))))
         place = np.arange(len(own))[:, None]
-        for extreme, missing in ((np.minimum, np.inf), (np.maximum, -np.inf)):
-            there = np.where(np.isnan(own), missing, own)
-            best = extreme.reduceat(there, begins, axis=0)
-            # where it occurs first
-            at = np.minimum.reduceat(np.where(there == best[of], place, len(own)), begins, axis=0)
-            if extreme is np.minimum:
-                low = at
-        columns = np.arange(values.shape[1])
-        found[2 * filled] = own[np.minimum(low, at), columns]
-        found[2 * filled + 1] = own[np.maximum(low, at), columns]
+        low, high = (extreme.reduceat(own, begins) for extreme in (np.fmin, np.fmax))
+        # where each occurs first
+        low_at, high_at = (
+            np.minimum.reduceat(np.where(own == best[of], place, len(own)), begins)
+            for best in (low, high)
+        )
+        found[2 * filled] = np.where(low_at < high_at, low, high)
+        found[2 * filled + 1] = np.where(low_at < high_at, high, low)
     for cell in np.flatnonzero(starts[1:] == starts[:-1]):
         for row, share in ((2 * cell, 0.25), (2 * cell + 1, 0.75)):
             at_x = edges[cell] + share * (edges[cell + 1] - edges[cell])

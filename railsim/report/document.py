@@ -1,39 +1,128 @@
-"""Pages of the design tools: sections of texts, tables and pictures under a verdict."""
+"""Pages: their sections, tables and drawings, values in words, and the page of a design tool.
+
+The page about runs has a template of its own, see `railsim.report.runs`.
+"""
 
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from calendar import month_name
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from io import BytesIO
 from typing import Any
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from railsim import table as values
 from railsim.design_checks import Check, verdict
 from railsim.page import rendered
 from railsim.plot.style import styled
-from railsim.table import Table
 from railsim.version import __version__
 
-DPI = 130
+Cell = str | tuple[str, str]  # a value, or a value with small print below it
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """A picture of the page: PNG in base64, its width on the screen, its caption."""
+class Table:
+    """A table of a page.
 
-    png: str
-    width: int
-    caption: str
+    Attributes
+    ----------
+    header : sequence of str
+    rows : sequence of sequences of Cell
+    caption : str
+    words : frozenset of int
+        Columns with text.
+    failed : frozenset of int
+        Rows in red.
+    note : str
+        A sentence below it.
+    """
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    caption: str = ""
+    words: Collection[int] = (0,)
+    failed: Collection[int] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing or a picture of the page; `kinds` are the labels of its colours."""
+
+    title: str
+    words: str
+    svg: str
+    kinds: Sequence[str] = ()
 
 
 @dataclass
 class Section:
-    """A section of the page; one without content is left out."""
+    """A section of the page.
+
+    `tables`: `Table` of the page about runs, `railsim.table.Table` of a design tool.  `plots`:
+    Plots that the script of the page draws: the number of a group of curves, or ``spread``.
+    """
 
     title: str
-    texts: Sequence[str] = ()
-    tables: Sequence[Table] = ()
-    figures: list[Drawn] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+    tables: list[Any] = field(default_factory=list)
+    drawings: list[Drawing] = field(default_factory=list)
+    id: str = ""  # of a section of the page about runs
+    plots: list[str] = field(default_factory=list)
+    details: list[Table] = field(default_factory=list)  # tables that are folded at first
+
+
+def of_values(table: values.Table, subject: str) -> Table:
+    """Return a table of values for the page; its caption begins with its subject."""
+    return Table(
+        [column.heading for column in table.columns],
+        table.texts(),
+        f"{subject}: {table.caption}" if table.caption else subject,
+        words=[k for k, column in enumerate(table.columns) if not column.format],
+    )
+
+
+def day(created: str) -> str:
+    """A time of ISO 8601 in words.
+
+    Examples
+    --------
+    >>> day("2026-11-03T15:04:20+00:00"), day("earlier")
+    ('3 November 2026, 15:04', 'earlier')
+    """
+    try:
+        when = datetime.fromisoformat(created)
+    except ValueError:
+        return created
+    return f"{when.day} {month_name[when.month]} {when.year}, {when:%H:%M}"
+
+
+def in_words(value: Any) -> str:
+    """A value of a file in words: no brackets of Python.
+
+    Examples
+    --------
+    >>> in_words((10, 10)), in_words(True), in_words(None), in_words(0.1 + 0.2)
+    ('10, 10', 'yes', 'none', '0.3')
+    """
+    if isinstance(value, tuple | list):
+        return ", ".join(map(in_words, value)) or "none"
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first names of a list, and how many more there are."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more
+
+
+DPI = 130
+IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 
 
 def as_png(figure: Figure) -> bytes:
@@ -46,7 +135,7 @@ def as_png(figure: Figure) -> bytes:
 
 def pictures(
     drawn: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str] | None = None
-) -> list[Drawn]:
+) -> list[Drawing]:
     """Return those of some pictures that were drawn, by default all, with their captions."""
     found = []
     for name in drawn if names is None else names:
@@ -54,7 +143,8 @@ def pictures(
             width = int.from_bytes(drawn[name][16:20], "big")  # the header of a PNG file
             caption = captions[name.rstrip("_0123456789")]
             code = b64encode(drawn[name]).decode()
-            found.append(Drawn(code, round(width * 96 / DPI), caption))
+            image = IMAGE.format(caption, round(width * 96 / DPI), code)
+            found.append(Drawing("", caption, image))
     return found
 
 
@@ -69,7 +159,7 @@ def document(
     """Return the page as HTML; `values` go to the template."""
     return rendered(
         "railsim.report", "templates/document.html", title=title, styles=["templates/document.css"],
-        schemes="light dark", sections=[s for s in sections if s.texts or s.tables or s.figures],
+        schemes="light dark", sections=[s for s in sections if s.texts or s.tables or s.drawings],
         method=method, verdict=verdict, lead=f"{source}Written by railsim {__version__}.", **values,
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from railsim.definitions.base import Vector
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
+from railsim.definitions.vehicle.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.track.alignment import Alignment
 
@@ -38,11 +38,7 @@ def vehicle_svg(vehicle: Vehicle) -> str:
 
 def element_kinds(vehicle: Vehicle) -> list[str]:
     """Return the kinds of elements of a vehicle, in the order of their colours."""
-    return list(dict.fromkeys(_kind(element) for element in flatten(vehicle).elements))
-
-
-def _kind(element: FlatElement) -> str:
-    return str(getattr(element.definition, "kind", "element"))
+    return list(dict.fromkeys(element.definition.kind for element in flatten(vehicle).elements))
 
 
 def _view(flat: FlatVehicle, kinds: Sequence[str], view: View) -> str:
@@ -79,7 +75,7 @@ def _shapes(flat: FlatVehicle, kinds: Sequence[str], view: View) -> Iterator[str
     for body in flat.of_kind("wheelset"):
         yield from _wheelset(body, view)
     for element in flat.elements:
-        number = kinds.index(_kind(element)) % COLOURS
+        number = kinds.index(element.definition.kind) % COLOURS
         ends_of = (element.point1, element.point2)
         title = f"<title>{escape(element.name)}</title>"
         if np.allclose(*ends_of):

@@ -13,8 +13,8 @@ from railsim.description.rest import rest_frequencies
 from railsim.errors import InputError, ModelError
 from railsim.model.statics import static_loads
 from railsim.profiles import Profile
+from railsim.report.document import Drawing, Section, Table, in_words, of_values
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
-from railsim.report.tables import Drawing, Section, Table, in_words, of_values
 from railsim.result import Result
 from railsim.simulation.assumptions import assumptions
 from railsim.text import printable
@@ -69,7 +69,7 @@ def what_was_run(
     used: Sequence[Used], results: Mapping[str, Result], inputs: Mapping[str, Any]
 ) -> Section:
     """Return the section of the page about vehicles, tracks, inputs and settings."""
-    section = Section("inputs", "Inputs")
+    section = Section("Inputs", id="inputs")
     vehicles: dict[str, Any] = {}
     tracks: dict[str, list[Track]] = {}
     for one in used:
@@ -103,11 +103,10 @@ def _at_rest(results: Mapping[str, Result]) -> list[Table]:
     """Return how the vehicles of the results stand at rest, each in its load case."""
     vehicles: list[tuple[Vehicle, Mapping[str, Profile]]] = []
     for result in results.values():
-        vehicle = result.vehicle()
-        if all(vehicle != known for known, _ in vehicles) and len(vehicles) < MOST_AT_REST:
-            vehicles.append((vehicle, result.profiles))
+        if all(result.vehicle() != known for known, _ in vehicles):
+            vehicles.append((result.vehicle(), result.profiles))
     found = []
-    for vehicle, profiles in vehicles:
+    for vehicle, profiles in vehicles[:MOST_AT_REST]:
         with suppress(InputError, ModelError):
             loads = static_loads(vehicle, profiles=profiles)
             subject = f"{vehicle.name}, load '{loads.load}' at rest"
@@ -143,11 +142,11 @@ def _differences(vehicles: Mapping[str, Any]) -> Table:
     """Return the keys in which vehicles differ."""
     flat = {name: dict(_flat(vehicle.model_dump())) for name, vehicle in vehicles.items()}
     keys = dict.fromkeys(key for values in flat.values() for key in values)
-    told = ("name", "source")
     rows = [
         [key, *(in_words(values.get(key, "—")) for values in flat.values())]
         for key in keys
-        if key not in told and len({str(values.get(key)) for values in flat.values()}) > 1
+        if key not in ("name", "source")
+        and len({str(values.get(key)) for values in flat.values()}) > 1
     ]
     more = len(rows) - MOST_DIFFERENCES
     return Table(

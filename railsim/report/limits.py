@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 from railsim.assessment import Assessment, assess
@@ -14,7 +14,7 @@ from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
-from railsim.report.tables import Cell, Table
+from railsim.report.document import Cell, Section, Table
 from railsim.result import Result
 from railsim.result.sensors import sensors
 from railsim.text import printable
@@ -36,37 +36,25 @@ METHOD = {"one": "1-dim.", "two": "2-dim.", "largest": "largest value", "smalles
 MOST = 256  # runs that are assessed; more would take long
 
 
-@dataclass
-class Assessed:
-    """What a page says about limits.
-
-    `verdicts`: Whether it is a pass, and the verdict in a sentence. `tables`, `details`: Details
-    are folded at first.
-    """
-
-    verdicts: list[tuple[bool, str]] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
-    details: list[Table] = field(default_factory=list)
-
-
-def assessed(results: Mapping[str, Result]) -> Assessed:
+def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[bool, str]], Section]:
     """Assess all runs as `railsim assess` does, also those that are sampled too coarsely.
 
-    EN 14363 as far as the runs cover its zones; Nadal's limit for each run.
+    EN 14363 as far as the runs cover its zones; Nadal's limit for each run.  Returns: whether each
+    verdict is a pass, and the verdict in a sentence; the section of the page.
     """
     runs = {name: result for name, result in results.items() if len(result["time"])}
-    found = Assessed()
+    verdicts, found = list[tuple[bool, str]](), Section("Comparison with limits", id="limits")
     if len(runs) > MOST:
         words = f"{len(runs)} runs are not compared with limits; at most {MOST} runs are."
-        found.details.append(_remarks([words]))
-        return found
+        found.details.append(remark_table([words]))
+        return verdicts, found
     running, remarks = _assessed(runs, "en14363")
     derailment, more = _assessed(runs, "safety")
     for one in running:
         parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
         edition = one.limits.edition if one.limits else ""
         words = f"{one.vehicle}, {edition}: {one.verdict} ({parts})."
-        found.verdicts.append((one.verdict == PASS, words))
+        verdicts.append((one.verdict == PASS, words))
         found.tables.append(_reasons(one))
         found.details += [_conditions(one), _sections(one), *_rows(one)]
         found.details += [_influences(one)] if one.influences else []
@@ -77,13 +65,14 @@ def assessed(results: Mapping[str, Result]) -> Assessed:
         table, above = _safety(derailment)
         found.tables.append(table)
         if above:
-            found.verdicts.append((False, f"Limits exceeded: {'; '.join(above)}."))
+            verdicts.append((False, f"Limits exceeded: {'; '.join(above)}."))
     if words_of := _gathered([*remarks, *more], runs):
-        found.details.append(_remarks(words_of))
-    return found
+        found.details.append(remark_table(words_of))
+    return verdicts, found
 
 
-def _remarks(words: Sequence[str]) -> Table:
+def remark_table(words: Sequence[str]) -> Table:
+    """Return remarks as a table."""
     return Table(["remark"], [[word] for word in words], "Remarks on these values")
 
 

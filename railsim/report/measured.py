@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.assessment.model_comparison import ModelValidation
@@ -17,13 +16,11 @@ from railsim.identification import Identified
 from railsim.identification.identified import correlation_table, parameter_table, residual_table
 from railsim.plot import validation as plots
 from railsim.plot.style import styled
-from railsim.report import tables
-from railsim.report.document import Drawn, Section, as_png, document, pictures
+from railsim.report.document import Drawing, Section, as_png, document, of_values, pictures
 
 RECORDS = ("model_validation.json", "identified.json")
 LARGEST_RECORD, LARGEST_PICTURE = 200_000_000, 20_000_000  # bytes
 PNG = b"\x89PNG\r\n\x1a\n"
-IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 CAPTIONS = {
     "scatter": "Simulated over measured section values; dashed the limit of the mean, dotted twice "
     "that of the standard deviation.",
@@ -75,20 +72,18 @@ def measured_page(parts: Sequence[Part], title: str | None = None) -> str:
     )
 
 
-def as_section(part: Part, number: int) -> tables.Section:
+def as_section(part: Part, number: int) -> Section:
     """Return a section of the page about runs; tables after the first are folded."""
-    found = tables.Section(f"measured{number}", part.title, [part.verdict, *part.remarks])
+    found = Section(part.title, [part.verdict, *part.remarks], id=f"measured{number}")
     for section in part.sections:
         found.texts += section.texts
-        for one in section.figures:
-            image = IMAGE.format(one.caption, one.width, one.png)
-            found.drawings.append(tables.Drawing("", one.caption, image))
-        found.details += [tables.of_values(table, section.title) for table in section.tables]
+        found.drawings += section.drawings
+        found.details += [of_values(table, section.title) for table in section.tables]
     found.tables, found.details = found.details[:1], found.details[1:]
     return found
 
 
-def _drawn(figures: Mapping[str, Figure]) -> list[Drawn]:
+def _drawn(figures: Mapping[str, Figure]) -> list[Drawing]:
     return pictures({name: as_png(figure) for name, figure in figures.items()}, CAPTIONS)
 
 
@@ -101,13 +96,13 @@ def validation_figures(found: ModelValidation) -> dict[str, Figure]:
     return figures
 
 
-def of_validation(found: ModelValidation, more: Sequence[Drawn] = ()) -> Part:
+def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
     """Return what a page says about a model against a test; `more` pictures at the end."""
     words = {FAIL: "The model does not match the test.", INCOMPLETE: "Too few sections."}
     text = words.get(found.verdict, "The model matches the test within all limits.")
     sections = [
         Section("Differences and limits", tables=[found.table()]),
-        Section("Pictures", figures=[*_drawn(validation_figures(found)), *more]),
+        Section("Pictures", drawings=[*_drawn(validation_figures(found)), *more]),
         Section("Values of the sections (SI)", tables=[found.section_table()]),
     ]
     title = f"{found.vehicle} against {', '.join(found.runs)}"
@@ -121,7 +116,7 @@ def identification_figures(found: Identified) -> dict[str, Figure]:
         return {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
 
 
-def of_identification(record: Mapping[str, Any], figures: list[Drawn]) -> Part:
+def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
     coloured = [one["channel"] for one in record["channels"] if one["white"] is False]
@@ -134,7 +129,7 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawn]) -> Part:
     sections = [
         Section("Parameters", unidentified, parameters),
         Section("Residuals", tables=[residual_table(record)]),
-        Section("Pictures", figures=figures),
+        Section("Pictures", drawings=figures),
     ]
     title = f"{record['vehicle']}: identified parameters"
     good = not coloured and not unidentified
@@ -181,7 +176,7 @@ def read_part(file: str | Path) -> Part:
         raise input_error(str(path), words, allowed) from None
 
 
-def _pictures(folder: Path, *names: str) -> list[Drawn]:
+def _pictures(folder: Path, *names: str) -> list[Drawing]:
     """Return pictures beside a record, those that are there."""
     files = {name: folder / f"{name}.png" for name in names}
     drawn = {n: read_bytes(f, LARGEST_PICTURE) for n, f in files.items() if f.is_file()}

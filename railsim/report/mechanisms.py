@@ -18,6 +18,7 @@ from railsim.design_checks import check_table
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
+from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.links import Course, actuators, links
@@ -27,12 +28,13 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 from railsim.plot import mechanisms as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawn, Section, of_design, pictures
+from railsim.report.document import Drawing, Section, as_png, of_design, pictures
 from railsim.table import Table
 
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
 
+REPORT = "report.html"
 FRAMES = 121
 GIF_FRAMES = 40
 DASHES = {"guide": [2, 3], "spring": [7, 4], "damper": [4, 3]}
@@ -60,7 +62,6 @@ class Collected:
 
     results: Sequence[Analysis]  # one for each file; the first is the one that the page describes
     cases: Mapping[str, Analysis]  # its base and cases, where it has cases
-    comparison: Sequence[Mapping[str, Any]] | None = None
     optimum: "Optimum | None" = None
 
     @property
@@ -87,6 +88,17 @@ CAPTIONS = {
     "comparison_zone": "The same within the zone; below, the differences from the first.",
     "search": "Objective at the end of the search from each starting point.",
 }  # fmt: skip
+
+
+def files(collected: Collected) -> dict[str, bytes]:
+    """Page, pictures, animation and tables by the names of their files."""
+    drawn = {name: as_png(figure) for name, figure in figures(collected).items()}
+    content = {f"{name}.png": png for name, png in drawn.items()}
+    content["animation.gif"] = animation(collected.result)
+    content["positions.csv"] = positions(collected.result)
+    if collected.result.timed is not None:
+        content["motion.csv"] = motion_table(collected.result)
+    return content | {REPORT: page(collected, drawn).encode()}
 
 
 @styled()
@@ -280,7 +292,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     result = collected.result
     definition, made = result.definition, checks(result)
 
-    def shown(*names: str) -> list[Drawn]:
+    def shown(*names: str) -> list[Drawing]:
         return pictures(drawn, CAPTIONS, names)
 
     rows = [tables.position_table(result), tables.published_table(result)]
@@ -291,16 +303,16 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         found = tables.optimum_sentences(optimum), tables.optimum_tables(optimum)
         sections += [
             Section("Search", *found, shown("search")),
-            Section("Before and after the search", figures=compared),
+            Section("Before and after the search", drawings=compared),
         ]
-    if collected.comparison is not None:
+    if len(collected.results) > 1:
         compared += shown(*(name for name in drawn if name.startswith("drawing_")))
-        rows = [tables.comparison_table(collected.comparison)]
+        rows = [tables.comparison_table(compare(collected.results))]
         sections.append(Section("Comparison", [], rows, compared))
     kinematics = shown("kinematics", "actuators", "angles", "cam")
     forces = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")
     sections += [
-        Section("Kinematics", figures=kinematics),
+        Section("Kinematics", drawings=kinematics),
         Section("Forces and motion", [], [tables.reaction_table(result)], shown(*forces)),
     ]
     if choices := selection(result):

@@ -20,9 +20,9 @@ from railsim.notation import QUANTITIES
 from railsim.page import rendered
 from railsim.plot.assessment import assessment_figure
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.document import as_png
+from railsim.report.document import Cell, Drawing, Section, Table, as_png, day, listed, of_values
 from railsim.report.inputs import Used, inputs_of, what_was_run
-from railsim.report.limits import assessed
+from railsim.report.limits import assessed, remark_table
 from railsim.report.published import beside_published
 from railsim.report.spread import (
     LEAST,
@@ -34,7 +34,6 @@ from railsim.report.spread import (
     spread_rows,
     worst_rows,
 )
-from railsim.report.tables import Cell, Drawing, Section, Table, day, listed, of_values
 from railsim.result import Result
 from railsim.text import printable
 from railsim.version import __version__
@@ -69,11 +68,12 @@ def page(
     safety are shown in sections of their own. `measured`: Comparisons with tests and
     identifications.
     """
+    inputs = inputs or {}
     found = groups(results)
     cells = cells_of(found)
     curves = [curve_data(group, cells) for group in found]
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
-    limits = assessed(results if assessable is None else assessable)
+    verdicts, limits = assessed(results if assessable is None else assessable)
     peaks = any(record["name"] in results for record in _done(records))
     sections = [_peaks(records, results)] if peaks or len(records) < LEAST else []
     sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
@@ -82,23 +82,19 @@ def page(
     if found and (data["curves"] or peaks):
         sections.append(_curves(len(data["curves"]), records, results))
     if limits.tables or limits.details:
-        title_of = "Comparison with limits"
-        tables, details = limits.tables, limits.details
-        sections.append(Section("limits", title_of, tables=tables, details=details))
-    if spread := _spread(records, data, inputs or {}):
-        sections.append(spread)
-    if published := _published(results):
-        sections.append(published)
-    sections += measured
-    sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs or {}))
+        sections.append(limits)
+    if len(records) >= LEAST:
+        sections.append(_spread(records, data, inputs))
+    sections += [*_published(results), *measured]
+    sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report", "templates/runs.html", title=title,
         styles=["vendor/uPlot.min.css", "templates/runs.css"],
         scripts=["vendor/uPlot.iife.min.js", "templates/study.js", "templates/runs.js"], data=data,
         schemes="light dark", lead=_lead(records, results),
-        verdict=_verdict(records, limits.verdicts),
-        sections=[section for section in sections if section],
+        verdict=_verdict(records, verdicts),
+        sections=sections,
         foot=f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
         "Values in customary units; files and the Python interface use SI units.",
         wrap=Markup("_<wbr>"),
@@ -110,10 +106,9 @@ def _done(records: Sequence[Record]) -> list[Record]:
 
 
 def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
-    number = f"{len(records)} run{'s' * (len(records) != 1)}"
     names = {kind: list(dict.fromkeys(str(record["labels"].get(kind, "")) for record in records))
              for kind in ("vehicle", "track")}  # fmt: skip
-    parts = [number]
+    parts = [f"{len(records)} run{'s' * (len(records) != 1)}"]
     for kind, found in names.items():
         if len(found) <= 4 and all(found):
             parts.append(f"{kind}{'s' * (len(found) > 1)} {', '.join(found)}")
@@ -164,7 +159,7 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
         texts = ["The study kept no results of its runs (`--keep summary`); their values follow."]
     elif len(shown) < done:
         texts.append(f"{_largest(len(shown), done)}; all others follow in the table of runs.")
-    return Section("peaks", "Peaks", texts, tables=[table] if shown else [])
+    return Section("Peaks", texts, tables=[table] if shown else [], id="peaks")
 
 
 def _worst(records: Sequence[Record]) -> Section:
@@ -175,7 +170,7 @@ def _worst(records: Sequence[Record]) -> Section:
         f"The largest of {len(done)} runs by magnitude, over all wheels; the table of runs below "
         "has the rest, and the command of each."
     )
-    return Section("worst", "Worst runs", [text], tables=[table])
+    return Section("Worst runs", [text], tables=[table], id="worst")
 
 
 def _largest(shown: int, done: int) -> str:
@@ -184,7 +179,7 @@ def _largest(shown: int, done: int) -> str:
 
 def _assessed(assessment: Assessment) -> Section:
     """An assessment of comfort, wear or safety: its picture and its tables, folded."""
-    section = Section(assessment.standard, f"Assessment: {assessment.standard}")
+    section = Section(f"Assessment: {assessment.standard}", id=assessment.standard)
     figure = assessment_figure([assessment])
     if figure is not None:
         code = b64encode(as_png(figure)).decode()
@@ -192,28 +187,22 @@ def _assessed(assessment: Assessment) -> Section:
         section.drawings.append(Drawing(assessment.vehicle, "", image))
     section.details = [of_values(one, str(one.columns[0].heading)) for one in tables(assessment)]
     if assessment.remarks:
-        rows = [[remark] for remark in assessment.remarks]
-        section.details.append(Table(["remark"], rows, "Remarks on these values"))
+        section.details.append(remark_table(assessment.remarks))
     return section
 
 
 def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> Section:
     if not number:
         text = "The results hold none of the quantities that are drawn here."
-        return Section("curves", "Along the track", [text])
+        return Section("Along the track", [text], id="curves")
     done = len(_done(records))
     texts = [f"{_largest(len(results), done)}."] if len(results) < done else []
-    return Section("curves", "Along the track", texts, plots=[*map(str, range(number))])
+    return Section("Along the track", texts, plots=[*map(str, range(number))], id="curves")
 
 
-def _spread(
-    records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str, Any]
-) -> Section | None:
+def _spread(records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str, Any]) -> Section:
     """Table of all runs, and what their values depend on."""
-    done = _done(records)
-    if len(records) < LEAST:
-        return None
-    varied = parameters(records)
+    done, varied = _done(records), parameters(records)
     data["spread"] = {
         "parameters": varied,
         "columns": columns(records),
@@ -231,17 +220,16 @@ def _spread(
     note = "Peaks and medians over full curves by magnitude, over all wheels."
     caption = f"Spread over {len(done)} runs"
     table = Table(header, spread_rows(done), caption, (0, 2, 5), note=note)
-    section = Section("spread", "Over the study", plots=["runs"], details=[table])
+    section = Section("Over the study", plots=["runs"], details=[table], id="spread")
     if len(done) >= LEAST and varied:
         section.texts = [f"Varied: {', '.join(varied)}."]
         section.plots.insert(0, "spread")
     return section
 
 
-def _published(results: Mapping[str, Result]) -> Section | None:
+def _published(results: Mapping[str, Result]) -> list[Section]:
+    """Published values beside those of the runs, where there are any."""
     rows = beside_published(results)
-    if not rows:
-        return None
     tables = []
     for study in dict.fromkeys(row.study.name for row in rows):
         own = [row for row in rows if row.study.name == study]
@@ -258,12 +246,13 @@ def _published(results: Mapping[str, Result]) -> Section | None:
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
         header = ["run", "", "read", "published", "here", "difference", "rails of the run"]
         tables.append(Table(header, cells, first.name, (0, 1, 2, 6), note=note))
-    return Section("published", "Comparison with published values", tables=tables)
+    title = "Comparison with published values"
+    return [Section(title, tables=tables, id="published")] if tables else []
 
 
 def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
     """Runs that failed or ended early, and remarks, equal ones once."""
-    section = Section("remarks", "Failures and remarks", [*more])
+    section = Section("Failures and remarks", [*more], id="remarks")
     ended: dict[tuple[str, str], list[Record]] = {}
     for record in records:
         if record["status"] != "complete":  # one reason for whatever numbers it tells

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -155,12 +156,11 @@ def worst_rows(records: Sequence[Record]) -> list[list[tuple[str, str] | str]]:
     own = [key for key in there if "_mid" not in key and not key.endswith(tuple(WORDS))]
     for key in [name for name in RANKED if name in there] or own:
         column = there[key]
-        pairs = [(-v, i) for i, v in enumerate(column["values"]) if v is not None]
         row: list[tuple[str, str] | str] = [_heading(column)]
-        for value, number in sorted(pairs)[:WORST]:
+        for number in _ranked(column["values"])[:WORST]:
             told = (f"{own['words']} {_text(own['values'][number])}" for own in varied.values())
             where = ", ".join(told) or str(records[number]["name"])
-            row.append((f"{-value:.4g}", where))
+            row.append((f"{column['values'][number]:.4g}", where))
         rows.append(row + [""] * (1 + WORST - len(row)))
     return rows
 
@@ -182,16 +182,14 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
     names = [str(record["name"]) for record in records]
     if len(names) <= most:
         return names
-    ranked = []
-    for name in RANKED:
-        values = columns(records).get(name, {"values": []})["values"]
-        pairs = [(-value, number) for number, value in enumerate(values) if value is not None]
-        ranked.append([number for _, number in sorted(pairs)])
-    selected: dict[int, None] = {}
-    for rank in range(len(names)):
-        for ranks in ranked:
-            if rank < len(ranks) and len(selected) < most:
-                selected[ranks[rank]] = None
-    if not selected:
-        selected = dict.fromkeys(range(most))
-    return [names[number] for number in sorted(selected)]
+    there = columns(records)
+    ranked = [_ranked(there[name]["values"]) for name in RANKED if name in there]
+    in_turn = dict.fromkeys(number for rank in zip_longest(*ranked) for number in rank)
+    in_turn.pop(None, None)
+    return [names[number] for number in sorted([*in_turn][:most] or range(most))]
+
+
+def _ranked(values: Sequence[float | None]) -> list[int]:
+    """Numbers of the runs with a value, the largest first."""
+    there = [(-value, number) for number, value in enumerate(values) if value is not None]
+    return [number for _, number in sorted(there)]

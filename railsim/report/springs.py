@@ -15,7 +15,7 @@ from railsim.design_checks import check_table
 from railsim.errors import InputError
 from railsim.plot import springs as plots
 from railsim.plot.style import styled
-from railsim.report.document import Drawn, Section, of_design, pictures
+from railsim.report.document import Drawing, Section, as_png, of_design, pictures
 from railsim.springs import tables
 from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import Design, design
@@ -25,6 +25,7 @@ from railsim.springs.verification import Fatigue, Verification, dynamic_loads, f
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
 
+REPORT = "report.html"
 METHOD = (
     "Vertical stiffness after EN 13906-1; lateral and tilting stiffness of the loaded coil column "
     "after Krettek and Sobczak with the factors of Grossi (2025), ch. 2; equilibrium of the arm "
@@ -100,6 +101,16 @@ def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" =
     )  # fmt: skip
 
 
+def files(
+    suspension: TrailingArmSuspension, search: "SearchResult | None" = None
+) -> dict[str, bytes]:
+    """Compute what a suspension file allows; pictures and the page by the names of their files."""
+    results = collected(suspension, search)
+    drawn = {name: as_png(figure) for name, figure in figures(results).items()}
+    content = {f"{name}.png": png for name, png in drawn.items()}
+    return content | {REPORT: page(results, drawn).encode()}
+
+
 @styled()
 def figures(results: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
@@ -126,7 +137,7 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
     suspension, verification = results.suspension, results.verification
     sheets = data_sheets(suspension, verification)
 
-    def shown(*names: str) -> list[Drawn]:
+    def shown(*names: str) -> list[Drawing]:
         return pictures(figures, CAPTIONS, names)
 
     sections = [Section("Inputs", [], tables.input_tables(suspension))]

@@ -294,7 +294,7 @@ def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
 
 
 def _write(found: Optimisation) -> None:
-    from railsim.plot.design import front_figure, sensitivity_figure
+    from railsim.plot.study import front_figure, sensitivity_figure
     from railsim.plot.style import save
 
     text = json.dumps(finite(found.record()), indent=1, allow_nan=False)

@@ -118,7 +118,7 @@ class Stationary:
         self, path: str | Path | None = None, *, title: str = "", overwrite: bool = False
     ) -> "Figure":
         """Draw unloading over twist from both directions; to a file too if a path is given."""
-        from railsim.plot.stationary import twist_figure
+        from railsim.plot.stability import twist_figure
         from railsim.plot.style import save
 
         limit = next(v.limit for v in self.values if v.quantity == UNLOADING)

@@ -53,6 +53,14 @@ def test_command_prints_value_wheel_time_and_difference(files, capsys):
     assert "full curve 1, median" in printed
 
 
+def test_remarks_are_printed_unless_quiet(files, capsys, monkeypatch):
+    monkeypatch.setattr("railsim.result.Result.remarks", ("hunts at 5 Hz",))
+    assert main(["compare", *files]) == 0
+    assert "lower: remark: hunts at 5 Hz" in capsys.readouterr().out
+    assert main(["compare", *files, "--quiet"]) == 0
+    assert "remark" not in capsys.readouterr().out
+
+
 def test_folder_holds_table_record_and_picture(files, tmp_path):
     folder = tmp_path / "comparison"
     assert main(["compare", *files, "--out", str(folder)]) == 0

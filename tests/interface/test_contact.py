@@ -146,6 +146,8 @@ def test_what_was_put_right_in_a_file_is_told(tmp_path, capsys):
     path.write_text("y_mm,z_mm\n" + rows)
     assert cli.main(["contact", "--wheel", str(path)]) == 0
     assert "mirrored" in capsys.readouterr().err
+    assert cli.main(["contact", "--wheel", str(path), "--quiet"]) == 0
+    assert "mirrored" not in capsys.readouterr().err
     assert any("mirrored" in note for note in as_json(capsys, "--wheel", str(path))["notes"])
 
 

@@ -21,10 +21,10 @@ from test_study import simulated as simulated
 import railsim
 from railsim.cli import main
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
+from railsim.report.document import day, in_words
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
 from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
-from railsim.report.tables import day, in_words
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.facts import run_facts
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from railsim.cli import main
-from railsim.cli.common import in_width, show
+from railsim.cli.terminal import in_width, show
 from railsim.table import Table
 
 TABLE = Table(["quantity", "verdict"], [["a\x1b[31mname", "fail"], ["of " * 40, "pass"]])

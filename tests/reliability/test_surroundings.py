@@ -157,4 +157,4 @@ def test_ten_thousand_dips_are_told_with_what_is_allowed(tmp_path, capsys):
 def test_commands_print_by_the_function_that_escapes():
     folder = ROOT / "railsim" / "cli"
     by_click = [path.name for path in folder.glob("*.py") if "click.echo(" in path.read_text()]
-    assert by_click == ["common.py"]
+    assert by_click == ["terminal.py"]
