@@ -37,10 +37,11 @@ def with_preloads(model: Model) -> Model:
     """
     key = _key(model)
     if key not in _KEPT:
-        system = _solved(model).system
+        solved = _solved(model)
+        found = solved.system.links.spring[:, 2].copy(), solved.system.mounts.preload.copy()
         if len(_KEPT) >= MOST_KEPT:
             _KEPT.clear()
-        _KEPT[key] = system.links.spring[:, 2].copy(), system.mounts.preload.copy()
+        _KEPT[key] = _KEPT[_key(solved)] = found  # which is its own solution
     return with_these_preloads(model, *_KEPT[key])
 
 
@@ -234,11 +235,16 @@ def _solved_for(
     links, mounts = _copies(system)
     for group, element in unknowns:
         _set_preload(links, mounts, group, element, 0.0)
-    fixed = _preload_forces(system, links, mounts, conditions)
-    columns = []
-    for group, element in unknowns:
-        unit = _with_unit_preload(system, group, element)
-        columns.append(_preload_forces(system, *unit, conditions))
+    every = [("links", e) for e in range(len(links.body))]
+    every += [("mounts", e) for e in range(len(mounts.body))]
+    fixed = _preload_forces(system, links, mounts, every, conditions)
+    unit_links, unit_mounts = _copies(system)
+    unit_links.spring[:, 2] = 1.0
+    unit_mounts.preload[:] = 0.0, 0.0, 1.0
+    columns = [
+        _preload_forces(system, unit_links, unit_mounts, [unknown], conditions)
+        for unknown in unknowns
+    ]
     matrix = np.array(columns).T.reshape(len(conditions), len(unknowns))
     # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
     scale = np.sqrt(np.array([support[unknown] for unknown in unknowns]))
@@ -311,32 +317,30 @@ def _load(system: System, body: int, component: int) -> float:
     return float(weight) if component == 2 else 0.0
 
 
-def _with_unit_preload(system: System, group: str, element: int) -> tuple[Links, Mounts]:
-    links, mounts = _copies(system)
-    links.spring[:, 2] = 0.0
-    mounts.preload[:] = 0.0
-    _set_preload(links, mounts, group, element, 1.0)
-    return links, mounts
-
-
 def _set_preload(links: Links, mounts: Mounts, group: str, element: int, value: float) -> None:
     preload = links.spring if group == "links" else mounts.preload
     preload[element, 2] = value
 
 
 def _preload_forces(
-    system: System, links: Links, mounts: Mounts, conditions: list[tuple[int, int]]
+    system: System,
+    links: Links,
+    mounts: Mounts,
+    elements: list[tuple[str, int]],
+    conditions: list[tuple[int, int]],
 ) -> Floats:
-    """Forces and moments of all preloads in the nominal position, one per condition."""
+    """Forces and moments of the preloads of some elements in the nominal position."""
     totals = np.zeros((len(system.bodies.kind), 6))
-    for e, (i, j) in enumerate(links.body):
-        direction = _nominal(system, j, links.point[e, 1]) - _nominal(system, i, links.point[e, 0])
-        force = links.spring[e, 2] * direction / np.linalg.norm(direction)
-        _add(totals, i, links.point[e, 0], force)
-        _add(totals, j, links.point[e, 1], -force)
-    for e, ((i, j), force) in enumerate(zip(mounts.body, nominal_forces(mounts), strict=True)):
-        _add(totals, i, mounts.point[e, 0], force)
-        _add(totals, j, mounts.point[e, 1], -force)
+    forces = nominal_forces(mounts)
+    for group, e in elements:
+        if group == "links":
+            (i, j), (one, two) = links.body[e], links.point[e]
+            direction = _nominal(system, j, two) - _nominal(system, i, one)
+            force = links.spring[e, 2] * direction / np.linalg.norm(direction)
+        else:
+            (i, j), (one, two), force = mounts.body[e], mounts.point[e], forces[e]
+        _add(totals, i, one, force)
+        _add(totals, j, two, -force)
     return np.array([totals[body, component] for body, component in conditions])
 
 
