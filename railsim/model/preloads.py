@@ -37,11 +37,10 @@ def with_preloads(model: Model) -> Model:
     """
     key = _key(model)
     if key not in _KEPT:
-        solved = _solved(model)
-        found = solved.system.links.spring[:, 2].copy(), solved.system.mounts.preload.copy()
+        system = _solved(model).system
         if len(_KEPT) >= MOST_KEPT:
             _KEPT.clear()
-        _KEPT[key] = _KEPT[_key(solved)] = found  # which is its own solution
+        _KEPT[key] = system.links.spring[:, 2].copy(), system.mounts.preload.copy()
     return with_these_preloads(model, *_KEPT[key])
 
 

@@ -168,7 +168,7 @@ class StepChoice:
             return False
 
     def _stability(self, model: Model, speed: float, state: Floats | None) -> Stability:
-        rolling = equilibrium(model, speed).state if state is None else state
+        rolling = equilibrium(model, speed, self._inputs).state if state is None else state
         return Stability(
             model,
             level_track_with_friction(model.system),
