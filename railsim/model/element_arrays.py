@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.elements.rows import (
     AXES,
@@ -379,7 +379,7 @@ def _kind_of_mount(row: dict[str, Any]) -> tuple[bool, ...]:
     return (not has_law, *(bool(flag) for flag in row["flags"][1:3]))
 
 
-def _starts(tables: Sequence[Floats]) -> NDArray[np.int64]:
+def _starts(tables: Sequence[Floats]) -> Integers:
     return np.concatenate([[0], np.cumsum([len(table) for table in tables])]).astype(np.int64)
 
 

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.compiler import entry
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
@@ -67,7 +66,7 @@ _BALANCING, _SQUARINGS, _LEFT = 3, 16, 1e-20
 
 
 def empty_recorder(
-    model: Model, rows: int, chosen: NDArray[np.int64] | None = None, patches: bool = False
+    model: Model, rows: int, chosen: Integers | None = None, patches: bool = False
 ) -> Recorder:
     """Recorder with room for `rows` outputs.
 
@@ -285,10 +284,7 @@ def _surely_below(matrix: Floats, limit: float) -> bool:
 
 
 def _jacobian(
-    function: Callable[[Floats], Floats],
-    state: Floats,
-    moving: NDArray[np.int64],
-    step: float = 1e-8,
+    function: Callable[[Floats], Floats], state: Floats, moving: Integers, step: float = 1e-8
 ) -> Floats:
     """Jacobian of the entries `moving` by forward differences; the function takes many states."""
     trials = np.repeat(state[None], moving.size + 1, axis=0)  # the state itself is the first
@@ -298,7 +294,7 @@ def _jacobian(
     return np.ascontiguousarray(((found[1:] - found[0]) / changes[:, None]).T)
 
 
-def _moving(system: System, state: Floats) -> NDArray[np.int64]:
+def _moving(system: System, state: Floats) -> Integers:
     """Entries of a state that move: not position and speed, nor what slopes have learnt."""
     end = len(state) - N_SCALARS
     indices = np.arange(end)

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats, Integers
 from railsim.definitions.settings import Settings
 from railsim.errors import RailsimError
 from railsim.kernels.compiler import entry
@@ -38,7 +39,6 @@ from railsim.simulation.ensemble import Ensemble, contact_grid
 from railsim.simulation.outputs import OutputPlan
 from railsim.simulation.step_choice import StepChoice, duration
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 # Longest chunk in outputs, and in steps of all its vehicles: some hundredths of a second of
@@ -177,8 +177,8 @@ class Run:
     due: bool = True
     status: int = RUNNING
     where: int = 0
-    events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    parts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
+    events: Integers = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    parts: Integers = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
     again: int = 0
     vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
     cpu_time: float = 0.0

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -42,8 +42,6 @@ from railsim.result.sensors import all_sensors, motions, readings
 from railsim.simulation.own_outputs import OwnOutputs
 from railsim.track.alignment import alignment_of
 from railsim.track.irregularity import displacement
-
-Floats = NDArray[np.float64]
 
 ROLL, YAW, LATERAL = 3, 5, 1
 NEEDED = ("time", "distance", "mileage", "curvature", "cant", "Q0")

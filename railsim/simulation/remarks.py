@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.system import DIVIDED, TIME, UNSETTLED, Support
@@ -27,8 +27,6 @@ from railsim.notation import SIDES
 from railsim.result.hunting import Hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.outputs import run_extremes
-
-Floats = NDArray[np.float64]
 
 # Vertical impacts: twice the ratio at which North American wagons are taken out of service (AAR
 # Rule 41: 400 kN on wheels of 159 kN)
@@ -247,7 +245,7 @@ def yaw_range(look_ups: int) -> tuple[str, ...]:
 
 
 def alternation(
-    measured: NDArray[np.float64], Q0: NDArray[np.float64], wheelsets: Sequence[str], divided: int
+    measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided: int
 ) -> tuple[str, ...]:
     """Remark on a guiding force that alternates from step to step.
 
@@ -269,8 +267,8 @@ def alternation(
 
 
 def vibration(
-    measured: NDArray[np.float64],
-    Q0: NDArray[np.float64],
+    measured: Floats,
+    Q0: Floats,
     wheelsets: Sequence[str],
     *,
     irregular: bool,

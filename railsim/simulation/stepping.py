@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
@@ -40,7 +40,6 @@ from railsim.simulation.preparation import begin
 from railsim.simulation.run_progress import Progress, RunProgress
 from railsim.simulation.step_choice import duration as time_for
 
-Floats = NDArray[np.float64]
 NEVER = 1 << 40
 SHORTEST = 1e-12  # s
 SHARE = 1e-3  # of a step: what is shorter is made up for by the next one
