@@ -61,7 +61,7 @@ class Part:
     Attributes
     ----------
     state : int64[n_state]
-        Integers of its own state; the last three, time, position and speed, are those of all.
+        Indices of its own state; the last three, time, position and speed, are those of all.
     bodies, wheelsets, elements : slice
         Its bodies, wheelsets and recorded elements.
     """
@@ -330,7 +330,7 @@ def _slices(lengths: Iterable[int]) -> list[slice]:
 def _indices(
     n: int, m: int, sizes: tuple[int, int], bodies: slice, internal: slice, wheelsets: slice, w: int
 ) -> Integers:
-    """Integers of one vehicle's state in that of n bodies, m internal states, w wheelsets."""
+    """Indices of one vehicle's state in that of n bodies, m internal states, w wheelsets."""
     coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
     inner = np.arange(internal.start, internal.stop)
     first = 18 * n + 2 * m
