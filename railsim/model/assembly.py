@@ -191,7 +191,6 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
     elements = ElementArrays({body.name: body for body in flat.bodies}, own=LawBlocks(laws))
     for element in flat.elements:
         elements.add(element)
-    elements.sort()
     bodies, offsets = _bodies(flat)
     nothing: Any = None
     system = System(
@@ -200,18 +199,11 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
         track=nothing,
         support=nothing,
         contact=nothing,
-        links=elements.links(),
-        mounts=elements.mounts(),
-        curves=elements.curves(),
-        internal=elements.internal(),
-        loads=elements.loads(),
-        drives=elements.drives(),
         drive=CONSTANT_SPEED,
         gravity=GRAVITY,
-        actuators=elements.actuators(),
         signals=NO_SIGNALS,
         controllers=NO_CONTROLLERS,
-        own=elements.own.own(),
+        **elements.arrays(),
     )
     index = Index(
         bodies=tuple(_names(flat.bodies)),
