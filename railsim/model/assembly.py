@@ -151,12 +151,12 @@ def assemble(
     """
     check_types([vehicle], track)
     flat = flatten(vehicle)
-    book = _ProfileBook(_profiles_by_name(profiles))
+    given = _profiles_by_name(profiles)
     check_fixed(flat, track, settings.drive.mode)
     shared = shared or SharedTables()
     if shared.track is None:
         shared.track = track_tables(track)
-    contact, tables = _contact(flat, track, settings, book, shared.contact)
+    contact, tables, used = _contact(flat, track, settings, given, shared.contact)
     contact = with_own_laws(contact, settings)
     system, index = _suspension(flat, vehicle.laws or {})
     system = system._replace(
@@ -169,14 +169,14 @@ def assemble(
     if vehicle.load is not None:
         unloaded = vehicle.model_copy(update={"load": None})
         design = assemble(unloaded, track, settings, profiles, shared)
-    wheels = uneven_wheels(flat, track, book.used)
-    check = check_rails(flat, track, book.used)
+    wheels = uneven_wheels(flat, track, used)
+    check = check_rails(flat, track, used)
     served = (tables, contact.table)
-    rails = rail_ranges(flat, track, book.used, served, settings.normal_contact)
+    rails = rail_ranges(flat, track, used, served, settings.normal_contact)
     if settings.transient_creep and N_PATCH * parts_of_wheel(rails.arrays) > TRACED:
         found = "sections of more than two rails side by side"
         raise input_error("track", found, "two with settings.transient_creep", key="sections")
-    return Model(system, index, flat, tables, book.used, design, wheels, check, rails)
+    return Model(system, index, flat, tables, used, design, wheels, check, rails)
 
 
 def without_rails(vehicle: Vehicle) -> Model:
@@ -191,7 +191,6 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
     elements = ElementArrays({body.name: body for body in flat.bodies}, own=LawBlocks(laws))
     for element in flat.elements:
         elements.add(element)
-    elements.sort()
     bodies, offsets = _bodies(flat)
     nothing: Any = None
     system = System(
@@ -200,18 +199,11 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
         track=nothing,
         support=nothing,
         contact=nothing,
-        links=elements.links(),
-        mounts=elements.mounts(),
-        curves=elements.curves(),
-        internal=elements.internal(),
-        loads=elements.loads(),
-        drives=elements.drives(),
         drive=CONSTANT_SPEED,
         gravity=GRAVITY,
-        actuators=elements.actuators(),
         signals=NO_SIGNALS,
         controllers=NO_CONTROLLERS,
-        own=elements.own.own(),
+        **elements.arrays(),
     )
     index = Index(
         bodies=tuple(_names(flat.bodies)),
@@ -368,27 +360,21 @@ def _profiles_by_name(profiles: Mapping[str, Profile] | None) -> dict[str, Profi
     return dict(profiles)
 
 
-class _ProfileBook:
-    """Loads each profile once and remembers which ones were used."""
-
-    def __init__(self, known: dict[str, Profile]) -> None:
-        self._known = known
-        self.used: dict[str, Profile] = {}
-
-    def profile(self, name: str, kind: Kind) -> Profile:
-        if name not in self.used:
-            self.used[name] = self._known.get(name) or load_profile(name, kind=kind)
-        return self.used[name]
-
-
 def _contact(
     flat: FlatVehicle,
     track: Track,
     settings: Settings,
-    book: _ProfileBook,
+    profiles: dict[str, Profile],
     known: dict[tuple[Any, ...], ContactTable],
-) -> tuple[Contact, tuple[ContactTable, ...]]:
-    """Contact arrays: one table for each different wheel on its rail."""
+) -> tuple[Contact, tuple[ContactTable, ...], dict[str, Profile]]:
+    """Contact arrays, one table for each different wheel on its rail, and the profiles used."""
+    used: dict[str, Profile] = {}
+
+    def profile(name: str, kind: Kind) -> Profile:
+        if name not in used:
+            used[name] = profiles.get(name) or load_profile(name, kind=kind)
+        return used[name]
+
     wheelsets = flat.of_kind("wheelset")
     keys: dict[tuple[Any, ...], int] = {}
     tables: list[ContactTable] = []
@@ -405,8 +391,8 @@ def _contact(
                 wheelset.back_to_back,
                 wheelset.tape_circle_distance,
             )
-            wheel = book.profile(wheelset.profile[side], "wheel")
-            rail = book.profile(track.rail[side], "rail")
+            wheel = profile(wheelset.profile[side], "wheel")
+            rail = profile(track.rail[side], "rail")
             if key not in known:
                 known[key] = cached_contact_table(
                     wheel,
@@ -458,4 +444,4 @@ def _contact(
         friction_law=0,
         friction_block=np.zeros(0),
     )
-    return contact, tuple(tables)
+    return contact, tuple(tables), used

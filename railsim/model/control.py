@@ -20,8 +20,8 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.laws.binding import Takes, bind
 from railsim.model.assembly import Model
 from railsim.model.element_arrays import LawBlocks
+from railsim.notation import COMPONENTS
 
-AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 OF_BODY = dict(
     zip(
         BODY_SIGNALS,
@@ -133,7 +133,7 @@ class _Wiring:
     def _measured(self, key: str, signal: Signal) -> tuple[int, int, int, int]:
         """Kind, body or element or wheelset, group or side, and component of a signal."""
         index, quantity = self._model.index, signal.quantity
-        axis = AXES.index(signal.axis) if signal.axis else 0
+        axis = COMPONENTS.index(signal.axis) if signal.axis else 0
         if quantity in OF_BODY:
             body = self._number(index.bodies, signal.body, f"{key}.body", "body")
             return OF_BODY[quantity], body, 0, axis % 3

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.elements.rows import (
     AXES,
@@ -256,7 +256,6 @@ class ElementArrays:
     def _add_load(self, element: FlatElement, load: Load) -> None:
         self.load_rows.append(
             {
-                "name": element.name,
                 "body": self._number(element.body1),
                 "point": np.array(element.point1) - self._centre(element.body1),
                 "flags": (load.is_torque, load.track_axes, load.over_distance),
@@ -292,85 +291,60 @@ class ElementArrays:
         self.curve_rows.append(np.array(two_sided(table)))
         return len(self.curve_rows) - 1
 
-    def sort(self) -> None:
-        """Bring mounts of one kind together: what none of a block of eight has is skipped."""
+    def arrays(self) -> dict[str, Any]:
+        """Arrays of all elements, by the fields of a `System`.
+
+        Mounts of one kind come together: what none of a block of eight has is skipped.
+        """
         self.mount_rows.sort(key=_kind_of_mount)
+        points = np.concatenate([np.zeros((0, 2)), *self.curve_rows])
+        loads = [row["table"] for row in self.load_rows]
+        drives = [table for row in self.drive_rows for table in row["tables"]]
+        return {
+            "links": Links(
+                row=_table(self.link_rows, LINK_COLUMNS, LINK_SIZE),
+                **_columns(self.link_rows, np.int64, body=(2,), internal=(), curve=(2,)),
+            ),
+            "mounts": self._mounts(),
+            "curves": Curves(
+                start=_starts(self.curve_rows),
+                x=np.ascontiguousarray(points[:, 0]),
+                f=np.ascontiguousarray(points[:, 1]),
+            ),
+            "internal": Internal(
+                kind=np.array([row[0] for row in self.internal_rows], dtype=np.int64),
+                parameter=np.array([row[1] for row in self.internal_rows], float).reshape(-1, 3),
+                curve=np.array([row[2] for row in self.internal_rows], dtype=np.int64),
+            ),
+            "loads": Loads(
+                start=_starts(loads),
+                table=np.concatenate([np.zeros((0, 4)), *loads]),
+                **_columns(self.load_rows, np.int64, body=(), flags=(3,)),
+                **_columns(self.load_rows, float, point=(3,)),
+            ),
+            "drives": Drives(
+                start=_starts(drives),
+                table=np.concatenate([np.zeros((0, 2)), *drives]),
+                **_columns(self.drive_rows, np.int64, body=(2,)),
+                **_columns(self.drive_rows, float, row=(4,)),
+            ),
+            "actuators": Actuators(
+                **_columns(self.act_rows, np.int64, body=(2,), which=(WHICH_SIZE,)),
+                **_columns(self.act_rows, float, row=(ROW_SIZE,)),
+            ),
+            "own": self.own.own(),
+        }
 
-    def links(self) -> Links:
-        """Arrays of all point-to-point elements."""
-        rows = self.link_rows
-        return Links(
-            body=_column(rows, "body", (2,), np.int64),
-            row=_table(rows, LINK_COLUMNS, LINK_SIZE),
-            internal=_column(rows, "internal", (), np.int64),
-            curve=_column(rows, "curve", (2,), np.int64),
-        )
-
-    def mounts(self) -> Mounts:
-        """Arrays of all three-axis elements."""
-        rows = self.mount_rows
-        internal = _column(rows, "internal", (3,), np.int64)
-        curve = _column(rows, "curve", (3,), np.int64)
-        friction = _column(rows, "friction", (3, 4))
-        flags = _column(rows, "flags", (4,), np.int64)
+    def _mounts(self) -> Mounts:
+        whole = {"body": (2,), "internal": (3,), "curve": (3,), "flags": (4,)}
+        columns = _columns(self.mount_rows, np.int64, **whole)
+        friction = _columns(self.mount_rows, float, friction=(3, 4))["friction"]
         return Mounts(
-            body=_column(rows, "body", (2,), np.int64),
-            row=_table(rows, MOUNT_COLUMNS, MOUNT_SIZE),
+            row=_table(self.mount_rows, MOUNT_COLUMNS, MOUNT_SIZE),
             friction=friction,
-            internal=internal,
-            curve=curve,
-            flags=flags,
-            law=mount_laws(internal, curve, flags),
+            law=mount_laws(columns["internal"], columns["curve"], columns["flags"]),
             falling=falling_friction(friction),
-        )
-
-    def loads(self) -> Loads:
-        """Arrays of all given forces and torques."""
-        rows = self.load_rows
-        tables = [row["table"] for row in rows]
-        return Loads(
-            body=_column(rows, "body", (), np.int64),
-            point=_column(rows, "point", (3,)),
-            flags=_column(rows, "flags", (3,), np.int64),
-            start=_starts(tables),
-            table=np.concatenate(tables) if tables else np.zeros((0, 4)),
-        )
-
-    def drives(self) -> Drives:
-        """Arrays of all torques on wheelsets."""
-        rows = self.drive_rows
-        tables = [table for row in rows for table in row["tables"]]
-        return Drives(
-            body=_column(rows, "body", (2,), np.int64),
-            row=_column(rows, "row", (4,)),
-            start=_starts(tables),
-            table=np.concatenate(tables) if tables else np.zeros((0, 2)),
-        )
-
-    def actuators(self) -> Actuators:
-        """Arrays of all forces that follow commands or laws of one's own."""
-        return Actuators(
-            body=_column(self.act_rows, "body", (2,), np.int64),
-            which=_column(self.act_rows, "which", (WHICH_SIZE,), np.int64),
-            row=_column(self.act_rows, "row", (ROW_SIZE,)),
-        )
-
-    def curves(self) -> Curves:
-        """All tables, one after the other."""
-        points = np.concatenate(self.curve_rows) if self.curve_rows else np.zeros((0, 2))
-        return Curves(
-            start=_starts(self.curve_rows),
-            x=np.ascontiguousarray(points[:, 0]),
-            f=np.ascontiguousarray(points[:, 1]),
-        )
-
-    def internal(self) -> Internal:
-        """Laws of all internal states."""
-        rows = self.internal_rows
-        return Internal(
-            kind=np.array([row[0] for row in rows], dtype=np.int64),
-            parameter=np.array([row[1] for row in rows], dtype=float).reshape(-1, 3),
-            curve=np.array([row[2] for row in rows], dtype=np.int64),
+            **columns,
         )
 
 
@@ -379,7 +353,7 @@ def _kind_of_mount(row: dict[str, Any]) -> tuple[bool, ...]:
     return (not has_law, *(bool(flag) for flag in row["flags"][1:3]))
 
 
-def _starts(tables: Sequence[Floats]) -> NDArray[np.int64]:
+def _starts(tables: Sequence[Floats]) -> Integers:
     return np.concatenate([[0], np.cumsum([len(table) for table in tables])]).astype(np.int64)
 
 
@@ -392,7 +366,11 @@ def _table(rows: list[dict[str, Any]], columns: Mapping[str, slice], size: int) 
     return table
 
 
-def _column(
-    rows: list[dict[str, Any]], key: str, shape: tuple[int, ...], dtype: type = np.float64
-) -> NDArray[Any]:
-    return np.array([row[key] for row in rows], dtype=dtype).reshape(len(rows), *shape)
+def _columns(
+    rows: list[dict[str, Any]], dtype: type, **shapes: tuple[int, ...]
+) -> dict[str, NDArray[Any]]:
+    """Values of some names as arrays, one row an element."""
+    return {
+        name: np.array([row[name] for row in rows], dtype=dtype).reshape(len(rows), *shape)
+        for name, shape in shapes.items()
+    }

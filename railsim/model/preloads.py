@@ -1,11 +1,12 @@
 """Preloads of the suspension, with which a vehicle stands in its nominal position."""
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Flags, Floats
 from railsim.definitions.vehicle.flatten import FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
@@ -134,15 +135,12 @@ def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
                 + "; ".join(unbalanced)
             )
     flat = {element.name: element for element in model.flat.elements}
+    names, forces = _names(model), _forces(filled.system)
     shares = {}
-    for group, i in support:
-        name = getattr(model.index, group)[i]
-        if group == "links":
-            shares[name] = -float(filled.system.links.spring[i, 2])
-            continue
-        # the body below is pushed down by what stands on it
-        below = 1.0 if _is_below(model, flat[name]) else -1.0
-        shares[name] = below * float(filled.system.mounts.preload[i, 2])
+    for k in support:
+        # a link pulls; the body below a mount is pushed down by what stands on it
+        below = k >= len(model.index.links) and _is_below(model, flat[names[k]])
+        shares[names[k]] = float(forces[k]) if below else -float(forces[k])
     return shares
 
 
@@ -165,15 +163,11 @@ def _levelled(model: Model) -> Model:
     carried = _carried_by_levelled_springs(model)
     if not carried:
         return model
-    names = {e.name for e in model.flat.elements if e.definition.has_levelling}
-    support = {
-        (group, i): stiffness
-        for (group, i), stiffness in _auto_preloads(model).items()
-        if getattr(model.index, group)[i] in names
-    }
+    levelled = {e.name for e in model.flat.elements if e.definition.has_levelling}
+    names = _names(model)
+    support = {k: stiff for k, stiff in _auto_preloads(model).items() if names[k] in levelled}
     conditions = [pair for pair in _conditions(model.system) if pair[0] in carried]
-    levelled, _ = _with_solved_preloads(model, support, conditions)
-    return levelled
+    return _with_solved_preloads(model, support, conditions)[0]
 
 
 def _carried_by_levelled_springs(model: Model) -> set[int]:
@@ -188,67 +182,69 @@ def _carried_by_levelled_springs(model: Model) -> set[int]:
 
 
 def _with_solved_preloads(
-    model: Model, support: dict[tuple[str, int], float], conditions: list[tuple[int, int]]
+    model: Model, support: dict[int, float], conditions: list[tuple[int, int]]
 ) -> tuple[Model, Floats]:
     """Solve the preloads of `support` for `conditions`; the model with them, and what is left.
 
     What only presses does not pull: it carries nothing, and the others are solved without it.
     """
-    support = dict(support)
+    system, support = model.system, dict(support)
+    loads = np.array([_load(system, body, component) for body, component in conditions])
+    unit_links, unit_mounts = _copies(system)
+    unit_links.spring[:, 2] = 1.0
+    unit_mounts.preload[:] = 0.0, 0.0, 1.0
+    unit = system._replace(links=unit_links, mounts=unit_mounts)
+    columns = {k: _preload_forces(unit, [k], conditions) for k in support}
+    forces = _forces(system)
+    presses = np.concatenate([np.zeros(len(unit_links.body), bool), _presses(unit_mounts)])
     while True:
-        filled, rest = _solved_for(model, support, conditions)
-        forces = filled.system.mounts.preload[:, 2]
-        pulling = [
-            (group, i)
-            for group, i in support
-            if group == "mounts" and only_presses(filled.system.mounts, i) and forces[i] < 0.0
-        ]
+        unknowns = list(support)
+        forces[unknowns] = 0.0
+        given = _with_forces(system, forces)
+        fixed = _preload_forces(given, range(len(forces)), conditions)
+        matrix = np.array([columns[k] for k in unknowns]).T.reshape(len(conditions), len(unknowns))
+        # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
+        scale = np.sqrt(np.array([support[k] for k in unknowns]))
+        right_side = -(loads + fixed)
+        values = least_squares(matrix * scale, right_side, 1e-10) * scale
+        forces[unknowns] = values
+        pulling = [k for k in unknowns if presses[k] and forces[k] < 0.0]
         if not pulling:
-            return filled, rest
-        for each in pulling:
-            forces[each[1]] = 0.0
-            del support[each]
-        model = filled
+            filled = replace(model, system=_with_forces(system, forces))
+            return filled, matrix @ values - right_side
+        for k in pulling:
+            forces[k] = 0.0
+            del support[k]
 
 
-def only_presses(mounts: Mounts, i: int) -> bool:
-    """Whether a mount is a pad or wedge, whose spring and damper never pull."""
-    return bool(mounts.flags[i, FRICTION] == ONE_SIDED)
+def _presses(mounts: Mounts) -> Flags:
+    """Which mounts are pads or wedges, whose spring and damper never pull."""
+    return np.asarray(mounts.flags[:, FRICTION] == ONE_SIDED)
 
 
 def nominal_forces(mounts: Mounts) -> Floats:
     """Preloads of mounts as they act: of a pad with clearance none, shape (mount, 3) [N]."""
     forces = np.array(mounts.preload)
-    presses = mounts.flags[:, FRICTION] == ONE_SIDED
+    presses = _presses(mounts)
     forces[presses, 2] = np.maximum(forces[presses, 2], 0.0)
     return forces
 
 
-def _solved_for(
-    model: Model, support: dict[tuple[str, int], float], conditions: list[tuple[int, int]]
-) -> tuple[Model, Floats]:
-    """As `_with_solved_preloads`, whatever the signs."""
-    system = model.system
-    unknowns = list(support)
-    loads = np.array([_load(system, body, component) for body, component in conditions])
+def _names(model: Model) -> tuple[str, ...]:
+    """Elements that may have a preload: links, then mounts; in this order they are numbered."""
+    return model.index.links + model.index.mounts
+
+
+def _forces(system: System) -> Floats:
+    """Tensions of links, then vertical forces of mounts on their first bodies [N]."""
+    return np.concatenate([system.links.spring[:, 2], system.mounts.preload[:, 2]])
+
+
+def _with_forces(system: System, forces: Floats) -> System:
+    """Return the system with these forces."""
     links, mounts = _copies(system)
-    for group, element in unknowns:
-        _set_preload(links, mounts, group, element, 0.0)
-    fixed = _preload_forces(system, links, mounts, conditions)
-    columns = []
-    for group, element in unknowns:
-        unit = _with_unit_preload(system, group, element)
-        columns.append(_preload_forces(system, *unit, conditions))
-    matrix = np.array(columns).T.reshape(len(conditions), len(unknowns))
-    # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
-    scale = np.sqrt(np.array([support[unknown] for unknown in unknowns]))
-    right_side = -(loads + fixed)
-    scaled = least_squares(matrix * scale, right_side, 1e-10)
-    values = scaled * scale
-    for (group, element), value in zip(unknowns, values, strict=True):
-        _set_preload(links, mounts, group, element, value)
-    filled = replace(model, system=system._replace(links=links, mounts=mounts))
-    return filled, matrix @ values - right_side
+    links.spring[:, 2], mounts.preload[:, 2] = np.split(forces, [len(links.body)])
+    return system._replace(links=links, mounts=mounts)
 
 
 def _copies(system: System) -> tuple[Links, Mounts]:
@@ -275,7 +271,7 @@ def least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:
     return np.asarray(solution, dtype=float)
 
 
-def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[tuple[str, int], float]:
+def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[int, float]:
     """Elements whose preload is to be found, with the stiffness by which they share the weight.
 
     With `known_lengths` also those whose preload follows from their lengths.
@@ -286,13 +282,7 @@ def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[tuple[s
         if element.definition.preload_is_free
         or (known_lengths and element.definition.has_free_length)
     }
-    groups = {"links": model.index.links, "mounts": model.index.mounts}
-    return {
-        (group, i): auto[name]
-        for group, names in groups.items()
-        for i, name in enumerate(names)
-        if auto.get(name, 0.0) > 0.0
-    }
+    return {k: auto[name] for k, name in enumerate(_names(model)) if auto.get(name, 0.0) > 0.0}
 
 
 def _conditions(system: System) -> list[tuple[int, int]]:
@@ -311,32 +301,22 @@ def _load(system: System, body: int, component: int) -> float:
     return float(weight) if component == 2 else 0.0
 
 
-def _with_unit_preload(system: System, group: str, element: int) -> tuple[Links, Mounts]:
-    links, mounts = _copies(system)
-    links.spring[:, 2] = 0.0
-    mounts.preload[:] = 0.0
-    _set_preload(links, mounts, group, element, 1.0)
-    return links, mounts
-
-
-def _set_preload(links: Links, mounts: Mounts, group: str, element: int, value: float) -> None:
-    preload = links.spring if group == "links" else mounts.preload
-    preload[element, 2] = value
-
-
 def _preload_forces(
-    system: System, links: Links, mounts: Mounts, conditions: list[tuple[int, int]]
+    system: System, elements: Iterable[int], conditions: list[tuple[int, int]]
 ) -> Floats:
-    """Forces and moments of all preloads in the nominal position, one per condition."""
+    """Forces and moments of the preloads of some elements in the nominal position."""
+    links, mounts, forces = system.links, system.mounts, nominal_forces(system.mounts)
     totals = np.zeros((len(system.bodies.kind), 6))
-    for e, (i, j) in enumerate(links.body):
-        direction = _nominal(system, j, links.point[e, 1]) - _nominal(system, i, links.point[e, 0])
-        force = links.spring[e, 2] * direction / np.linalg.norm(direction)
-        _add(totals, i, links.point[e, 0], force)
-        _add(totals, j, links.point[e, 1], -force)
-    for e, ((i, j), force) in enumerate(zip(mounts.body, nominal_forces(mounts), strict=True)):
-        _add(totals, i, mounts.point[e, 0], force)
-        _add(totals, j, mounts.point[e, 1], -force)
+    for k in elements:
+        e = k - len(links.body)
+        if e < 0:
+            (i, j), (one, two) = links.body[k], links.point[k]
+            direction = _nominal(system, j, two) - _nominal(system, i, one)
+            force = links.spring[k, 2] * direction / np.linalg.norm(direction)
+        else:
+            (i, j), (one, two), force = mounts.body[e], mounts.point[e], forces[e]
+        _add(totals, i, one, force)
+        _add(totals, j, two, -force)
     return np.array([totals[body, component] for body, component in conditions])
 
 

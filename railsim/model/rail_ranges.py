@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.contact.curves import gauge_face
 from railsim.contact.section_tables import Range, cached_section_table
 from railsim.contact.table import ContactTable, Normal
@@ -21,8 +20,6 @@ from railsim.errors import ModelError, input_error
 from railsim.kernels.contact_table import N_FIELD, N_PATCH, RailTables
 from railsim.profiles.profile import Profile
 
-Ints = NDArray[np.int64]
-
 
 @dataclass(frozen=True, eq=False)
 class RailRanges:
@@ -33,7 +30,7 @@ class RailRanges:
     """
 
     tables: tuple[ContactTable, ...]
-    which: Ints
+    which: Integers
     ends: Floats
 
     @cached_property
@@ -88,7 +85,7 @@ def rail_ranges(
     flat: FlatVehicle,
     track: Track,
     profiles: dict[str, Profile],
-    plain: tuple[tuple[ContactTable, ...], Ints],
+    plain: tuple[tuple[ContactTable, ...], Integers],
     normal: Normal,
 ) -> RailRanges:
     """Return the ranges of a track for the wheels of a vehicle.

@@ -213,9 +213,11 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
     elements = {element.name: element for element in model.flat.elements}
     members = [(LINK, k, name) for k, name in enumerate(index.links)]
     members += [(MOUNT, k, name) for k, name in enumerate(index.mounts)]
-    found = _outputs(model, state, [pair[:2] for pair in members])
+    chosen = np.array([member[:2] for member in members], dtype=np.int64).reshape(-1, 2)
+    recorder = empty_recorder(model, 1, chosen)
+    observed(model.system, state, recorder)
     springs, stops = [], []
-    for (group, _, name), row in zip(members, found, strict=True):
+    for (group, _, name), row in zip(members, recorder.element[0], strict=True):
         element = elements.get(name) or elements[name.rpartition(".")[0]]
         travel, force = row[DEFLECTION : DEFLECTION + 3], row[FORCE : FORCE + 3]
         gaps = _gaps(element, travel)
@@ -230,13 +232,6 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
         Table([Column("element"), *_SPRING], springs, "Springs at rest"),
         Table([Column("element"), Column("axis"), *_GAP], stops, "Stops at rest"),
     )
-
-
-def _outputs(model: Model, state: Floats, members: list[tuple[int, int]]) -> Floats:
-    """Return deflections and forces of elements, float64[element, column of their outputs]."""
-    recorder = empty_recorder(model, 1, np.array(members, dtype=np.int64).reshape(-1, 2))
-    observed(model.system, state, recorder)
-    return np.asarray(recorder.element[0])
 
 
 def _pressed(

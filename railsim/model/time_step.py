@@ -11,9 +11,8 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.compiler import entry
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
@@ -61,10 +60,13 @@ GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
 # 1/s, growth up to which a vehicle is below its critical speed: bodies that nothing holds have none
 NEUTRAL = 1e-3
 _NEVER = 1 << 40
+# of a map before the norms of its powers are looked at, of these, and the least norm of a square
+# that is no round-off
+_BALANCING, _SQUARINGS, _LEFT = 3, 16, 1e-20
 
 
 def empty_recorder(
-    model: Model, rows: int, chosen: NDArray[np.int64] | None = None, patches: bool = False
+    model: Model, rows: int, chosen: Integers | None = None, patches: bool = False
 ) -> Recorder:
     """Recorder with room for `rows` outputs.
 
@@ -176,7 +178,7 @@ class Stability:
 
     def _within(self, flange: bool, system: System, state: Floats, h: float) -> bool:
         more = GROWTH_IN_FLANGE if flange else GROWTH
-        growth = _step_growth(self._model, system, state, self._scheme, h)
+        growth = _step_growth(self._model, system, state, self._scheme, h, more)
         if growth > more and flange not in self._allowed:  # for most the question does not arise
             vehicle_growth = _vehicle_growth(self._model, system, state)
             self._allowed[flange] = max(0.0, vehicle_growth) + more
@@ -211,8 +213,13 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
     return float(np.max(np.linalg.eigvals(columns).real))
 
 
-def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: float) -> float:
-    """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails."""
+def _step_growth(
+    model: Model, system: System, state: Floats, scheme: str, h: float, enough: float = 0.0
+) -> float:
+    """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails.
+
+    Where it surely is smaller than `enough`, that is returned instead.
+    """
     arrays = system, work_arrays(system)
     rest = np.zeros_like(state), np.zeros((3, len(state))), empty_recorder(model, 1)
     one = SCHEMES[scheme], h, Chunk(1, 1, _NEVER)
@@ -237,14 +244,47 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
     columns = _jacobian(stepped, state, _moving(system, state), 1e-6 if iterates else 1e-8)
     if not np.isfinite(columns).all():
         return np.inf
+    if enough > 0.0 and _surely_below(columns, enough * h):
+        return enough
     return float(np.log(np.max(np.abs(np.linalg.eigvals(columns)))) / h)
 
 
+def _surely_below(matrix: Floats, limit: float) -> bool:
+    """Whether |lambda| < exp(limit) for all eigenvalues, as far as norms of powers tell.
+
+    |lambda|^m <= ||A^m||, and squaring A takes a third of the time of its eigenvalues.  Row and
+    column k times and over a factor leave these as they are and make the norm small.  Half of the
+    limit is left for round-off: of the logarithm of a norm over m, single precision is enough.
+    """
+    coupled = matrix != 0.0
+    np.fill_diagonal(coupled, False)
+    kept = np.ones(len(matrix), dtype=bool)
+    while (alone := kept & ~(coupled[:, kept].any(axis=1) & coupled[kept].any(axis=0))).any():
+        kept &= ~alone  # whose eigenvalues are their diagonal entries
+    if np.abs(np.diag(matrix)[~kept]).max(initial=0.0) > np.exp(0.5 * limit):
+        return False
+    power = matrix[np.ix_(kept, kept)]
+    for _ in range(_BALANCING):
+        sizes = np.abs(power)
+        np.fill_diagonal(sizes, 0.0)
+        factor = np.sqrt(sizes.sum(axis=0) / sizes.sum(axis=1))
+        power = power * factor[:, None] / factor
+    logarithm = 0.0  # of the factor by which the power is larger than what is held of it
+    for doubled in range(_SQUARINGS):
+        norm = float(np.linalg.norm(power))
+        if not _LEFT < norm < np.inf:
+            break
+        logarithm += math.log(norm)
+        if logarithm < 0.5 * limit * 2.0**doubled:
+            return True
+        power = (power / norm).astype(np.float32)
+        power = power @ power
+        logarithm *= 2.0
+    return False
+
+
 def _jacobian(
-    function: Callable[[Floats], Floats],
-    state: Floats,
-    moving: NDArray[np.int64],
-    step: float = 1e-8,
+    function: Callable[[Floats], Floats], state: Floats, moving: Integers, step: float = 1e-8
 ) -> Floats:
     """Jacobian of the entries `moving` by forward differences; the function takes many states."""
     trials = np.repeat(state[None], moving.size + 1, axis=0)  # the state itself is the first
@@ -254,7 +294,7 @@ def _jacobian(
     return np.ascontiguousarray(((found[1:] - found[0]) / changes[:, None]).T)
 
 
-def _moving(system: System, state: Floats) -> NDArray[np.int64]:
+def _moving(system: System, state: Floats) -> Integers:
     """Entries of a state that move: not position and speed, nor what slopes have learnt."""
     end = len(state) - N_SCALARS
     indices = np.arange(end)

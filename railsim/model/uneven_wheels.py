@@ -7,9 +7,8 @@ Equilibrium, linear analyses and the choice of the step see round wheels, as the
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.contact.curves import rail_curve, tape_circle_position
 from railsim.contact.out_of_round import Surface, parts_by_wheel, surface_arrays, wheel_surface
 from railsim.definitions import Track
@@ -28,7 +27,7 @@ PER_LENGTH = 20.0  # steps over a flat or wave
 class UnevenWheels(NamedTuple):
     """The fields of `kernels.system.Contact` that hold wheels that are not round."""
 
-    surface_of: NDArray[np.int64]
+    surface_of: Integers
     surface_row: Floats
     surface: Floats
     flat_ahead: Floats

@@ -14,6 +14,7 @@ Means over distance integrate the record, taken as linear between its samples, e
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy import fft  # scipy's takes a tenth of the whole command `run` to import
@@ -91,6 +92,7 @@ def filtered(x: Floats, rate: float, response: Response, margin: float) -> Float
     return out
 
 
+@lru_cache(100)
 def fast_length(least: int) -> int:
     """Smallest length, `least` or more, that the transform takes apart into 2, 3 and 5.
 
@@ -107,15 +109,17 @@ def fast_length(least: int) -> int:
 def _continued(x: Floats, begin: int, end: int) -> Floats:
     """Rows of a record that goes on beyond its ends as its odd mirror image, then constant."""
     last = len(x) - 1
-    rows = np.arange(begin, end)
-    inner = np.clip(rows, 0, last)
-    if begin >= 0 and end <= last + 1:
-        return x[begin:end]
-    mirrored = np.clip(np.where(rows < 0, -rows, 2 * last - rows), 0, last)
-    found: Floats = x[inner].astype(np.float64)
-    outside = rows != inner
-    found[outside] = 2.0 * found[outside] - x[mirrored[outside]]
-    return found
+    inner = x[max(begin, 0) : min(end, last + 1)]
+    if len(inner) == end - begin:
+        return inner
+    before, after = np.arange(begin, 0), np.arange(last + 1, end)
+    return np.concatenate(
+        [
+            2.0 * x[:1].astype(np.float64) - x[np.minimum(-before, last)],
+            inner,
+            2.0 * x[last:].astype(np.float64) - x[np.maximum(2 * last - after, 0)],
+        ]
+    )
 
 
 def even_step(time: Floats) -> float | None:

@@ -13,11 +13,12 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats, Integers
 from railsim.definitions.settings import Settings
 from railsim.errors import RailsimError
 from railsim.kernels.compiler import entry
@@ -38,7 +39,6 @@ from railsim.simulation.ensemble import Ensemble, contact_grid
 from railsim.simulation.outputs import OutputPlan
 from railsim.simulation.step_choice import StepChoice, duration
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 # Longest chunk in outputs, and in steps of all its vehicles: some hundredths of a second of
@@ -47,8 +47,8 @@ ROWS, STEPS = 1000, 64_000
 ROUND_OFF = 1e-9  # s
 
 # what a chunk changes in the work arrays: counts of patches and of steps, extremes, times without
-# load, vibrations, commands and samples
-COUNTED = ("events", "extremes", "unloaded", "vibration", "parts", "memory")
+# load, vibrations, commands and samples; and where the rails have been displaced
+COUNTED = ("events", "extremes", "unloaded", "vibration", "parts", "memory", "rail_motion")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,15 +71,6 @@ class SavedState:
     counted: tuple[NDArray[Any], ...]
     grid: tuple[Any, ...]
     begun: "SavedState | None" = None
-
-
-class _Before(NamedTuple):
-    """What a chunk changes, as it was before."""
-
-    state: Floats
-    fresh: bool
-    due: bool
-    counted: list[NDArray[Any]]
 
 
 @dataclass
@@ -177,8 +168,8 @@ class Run:
     due: bool = True
     status: int = RUNNING
     where: int = 0
-    events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    parts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
+    events: Integers = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    parts: Integers = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
     again: int = 0
     vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
     cpu_time: float = 0.0
@@ -297,12 +288,7 @@ class Convoy:
         """As `to_the_end`; None at the end, where the runs have neither states nor counts yet."""
         while self.left() > 1e-9 or self.due:
             begin = time.perf_counter()
-            before = _Before(
-                self.state.copy(),
-                self.fresh,
-                self.due,
-                [getattr(self.work, name).copy() for name in COUNTED],
-            )
+            before = self.saved()
             choices = self.choices()
             if len(set(choices)) > 1 or self._errors():
                 return self._parted(choices, before)
@@ -456,12 +442,23 @@ class Convoy:
             except Exception as error:
                 run.error = error
 
-    def _parted(self, keys: Sequence[object], before: _Before | None = None) -> list[list[Run]]:
+    def saved(self) -> SavedState:
+        """All that the runs go on from, a copy."""
+        counted = tuple(getattr(self.work, name).copy() for name in COUNTED)
+        grid = self.fresh, self.due, self.evaluates, float(self.derivative[SPEED])
+        return SavedState(self.state.copy(), counted, grid)
+
+    def restore(self, saved: SavedState) -> None:
+        """Go back to a state."""
+        self.state[:] = saved.motion
+        for name, values in zip(COUNTED, saved.counted, strict=True):
+            getattr(self.work, name)[...] = values
+        self.fresh, self.due, self.evaluates, self.derivative[SPEED] = saved.grid[-4:]
+
+    def _parted(self, keys: Sequence[object], before: SavedState | None = None) -> list[list[Run]]:
         """Runs grouped by equal keys, as they were before; those with an error are at their end."""
         if before is not None:
-            self.state, self.fresh, self.due, counted = before
-            for name, values in zip(COUNTED, counted, strict=True):
-                getattr(self.work, name)[:] = values
+            self.restore(before)
         self.give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [

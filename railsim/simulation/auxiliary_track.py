@@ -5,8 +5,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
@@ -15,7 +15,6 @@ from railsim.model.assembly import Model
 from railsim.model.time_step import divide_strikes, empty_recorder
 from railsim.model.work import work_arrays
 
-Floats = NDArray[np.float64]
 # called with the time that has been simulated, and all of it [s]; it may raise, as on Ctrl-C
 Progress = Callable[[float, float], None]
 

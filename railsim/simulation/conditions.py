@@ -7,8 +7,8 @@ from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -17,7 +17,6 @@ from railsim.result import Result
 from railsim.text import shortened
 from railsim.units import speed_in_si
 
-Floats = NDArray[np.float64]
 SPEED_RANGE = (0.5, 150.0)  # m/s
 STATES = ("end", "memory")
 """Of a result's group `state`, what a run goes on from."""

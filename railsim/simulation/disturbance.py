@@ -1,8 +1,8 @@
 """Initial disturbances: added to the state in which a run begins, wheelsets kept on their rails."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import InitialState, Settings
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.contact_columns import W_Q
@@ -11,8 +11,6 @@ from railsim.kernels.status import RUNNING
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
 from railsim.notation import COMPONENTS, SIDES
-
-Floats = NDArray[np.float64]
 
 CLOSE = 1e-6  # error of a wheel load over the static one
 IMPACT = 0.5  # change of a wheel load over the static one

@@ -5,9 +5,6 @@ import logging
 import math
 import time
 
-import numpy as np
-from numpy.typing import NDArray
-
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, STATUS
 from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS, TIME
@@ -19,7 +16,6 @@ from railsim.simulation.outputs import run_extremes
 from railsim.simulation.remarks import beyond_experience, run_remarks
 from railsim.simulation.sampling import low_pass_remark
 
-Floats = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
 
 

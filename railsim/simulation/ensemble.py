@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.arrays import Floats, Integers
 from railsim.kernels.aligned import aligned
 from railsim.kernels.element_columns import BOTH_ENDS, ROTATES, falling_friction, mount_laws
 from railsim.kernels.element_outputs import LINK
@@ -38,8 +39,6 @@ from railsim.model import rail_ranges
 from railsim.model.assembly import Model, per_wheelset, side_by_side
 from railsim.model.uneven_wheels import joined, rolling
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Group = TypeVar("Group", bound=tuple[Any, ...])
 
 # the grid of the contact tables, which a system has but one of
@@ -67,7 +66,7 @@ class Part:
         Its bodies, wheelsets and recorded elements.
     """
 
-    state: Ints
+    state: Integers
     bodies: slice
     wheelsets: slice
     elements: slice
@@ -191,7 +190,7 @@ def joined_system(models: Sequence[Model]) -> System:
     )
 
 
-def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bodies:
+def _joined_bodies(systems: Sequence[System], first: Integers, offset: Floats) -> Bodies:
     joint = _joined(
         [system.bodies for system in systems],
         parent=first,
@@ -206,7 +205,7 @@ def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bo
     return joint._replace(frame=np.concatenate(frames))
 
 
-def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
+def _joined_mounts(systems: Sequence[System], **shifts: Integers) -> Mounts:
     """Mounts of all vehicles, those of one kind together: what a block of eight lacks is skipped.
 
     Those of one vehicle keep their order, and so do the forces on each body.
@@ -226,7 +225,7 @@ def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
     )
 
 
-def _order_of_mounts(systems: Sequence[System]) -> Ints:
+def _order_of_mounts(systems: Sequence[System]) -> Integers:
     """Numbers of the mounts, counted vehicle after vehicle, in the order of the joint system."""
     kinds = [
         np.column_stack(
@@ -240,7 +239,7 @@ def _order_of_mounts(systems: Sequence[System]) -> Ints:
     return np.lexsort(np.concatenate(kinds).T[::-1])
 
 
-def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
+def _joined_contact(models: Sequence[Model], first: Integers) -> Contact:
     """Wheelsets of all models; a table that several of them have is there once."""
     contacts = [model.system.contact for model in models]
     rows: dict[int, tuple[Floats, float, Floats]] = {}
@@ -298,7 +297,7 @@ def _joined_recorder(
     )
 
 
-def _joined(groups: Sequence[Group], **shifts: Ints) -> Group:
+def _joined(groups: Sequence[Group], **shifts: Integers) -> Group:
     """One group of arrays of several; indices of the fields in `shifts` are moved on, but -1."""
 
     def shifted(name: str, array: NDArray[Any], k: int) -> NDArray[Any]:
@@ -314,12 +313,12 @@ def _joined(groups: Sequence[Group], **shifts: Ints) -> Group:
     return joint
 
 
-def _joined_starts(starts: Sequence[Ints]) -> Ints:
+def _joined_starts(starts: Sequence[Integers]) -> Integers:
     """First points of tables of several groups, one group after the other, and the end."""
     return np.concatenate([[0], np.cumsum(np.concatenate([np.diff(start) for start in starts]))])
 
 
-def _starts(lengths: Iterable[int]) -> Ints:
+def _starts(lengths: Iterable[int]) -> Integers:
     return np.cumsum([0, *lengths])[:-1]
 
 
@@ -330,7 +329,7 @@ def _slices(lengths: Iterable[int]) -> list[slice]:
 
 def _indices(
     n: int, m: int, sizes: tuple[int, int], bodies: slice, internal: slice, wheelsets: slice, w: int
-) -> Ints:
+) -> Integers:
     """Indices of one vehicle's state in that of n bodies, m internal states, w wheelsets."""
     coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
     inner = np.arange(internal.start, internal.stop)

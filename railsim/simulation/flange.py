@@ -7,8 +7,8 @@ wheelset in another way than on the treads.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.kernels.status import RUNNING
@@ -19,8 +19,6 @@ from railsim.model.work import CONSTANT_SPEED, without_loads
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
-
-Floats = NDArray[np.float64]
 
 WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
 TIMES = 3.0, 3.0  # in transition and curve, at least [s]

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -42,8 +42,6 @@ from railsim.result.sensors import all_sensors, motions, readings
 from railsim.simulation.own_outputs import OwnOutputs
 from railsim.track.alignment import alignment_of
 from railsim.track.irregularity import displacement
-
-Floats = NDArray[np.float64]
 
 ROLL, YAW, LATERAL = 3, 5, 1
 NEEDED = ("time", "distance", "mileage", "curvature", "cant", "Q0")
@@ -143,20 +141,6 @@ def _of_both(values: Floats) -> Floats:
     """Sum over the last axis, the sides; numpy's own takes far longer over an axis of two."""
     total: Floats = 0.0 + values[..., 0] + values[..., 1]  # from zero, so that there is no -0.0
     return total
-
-
-def axle_torques(model: Model, state: Floats) -> Floats:
-    """Torque of drives and brakes on each wheelset, forwards positive, from recorded states.
-
-    Returns
-    -------
-    float64[time, wheelset]
-        [N m]
-    """
-    system, index = model.system, model.index
-    torque = np.empty((len(state), index.n_bodies))
-    recorded_axle_torques(system.drives, system.frame_offset, system.bodies, state, torque)
-    return torque[:, [index.bodies.index(name) for name in index.wheelsets]]
 
 
 def rail_deflection(model: Model, state: Floats) -> Floats:
@@ -285,7 +269,7 @@ class OutputPlan:
             )
             for index, name in enumerate(names)
         }
-        self.elements = _matching(self._asked.elements, list(known))
+        self.elements = _matching("element", "elements", self._asked.elements, list(known))
         # torques of actuators about axles are recorded beyond the elements that are asked for
         on_axles = np.flatnonzero(model.system.actuators.which[:, ACTION] == AXLE)
         self._on_axles = on_axles if self._asked.drives else on_axles[:0]
@@ -296,30 +280,11 @@ class OutputPlan:
 
     def _kept(self) -> tuple[Quantity, ...]:
         """All quantities of the result: of the usual ones those that are asked for."""
-        every = self._known()
-        patterns = self._asked.quantities
+        every, patterns = self._known(), self._asked.quantities
         if not patterns:
             return every
-        names = list(QUANTITIES)
-        faults = [
-            Fault(
-                "settings",
-                "outputs.quantities",
-                f"no quantity is called '{pattern}'",
-                nearest(pattern, names),
-            )
-            for pattern in patterns
-            if not any(fnmatchcase(name, pattern) for name in names)
-        ]
-        if faults:
-            raise InputError(faults)
-        return tuple(
-            q
-            for q in every
-            if q.name in NEEDED
-            or q.name not in QUANTITIES
-            or any(fnmatchcase(q.name, pattern) for pattern in patterns)
-        )
+        asked = {*NEEDED, *_matching("quantity", "quantities", patterns, list(QUANTITIES))}
+        return tuple(q for q in every if q.name in asked or q.name not in QUANTITIES)
 
     def _known(self) -> tuple[Quantity, ...]:
         asked = {
@@ -359,9 +324,13 @@ class OutputPlan:
         return empty_recorder(self._model, rows, chosen, self._asked.contact_patches)
 
     def _axle_torques(self, recorder: Recorder, rows: int) -> Floats:
-        """Torques of drives and brakes, and those of actuators, by wheelset [N m]."""
-        torque = axle_torques(self._model, recorder.state[:rows])
+        """Torques of drives, brakes and actuators on each wheelset, forwards positive [N m]."""
         system = self._model.system
+        every = np.empty((rows, self._model.index.n_bodies))
+        recorded_axle_torques(
+            system.drives, system.frame_offset, system.bodies, recorder.state[:rows], every
+        )
+        torque = every[:, system.contact.body]
         wheelset = {int(body): w for w, body in enumerate(system.contact.body)}
         moment = recorder.element[:rows, len(self.elements) :, element.MOMENT + 1]
         for k, i in enumerate(self._on_axles):
@@ -421,12 +390,15 @@ class OutputPlan:
         }
 
 
-def _matching(patterns: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+def _matching(
+    word: str, key: str, patterns: Sequence[str], names: Sequence[str]
+) -> tuple[str, ...]:
+    """Names that match one of the patterns of a key of the outputs."""
     faults = [
         Fault(
             "settings",
-            "outputs.elements",
-            f"no element is called '{pattern}'",
+            f"outputs.{key}",
+            f"no {word} is called '{pattern}'",
             nearest(pattern, names),
         )
         for pattern in patterns

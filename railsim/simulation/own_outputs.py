@@ -4,15 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.errors import Fault, InputError, nearest
 from railsim.laws.binding import Takes, bind
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SIDES, Quantity
 from railsim.result.labels import chosen_names
 
-Floats = NDArray[np.float64]
 Place = tuple[str, tuple[Any, ...]]
 """A quantity, and the indices over all of the time."""
 

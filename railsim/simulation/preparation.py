@@ -6,9 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -34,7 +32,6 @@ from railsim.simulation.sampling import filtering, low_pass_remark, output_words
 from railsim.simulation.step_choice import StepChoice, inputs_hash
 from railsim.track.irregularity import measured_remarks
 
-Floats = NDArray[np.float64]
 # of the start, before peaks are evaluated: time, and share of the run at most
 LEFT_OUT, SHARE_LEFT_OUT = 1.0, 0.1  # s, 1
 _START = logging.getLogger("railsim.start")  # remarks on a run that begins

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.system import DIVIDED, TIME, UNSETTLED, Support
@@ -27,8 +27,6 @@ from railsim.notation import SIDES
 from railsim.result.hunting import Hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.outputs import run_extremes
-
-Floats = NDArray[np.float64]
 
 # Vertical impacts: twice the ratio at which North American wagons are taken out of service (AAR
 # Rule 41: 400 kN on wheels of 159 kN)
@@ -58,37 +56,34 @@ def silent() -> Iterator[None]:
 
 def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
     """Return the remarks on a run that has ended, each once; `swings` is its limit cycle."""
-    model = run.prepared.model
-    wheelsets = model.index.wheelsets
-    Q0 = run.prepared.balance.Q0
+    model, Q0 = run.prepared.model, run.prepared.balance.Q0
+    wheelsets, support = model.index.wheelsets, model.system.support
     extremes = run_extremes(run.extremes, Q0)
-    uneven = model.wheels.uneven
+    uneven, hunts = model.wheels.uneven, swings is not None
+    irregular = bool(model.system.track.has_irregularity or len(model.rails.ends))
+    duration = float(run.state[TIME] - run.prepared.state[TIME])
     found = [
         *run.remarks,
         *run.prepared.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
-        *lifted_wheels(extremes, run.unloaded, wheelsets),
-        *(
-            ()
-            if uneven and swings is None
-            else stability(swings, extremes, float(run.state[TIME] - run.prepared.state[TIME]))
-        ),
-        *vibration(
+        lifted_wheels(extremes, run.unloaded, wheelsets),
+        stability(swings, extremes, duration) if hunts or not uneven else "",
+        vibration(
             run.vibration,
             Q0,
             wheelsets,
-            irregular=bool(model.system.track.has_irregularity or len(model.rails.ends)),
+            irregular=irregular,
             uneven=uneven,
-            elastic=bool(model.system.support.elastic),
-            hunts=swings is not None,
+            elastic=bool(support.elastic),
+            hunts=hunts,
         ),
-        *alternation(run.vibration, Q0, wheelsets, int(run.parts[DIVIDED])),
-        *creep_range(int(run.events[1]), int(run.events[0])),
-        *yaw_range(int(run.events[2])),
-        *unsettled_rails(int(run.parts[UNSETTLED])),
-        *(uneven_wheels_on(model.system.support) if uneven else ()),
+        alternation(run.vibration, Q0, wheelsets, int(run.parts[DIVIDED])),
+        creep_range(int(run.events[1]), int(run.events[0])),
+        yaw_range(int(run.events[2])),
+        unsettled_rails(int(run.parts[UNSETTLED])),
+        uneven_wheels_on(support) if uneven else "",
     ]
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(filter(None, found)))
 
 
 def beyond_experience(
@@ -96,14 +91,7 @@ def beyond_experience(
 ) -> tuple[str, ...]:
     """Remarks on forces larger than any that are known from railways.
 
-    Parameters
-    ----------
-    extremes : mapping of str to ndarray
-        See `railsim.simulation.outputs.run_extremes`.
-    Q0 : float64[wheelset, side]
-        Static wheel loads [N].
-    wheelsets : sequence of str
-        Their names.
+    `extremes`: see `railsim.simulation.outputs.run_extremes`; `Q0`: static wheel loads [N].
     """
     found = []
     ratio = extremes["Q"][0] / Q0
@@ -129,50 +117,30 @@ def beyond_experience(
 
 def lifted_wheels(
     extremes: Mapping[str, Floats], unloaded: Floats, wheelsets: Sequence[str]
-) -> tuple[str, ...]:
-    """Remark on wheels that carried nothing for some time.
-
-    Parameters
-    ----------
-    extremes, wheelsets
-        As for `beyond_experience`.
-    unloaded : float64[wheelset, side]
-        Time during which each wheel has carried nothing [s].
-    """
+) -> str:
+    """Remark on wheels that carried nothing for some time, `unloaded` [s]."""
     number = int(np.count_nonzero(unloaded))
     if number == 0:
-        return ()
-    w, side = (int(k) for k in np.unravel_index(np.argmax(unloaded), unloaded.shape))
+        return ""
+    w, side = _largest(unloaded)
     where = _where(extremes, "Q", (1, w, side), "first at")
     who = f"{wheelsets[w]}, {SIDES[side]}"
     others = "" if number == 1 else f"; {number} wheels in all were off their rails"
     return (
         f"A wheel lifts off its rail: {who}, for {1e3 * unloaded[w, side]:.3g} ms altogether "
-        f"({where}){others}.",
+        f"({where}){others}."
     )
 
 
-def stability(
-    swings: Hunting | None, extremes: Mapping[str, Floats], duration: float
-) -> tuple[str, ...]:
-    """Remark on a vehicle that hunts, or that nothing has disturbed.
-
-    Parameters
-    ----------
-    swings : Hunting, optional
-        Its limit cycle.
-    extremes : mapping of str to ndarray
-        See `railsim.simulation.outputs.run_extremes`.
-    duration : float
-        Simulated time [s].
-    """
+def stability(swings: Hunting | None, extremes: Mapping[str, Floats], duration: float) -> str:
+    """Remark on a vehicle that hunts, or that nothing has disturbed during the run [s]."""
     if swings is not None:
-        return (swings.sentence,)
+        return swings.sentence
     if duration < LONG or not np.max(np.abs(extremes["wheelset_lateral"])) < UNDISTURBED:
-        return ()
+        return ""
     return (
         "Nothing disturbs the vehicle: no curve, no irregularity, no initial displacement. This "
-        "run proves nothing about its stability.",
+        "run proves nothing about its stability."
     )
 
 
@@ -188,17 +156,17 @@ def _where(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], wo
     return f"{words}{'' if words.endswith('at') else ','} t = {time:.2f} s, s = {s:.1f} m"
 
 
-def unsettled_rails(evaluations: int) -> tuple[str, ...]:
+def unsettled_rails(evaluations: int) -> str:
     """Remark on evaluations that took all corrections that `kernels.support` allows.
 
     Whether the last of them was enough is not evaluated.
     """
     if evaluations == 0:
-        return ()
+        return ""
     return (
         f"In {_evaluations(evaluations)} the forces between wheels and elastic rails used all "
         f"{MOST_CORRECTIONS} iterations and may not have converged; their error may exceed "
-        f"{SETTLED:.2%} of the static wheel load: --check-step shows whether that matters.",
+        f"{SETTLED:.2%} of the static wheel load: --check-step shows whether that matters."
     )
 
 
@@ -206,98 +174,81 @@ def _evaluations(number: int) -> str:
     return f"{number} evaluation{'s' * (number > 1)}"
 
 
-def uneven_wheels_on(support: Support) -> tuple[str, ...]:
+def uneven_wheels_on(support: Support) -> str:
     """Remark on wheels that are not round on a track without masses."""
     if support.elastic and not support.massless:
-        return ()
+        return ""
     rails = "has no masses" if support.elastic else "is rigid"
     return (
         f"Wheels are not round, and the track {rails}: "
         "what flats and short waves do to it above 50 Hz depends on the mass of the rails; "
-        'preset = "co-running" or "p2" of [support] has one.',
+        'preset = "co-running" or "p2" of [support] has one.'
     )
 
 
-def creep_range(outside: int, patches: int) -> tuple[str, ...]:
-    """Remark on contact patches outside the creep law's range of a/b.
-
-    Parameters
-    ----------
-    outside, patches : int
-        Loaded patches outside that range, and all of them, in the time loop.
-    """
+def creep_range(outside: int, patches: int) -> str:
+    """Remark on loaded contact patches outside the creep law's range of a/b."""
     if outside == 0:
-        return ()
+        return ""
     return (
         f"{outside} of {patches} contact patches in the time loop ({outside / patches:.1e}) were "
         "narrower or wider than the creep law's range of a/b; the force at the end of the range "
-        "was used.",
+        "was used."
     )
 
 
-def yaw_range(look_ups: int) -> tuple[str, ...]:
+def yaw_range(look_ups: int) -> str:
     """Remark on wheels that were yawed against their rails beyond the contact table."""
     if look_ups == 0:
-        return ()
+        return ""
     return (
         f"In {_evaluations(look_ups)} a wheel was yawed against its rail by more than "
         f"{1e3 * YAW_MAX:g} mrad, where the contact table ends: it was continued linearly in the "
-        "square of the yaw.",
+        "square of the yaw."
     )
 
 
-def alternation(
-    measured: NDArray[np.float64], Q0: NDArray[np.float64], wheelsets: Sequence[str], divided: int
-) -> tuple[str, ...]:
+def alternation(measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided: int) -> str:
     """Remark on a guiding force that alternates from step to step.
 
     Arguments as of `vibration`; `divided`: number of divided steps.
     """
     if not len(measured):
-        return ()
+        return ""
     amplitude = 0.25 * np.sqrt(measured[..., ALTERNATION])
     w, side = _largest(amplitude / Q0)
     if not amplitude[w, side] > ALTERNATES[divided > 0] * Q0[w, side]:
-        return ()
+        return ""
     return (
         f"The guiding force of the {SIDES[side]} wheel of {wheelsets[w]} alternates from step to "
         f"step by {1e-3 * amplitude[w, side]:.1f} kN, vehicle at s = "
         f"{measured[w, side, ALTERNATES_AT]:.0f} m: the step is too long there, and the vehicle "
         f"may be held in a state that is none of its own; compare with half the step "
-        f"(--check-step).",
+        f"(--check-step)."
     )
 
 
 def vibration(
-    measured: NDArray[np.float64],
-    Q0: NDArray[np.float64],
+    measured: Floats,
+    Q0: Floats,
     wheelsets: Sequence[str],
     *,
     irregular: bool,
     elastic: bool,
     uneven: bool = False,
     hunts: bool = False,
-) -> tuple[str, ...]:
+) -> str:
     """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
 
-    Parameters
-    ----------
-    measured : float64[w, 2, VIBRATION]
-        See `railsim.kernels.vibration`.
-    Q0 : float64[w, 2]
-        Static wheel loads [N].
-    wheelsets : sequence of str
-        Their names.
-    irregular, elastic, uneven, hunts : bool
-        Whether the rails are irregular, and elastic; whether wheels are not round; whether the
-        vehicle hunts.
+    `measured`: see `railsim.kernels.vibration`; `Q0`: static wheel loads [N]; `irregular`,
+    `elastic`: the rails; `uneven`: wheels are not round; `hunts`: the vehicle hunts.
     """
     if not len(measured):
-        return ()
+        return ""
     share = measured[..., AMPLITUDE] / Q0
-    w, side = (int(index) for index in np.unravel_index(np.argmax(share), share.shape))
+    w, side = _largest(share)
     if not share[w, side] > VIBRATES:
-        return ()
+        return ""
     frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
     if hunts:
         cause = "the vehicle hunts"
@@ -311,6 +262,6 @@ def vibration(
         cause += "; the rails are rigid, [support] of the track makes them elastic"
     return (
         f"The wheel loads vibrate at {frequency:.0f} Hz: {100.0 * share[w, side]:.0f} % of Q0 "
-        f"(high pass {CUT_OFF:g} Hz) on the {('left', 'right')[side]} wheel of {wheelsets[w]}, "
-        f"vehicle at s = {position:.0f} m; {cause}.",
+        f"(high pass {CUT_OFF:g} Hz) on the {SIDES[side]} wheel of {wheelsets[w]}, "
+        f"vehicle at s = {position:.0f} m; {cause}."
     )

@@ -9,9 +9,7 @@ The outcome goes chunk by chunk to a sink; the facts about the run follow
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -19,8 +17,6 @@ from railsim.profiles import Profile
 from railsim.result import Result, Sink
 from railsim.simulation.run_progress import Progress
 from railsim.simulation.stepping import Simulation
-
-Floats = NDArray[np.float64]
 
 
 def simulate(

@@ -18,8 +18,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
@@ -54,8 +54,6 @@ from railsim.simulation.auxiliary_track import (
 )
 from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.tables import track_tables
-
-Floats = NDArray[np.float64]
 
 TIMES = 4.0, 6.0  # s in transition and curve; several periods of the car body
 APPROACH_TIME, APPROACH = 4.0, 30.0  # s and m at least of irregular rails before the start

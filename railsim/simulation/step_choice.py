@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
@@ -28,8 +28,6 @@ from railsim.model.time_step import MARGIN, Stability
 from railsim.model.work import level_track_with_friction
 from railsim.simulation.auxiliary_track import Progress
 from railsim.simulation.flange import in_flange_contact
-
-Floats = NDArray[np.float64]
 
 CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
@@ -168,7 +166,7 @@ class StepChoice:
             return False
 
     def _stability(self, model: Model, speed: float, state: Floats | None) -> Stability:
-        rolling = equilibrium(model, speed).state if state is None else state
+        rolling = equilibrium(model, speed, self._inputs).state if state is None else state
         return Stability(
             model,
             level_track_with_friction(model.system),

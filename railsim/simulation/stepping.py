@@ -8,12 +8,13 @@ bits, or where a command has come in between goes on with what is left of it.
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from railsim.arrays import Floats
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
@@ -32,7 +33,7 @@ from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
 from railsim.profiles import Profile
 from railsim.result import Hdf5Sink, MemorySink, Result, Sink
-from railsim.simulation.advance import COUNTED, ROUND_OFF, ROWS, STEPS, Convoy, SavedState
+from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, Convoy, SavedState
 from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.conditions import Inputs, check_numbers, own_speed, state_before
 from railsim.simulation.ending import end, verdict
@@ -40,7 +41,6 @@ from railsim.simulation.preparation import begin
 from railsim.simulation.run_progress import Progress, RunProgress
 from railsim.simulation.step_choice import duration as time_for
 
-Floats = NDArray[np.float64]
 NEVER = 1 << 40
 SHORTEST = 1e-12  # s
 SHARE = 1e-3  # of a step: what is shorter is made up for by the next one
@@ -437,15 +437,9 @@ class Simulation:
     @property
     def state(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        convoy, run = self._convoy, self._run
+        saved, run = self._convoy.saved(), self._run
         grid = (self._phase, self._missing, self._behind, self._length, self._every, self._goal)
-        here = (convoy.fresh, convoy.due, convoy.evaluates, run.status, run.where)
-        return SavedState(
-            convoy.state.copy(),
-            tuple(getattr(convoy.work, name).copy() for name in (*COUNTED, "rail_motion")),
-            (*grid, *here, float(convoy.derivative[SPEED])),
-            self._begun,
-        )
+        return replace(saved, grid=(*grid, run.status, run.where, *saved.grid), begun=self._begun)
 
     @state.setter
     def state(self, saved: SavedState) -> None:
@@ -459,12 +453,11 @@ class Simulation:
             found = "an instant before what is recorded already"
             raise InputError([argument_fault("state", "", found, "record=False")])
         self._rows = int(np.searchsorted(recorded, saved.motion[TIME] - SHORTEST))
-        convoy.state[:] = saved.motion
-        for name, values in zip((*COUNTED, "rail_motion"), saved.counted, strict=True):
-            getattr(convoy.work, name)[...] = values
-        *grid, convoy.fresh, convoy.due, convoy.evaluates = saved.grid[:9]
-        self._phase, self._missing, self._behind, self._length, self._every, self._goal = grid
-        self._run.status, self._run.where, convoy.derivative[SPEED] = saved.grid[9:]
+        convoy.restore(saved)
+        self._phase, self._missing, self._behind, self._length, self._every, self._goal = (
+            saved.grid[:6]
+        )
+        self._run.status, self._run.where = saved.grid[6:8]
         self._seen, self._begun = None, saved.begun
 
     def result(self) -> Result:

@@ -5,9 +5,6 @@ What it gains end to end stands in docs/performance.md.
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
@@ -22,8 +19,6 @@ from railsim.simulation.conditions import Inputs
 from railsim.simulation.ending import end
 from railsim.simulation.preparation import begin
 from railsim.simulation.run_progress import Progress, RunProgress
-
-Floats = NDArray[np.float64]
 
 
 def simulate_together(

@@ -34,7 +34,7 @@ def arrays(vehicle):
     made = ElementArrays({body.name: body for body in flat.bodies})
     for element in flat.elements:
         made.add(element)
-    return [*made.mounts(), *made.internal()]
+    return [*made.arrays()["mounts"], *made.arrays()["internal"]]
 
 for one, other in zip(arrays(bush), arrays(same), strict=True):
     np.testing.assert_array_equal(one, other)
