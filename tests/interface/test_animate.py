@@ -130,7 +130,7 @@ def test_arrows_begin_at_the_contact_and_wheels_without_contact_have_none(result
 def test_a_yawed_wheel_touches_where_it_is_lowest_along_the_rail(result, yaw, aside):
     """Sought on the turned surface of the whole wheel, to second order in the yaw."""
     arrays = {name: result[name] for name in result}
-    arrays["contact_y"] = np.zeros_like(arrays["contact_y"]) + [-aside, aside]
+    arrays["contact_y"] = np.broadcast_to([-aside, aside], arrays["contact_y"].shape)
     arrays["wheelset_yaw"] = np.full_like(arrays["wheelset_yaw"], yaw)
     y, z = (result_scene(result, frames=2).sections[0][1][f"wheel_{k}"] for k in "yz")
     radius = CubicSpline(np.sort(y), z[np.argsort(y)])

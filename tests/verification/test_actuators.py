@@ -65,8 +65,7 @@ def test_the_force_outwards_ends_with_the_stroke(command, deflection, force):
 
 def test_an_actuator_along_a_line_pulls_along_it_where_it_is_now():
     """Its points are 3, 4 and 12 parts of 13 apart, and 0, 5 and 12 once one has moved."""
-    centre = np.array([0.0, 0.0, -1.0])
-    points = [centre.tolist(), (centre + [0.3, 0.4, -1.2]).tolist()]
+    points = [[0.0, 0.0, -1.0], [0.3, 0.4, -2.2]]
     rig = Rig(kind="actuator", point=None, points=points, power_limit=1e3)
     rig.work.memory[rig.system.actuators.which[0, COMMAND]] = 1300.0
     for moved, line in (([0.0, 0.0], [3.0, 4.0, -12.0]), ([-0.3, 0.1], [0.0, 5.0, -12.0])):
