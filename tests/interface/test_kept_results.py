@@ -111,6 +111,7 @@ def test_outcome_is_a_table_and_a_grid(tmp_path, simulated):
     data = outcome.to_xarray()
     assert dict(data.sizes) == {"speed": 2, "track.friction": 3}
     assert data.Q_peak.attrs["units"] == "N"
+    assert outcome.results() == {}  # complete, but none is kept
     one = frame[(frame["speed"] == 12.0) & (frame["track.friction"] == 0.4)]
     assert data.Q_peak.sel({"speed": 12.0, "track.friction": 0.4}) == one["Q_peak"].item()
     spread = {"track.friction": {"low": 0.2, "high": 0.4}, "speed": {"low": 10.0, "high": 11.0}}
