@@ -1,5 +1,5 @@
 #!/bin/sh
-# All figures of docs/performance.md and README's speed on an idle machine, in one go: some 40 minutes.
+# All figures of docs/performance.md on an idle machine, in one go: some 40 minutes.
 # Runs from the root of the sources: sh benchmarks/all.sh
 set -e
 results=benchmarks/results

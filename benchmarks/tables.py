@@ -1,4 +1,4 @@
-"""Fill the tables of docs/performance.md and of README's speed with the figures in results/.
+"""Fill the tables of docs/performance.md with the figures in results/.
 
     python benchmarks/tables.py
 
@@ -124,7 +124,7 @@ def growth(found: dict[str, Any]) -> dict[str, str]:
 
 
 def speed(bench: dict[str, Any], speeds: dict[str, Any], peers: dict[str, Any]) -> str:
-    """README's table: what people run, and the fastest others at equal error."""
+    """What people run, and the fastest others at equal error."""
     loops = {run["name"]: run["real_time"] for run in bench["runs"]}
     real = {name: median(run["real_time"]) for name, run in speeds.items()}
     curve = "Manchester coach, R 250 m"
@@ -149,8 +149,7 @@ def main() -> None:
     known |= {"irregular": irregular(speeds), "study": study(load("study"))}
     known |= growth(load("growth")) | {"speed": speed(bench, speeds, found)}
     makers = {name: lambda made=made: made for name, made in known.items()}
-    for page in (ROOT / "docs" / "performance.md", ROOT / "README.md"):
-        fill_page(page, makers)
+    fill_page(ROOT / "docs" / "performance.md", makers)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
 """Plant errors in the sources, one at a time, and count those that the tests catch.
 
-    python tests/plant_errors.py --seed 1 --count 40 --list build/planted.csv
+    python tests/plant_errors.py --seed 1 --count 40 --kernels 5 --list build/planted.csv
 
 Each error is one token: an operator, a comparison, a sign, a number, a condition.  It is planted
 in the working copy, the module's own examples and the test files that name what it defines are run
 until one fails, then the file is put back.  The list holds place, change, and the first test that
-failed, or `survived`; what stands in a list is not tried again.  Run it in a clone of its own: it
-changes sources.
+failed, or `survived`; what stands in a list is not tried again.  `--kernels` limits the errors in
+kernels, each of which compiles for minutes: further errors of the seed elsewhere take their place.
+Run it in a clone of its own: it changes sources.
 
 Mutation operators after DeMillo, Lipton and Sayward (1978), "Hints on test data selection".
 """
@@ -29,7 +30,6 @@ SWAPPED = {
     "==": "!=", "!=": "==", "+=": "-=", "-=": "+=", "*=": "/=", "and": "or", "or": "and",
     "True": "False", "False": "True", "min": "max", "max": "min", "sin": "cos", "cos": "sin",
 }  # fmt: skip
-FILES_PER_ERROR = 10
 SECONDS_PER_ERROR = 2400
 
 
@@ -87,8 +87,8 @@ def _idle_lines(tree: ast.Module) -> set[int]:
     return idle
 
 
-def tests_of(path: str) -> list[str]:
-    """Test files, those first that name most of what the module and its package define."""
+def tests_of(path: str, count: int) -> list[str]:
+    """`count` test files, those first that name most of what module and package define."""
     module = ROOT / path
     room = module.parent.name
     names = {
@@ -108,10 +108,10 @@ def tests_of(path: str) -> list[str]:
     best = sorted(scores, key=lambda name: -scores[name])
     # what runs in the loop is named nowhere: the physics of the whole sees it
     physics = [name for name in best if "/verification/" in name] if room == "kernels" else []
-    return list(dict.fromkeys([*best[:FILES_PER_ERROR], *physics]))
+    return list(dict.fromkeys([*best[:count], *physics[:count]]))
 
 
-def first_failure(planted: Planted) -> str:
+def first_failure(planted: Planted, files: int) -> str:
     """The first test that fails with the error in place, or `survived`."""
     path = ROOT / planted.path
     source = path.read_text()
@@ -123,7 +123,7 @@ def first_failure(planted: Planted) -> str:
     try:
         path.write_text("".join(lines))
         run = subprocess.run(
-            [*command, planted.path, *tests_of(planted.path)],
+            [*command, planted.path, *tests_of(planted.path, files)],
             cwd=ROOT, capture_output=True, text=True, timeout=SECONDS_PER_ERROR,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -141,10 +141,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--kernels", type=int, help="at most so many in railsim/kernels")
+    parser.add_argument("--files", type=int, default=10, help="test files for each error")
     parser.add_argument("--list", type=Path, default=ROOT / "build" / "planted.csv")
     options = parser.parse_args()
     possible = [c for path in sorted((ROOT / "railsim").rglob("*.py")) for c in changes(path)]
-    chosen = random.Random(options.seed).sample(possible, options.count)
+    chosen = random.Random(options.seed).sample(possible, min(10 * options.count, len(possible)))
+    kernels = [planted for planted in chosen if planted.path.startswith("railsim/kernels/")]
+    left_out = set() if options.kernels is None else set(kernels[options.kernels :])
+    chosen = [planted for planted in chosen if planted not in left_out][: options.count]
     options.list.parent.mkdir(parents=True, exist_ok=True)
     done = options.list.read_text() if options.list.exists() else ""
     with options.list.open("a", newline="") as file:
@@ -153,7 +158,7 @@ def main() -> None:
             place = [planted.path, str(planted.line), planted.was, planted.now]
             if ",".join(place) in done:
                 continue
-            result = first_failure(planted)
+            result = first_failure(planted, options.files)
             writer.writerow([*place, result])
             file.flush()
             print(*place, result, flush=True)

@@ -8,6 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 from example_result import example_result
+from scipy.interpolate import CubicSpline
 
 import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
@@ -122,6 +123,29 @@ def test_arrows_begin_at_the_contact_and_wheels_without_contact_have_none(result
     data = scene_data(new)
     assert data["contact"][0][0][0][1] == 0.0
     assert data["words"]["Q"] == "Q (kN): vertical wheel force"  # as in the tables
+
+
+@pytest.mark.parametrize("yaw", [0.01, -0.02])
+@pytest.mark.parametrize("aside", [0.72, 0.745, 0.775])  # flange root, tread
+def test_a_yawed_wheel_touches_where_it_is_lowest_along_the_rail(result, yaw, aside):
+    """Sought on the turned surface of the whole wheel, to second order in the yaw."""
+    arrays = {name: result[name] for name in result}
+    arrays["contact_y"] = np.broadcast_to([-aside, aside], arrays["contact_y"].shape)
+    arrays["wheelset_yaw"] = np.full_like(arrays["wheelset_yaw"], yaw)
+    y, z = (result_scene(result, frames=2).sections[0][1][f"wheel_{k}"] for k in "yz")
+    radius = CubicSpline(np.sort(y), z[np.argsort(y)])
+    arrays["contact_z"] = np.full_like(arrays["contact_z"], radius(aside))
+    turned = railsim.Result(
+        arrays, result.quantities, result.coordinates, result.attributes, PROFILES
+    )
+    for side, sign in enumerate((-1.0, 1.0)):
+        along = np.linspace(-0.04, 0.04, 80_001)  # of the rail; at this Y the wheel is cut
+        own_x = along * np.cos(yaw) + sign * aside * np.sin(yaw)
+        own_y = -along * np.sin(yaw) + sign * aside * np.cos(yaw)
+        lowest = along[np.argmax(radius(np.abs(own_y)) ** 2 - own_x**2)]
+        found = result_scene(turned, frames=2).contact[0, 0, side, 0]
+        assert found == pytest.approx(lowest, abs=2.0 * yaw**2 + 2e-4)
+        assert abs(found) > 0.005
 
 
 def test_a_wheelset_beside_its_rails_is_drawn_on_its_flanges(result):

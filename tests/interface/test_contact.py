@@ -197,6 +197,22 @@ def test_creep_has_a_row_for_each_law_direction_and_size(capsys):
     assert "-0.000" not in printed
 
 
+def test_creep_directions_are_what_they_are_called(capsys):
+    """Beside their creepages, by symmetry: along the rail no force across and no moment."""
+    for row in as_json(capsys, "--creep")["creep"]:
+        named = [word in row["case"] for word in ("longitudinal", "lateral", "spin")]
+        assert [row[name] != 0.0 for name in ("xi_x", "xi_y", "phi")] == named
+        if "sign" in row["case"]:
+            assert (row["xi_y"] * row["phi"] > 0.0) == ("same" in row["case"])
+        if row["case"] == "longitudinal":
+            assert row["T_y"] == pytest.approx(0.0, abs=1e-12)
+            assert row["M_z"] == pytest.approx(0.0, abs=1e-12)
+            if row["size"] == 0.1:  # nearly mu N times the normalised creepage
+                assert abs(row["T_x"]) == pytest.approx(0.1, rel=0.1)
+        elif not named[0]:
+            assert row["T_x"] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_creep_refuses_a_friction_that_means_nothing(capsys):
     for friction in ("0", "-0.3", "nan", "1.5"):
         assert cli.main(["contact", "--creep", "--friction", friction]) == 2

@@ -4,6 +4,7 @@ import csv
 import pickle
 import shutil
 import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -110,6 +111,7 @@ def test_outcome_is_a_table_and_a_grid(tmp_path, simulated):
     data = outcome.to_xarray()
     assert dict(data.sizes) == {"speed": 2, "track.friction": 3}
     assert data.Q_peak.attrs["units"] == "N"
+    assert outcome.results() == {}  # complete, but none is kept
     one = frame[(frame["speed"] == 12.0) & (frame["track.friction"] == 0.4)]
     assert data.Q_peak.sel({"speed": 12.0, "track.friction": 0.4}) == one["Q_peak"].item()
     spread = {"track.friction": {"low": 0.2, "high": 0.4}, "speed": {"low": 10.0, "high": 11.0}}
@@ -199,16 +201,16 @@ def test_export_command_names_its_formats(tmp_path, capsys):
     assert main(["export", str(path), "--out", str(tmp_path / "r.mat")]) == 2
 
 
-def test_parquet_is_written_or_the_missing_package_named(tmp_path):
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        with pytest.raises(InputError, match="pip install pandas pyarrow"):
-            export(example_result(duration=1.0), tmp_path / "r.parquet")
-        assert list(tmp_path.iterdir()) == []
-        return
-    import pandas
-
+def test_parquet_holds_every_value(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
     result = example_result(duration=1.0)
     frame = pandas.read_parquet(export(result, tmp_path / "r.parquet"))
     assert np.array_equal(frame["Q:front.outer.wheelset:left"], result.Q[:, 0, 0])
+
+
+def test_missing_package_is_named_and_no_file_begun(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match="pip install pandas pyarrow"):
+        export(example_result(duration=1.0), tmp_path / "r.parquet")
+    assert list(tmp_path.iterdir()) == []

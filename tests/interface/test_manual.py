@@ -136,3 +136,10 @@ def test_every_promise_of_the_manual_names_its_tests():
         assert named, promise
         for file, test in named:
             assert f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), test
+
+
+def test_index_of_the_decisions_names_every_entry_in_order():
+    page = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+    entries = re.findall(r"^### (.*) \(\d{4}-\d\d-\d\d\)$", page, re.MULTILINE)
+    assert len(entries) > 80
+    assert re.findall(r"^ +- \[(.*)\]\(#", page, re.MULTILINE) == entries

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from example_result import example_result
@@ -42,11 +43,26 @@ def test_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path, capsys,
     assert "--out: " in capsys.readouterr().err
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_folder_in_one_that_cannot_be_written_to_is_refused(tmp_path):
-    (tmp_path / "mine").mkdir(mode=0o500)
-    with pytest.raises(InputError, match="mine cannot be written to"):
-        check_folder(tmp_path / "mine" / "out")
+@pytest.fixture
+def nobody():
+    """Root may write everywhere: while it is asked what is allowed, another user runs this."""
+    root = os.getuid() == 0
+    if root:
+        os.setreuid(65534, -1)
+    yield
+    if root:
+        os.setreuid(0, -1)
+
+
+@pytest.mark.usefixtures("nobody")
+def test_folder_in_one_that_cannot_be_written_to_is_refused():
+    with TemporaryDirectory() as folder:  # everybody may look into it, other than into tmp_path
+        mine = Path(folder)
+        mine.chmod(0o777)
+        check_folder(mine / "out")
+        mine.chmod(0o555)
+        with pytest.raises(InputError, match=f"{mine.name} cannot be written to"):
+            check_folder(mine / "out")
 
 
 @pytest.mark.parametrize("command", FIRST)

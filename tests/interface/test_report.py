@@ -13,6 +13,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+import tomli_w
 from example_result import example_result, feed
 from made_record import curve, made, track
 from test_study import arguments
@@ -340,6 +341,28 @@ def test_vehicles_of_one_name_from_two_files_are_shown_apart():
     assert "Differences between the vehicles" in text
     assert "<b>coach</b>" in text
     assert "<b>softer_coach</b>" in text
+
+
+def test_a_table_of_one_row_is_a_difference_of_vehicles():
+    """A motor's constant torque, which only one of two vehicles has."""
+    runs = records(2)
+    runs[1] = {**runs[1], "labels": {**runs[1]["labels"], "vehicle": "driven_coach"}}
+    one, other = example_result(), example_result()
+    motor = {
+        "kind": "traction",
+        "bodies": ["frame", "outer.wheelset"],
+        "torque_table": [[0.0, 800]],
+    }
+    driven = one.vehicle().model_dump(exclude_none=True)
+    driven["assemblies"]["bogie"]["elements"]["motor"] = motor
+    attributes = {**other.attributes, "vehicle_toml": tomli_w.dumps(driven)}
+    other = railsim.Result(
+        {name: other[name] for name in other}, other.quantities, other.coordinates, attributes,
+        other.profiles,
+    )  # fmt: skip
+    text = page("t", runs, {"run0": one, "run1": other})
+    assert "motor.torque_table" in text
+    assert "0, 800" in text
 
 
 def test_failures_and_remarks_are_told_and_names_are_shown_literally():

@@ -28,6 +28,13 @@ SPRING = {
     "damping": [0.0, 0.0, 5e3],
 }
 
+INCLINED = {  # 3 parts across, 4 down of 5
+    "kind": "spring_damper",
+    "points": [[0.0, 0.7, -1.0], [0.0, 1.0, -0.6]],
+    "stiffness": 4e8,
+    "damping": 0.0,
+}
+
 
 def vehicle(body=(), spring=(), **others):
     return Vehicle.model_validate(
@@ -47,6 +54,7 @@ def vehicle(body=(), spring=(), **others):
         (vehicle(body={"position": [0.0, 0.0, 1.2]}), "frame", "below the rails, z up to 1.2 m"),
         (vehicle(spring={"stiffness": [2e3, 2e3, 4e2]}), "frame", "bounces at 0.0503 Hz"),
         (vehicle(spring={"stiffness": [2e9, 2e9, 4e8]}), "frame", "bounces at 50.3 Hz"),
+        (vehicle(spring=INCLINED), "frame", "bounces at 40.3 Hz"),  # sqrt(2 0.8^2 k/m)/(2 pi)
         (vehicle(spring={"damping": [0.0, 0.0, 5e6]}), "frame", "damping ratio 62.5 of its bounce"),
         (vehicle(body={"mass": 8.0}), "mass", "mean static wheel load 6.42 kN"),
         (

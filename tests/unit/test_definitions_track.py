@@ -216,9 +216,10 @@ def test_cant_list_shorter_than_the_plan_is_usual():
         {"friction_falling": {"rest": 0.4, "decay": 0.6, "static": 0.5}},
     ],
 )
-def test_wrong_value_is_refused(change):
-    with pytest.raises(InputError):
+def test_wrong_value_is_refused_for_it_alone(change):
+    with pytest.raises(InputError) as caught:
         track(**{"plan": [STRAIGHT], **change})
+    assert {fault.key.partition(".")[0] for fault in caught.value.faults} == set(change)
 
 
 @pytest.mark.parametrize(
@@ -243,9 +244,11 @@ def test_wrong_value_is_refused(change):
         {"drive": {"mode": "free", "traction_table": [[-1.0, 5.0]]}},
     ],
 )
-def test_wrong_setting_is_refused(change):
-    with pytest.raises(ValidationError):
+def test_wrong_setting_is_refused_for_it_alone(change):
+    with pytest.raises(ValidationError) as caught:
         Settings.model_validate(change)
+    for error in caught.value.errors():
+        assert error["loc"][:1] == tuple(change) or f"'{next(iter(change))}'" in error["msg"]
 
 
 def test_settings_have_defaults_and_read_back():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
+import tomli_w
 
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.loading import load_vehicle, load_vehicle_text
@@ -263,59 +263,93 @@ AIR = {
     "horizontal_stiffness": [1.5e5, 1.5e5],
 }
 WIND = {"kind": "applied_force", "bodies": ["frame"], "force_table": [[0.0, 1.0, 2.0, 3.0]]}
-DAMPER = {"kind": "spring_damper", "bodies": ["a", "b"], "points": [[0, 0, 0], [0, 0, -1]]}
+DAMPER = {"kind": "spring_damper", "bodies": ["frame", "front"], "points": [[0, 0, 0], [0, 0, -1]]}
+BAR = {"kind": "roll_bar", "bodies": ["frame", "front"], "stiffness": 1.0}
 
 
-@pytest.mark.parametrize(
-    "element",
-    [
-        {**DAMPER, "stiffness": -1.0},
-        {**DAMPER, "stiffness": True},
-        {**DAMPER, "stiffness": "1"},
-        {**DAMPER, "stiffness": float("nan")},
-        {**DAMPER, "stiffness": float("inf")},
-        {**DAMPER, "points": [[0, 0, 0], [0, 0, 0]]},
-        {**DAMPER, "points": [[0, 0, 0]]},
-        {**DAMPER, "preload": "later"},
-        {**DAMPER, "series_stiffness": 1.0},
+EQUAL = "must begin with force 0 (same in both directions)"
+BEGIN = "the first column must begin at 0 (same in both directions) or below 0"
+WRONG = [  # element, key that is at fault, what is said of it
+    ({**DAMPER, "stiffness": -1.0}, "stiffness", "-1.0; must be greater than or equal to 0"),
+    ({**DAMPER, "stiffness": True}, "stiffness", "True; must be a valid number"),
+    ({**DAMPER, "stiffness": "1"}, "stiffness", "'1'; must be a valid number"),
+    ({**DAMPER, "stiffness": float("nan")}, "stiffness", "nan; must be a finite number"),
+    ({**DAMPER, "stiffness": float("inf")}, "stiffness", "inf; must be a finite number"),
+    ({**DAMPER, "points": [[0, 0, 0], [0, 0, 0]]}, "", "the two points are the same"),
+    ({**DAMPER, "points": [[0, 0, 0]]}, "points", "1 value; a list of 2"),
+    ({**DAMPER, "preload": "later"}, "preload", "'later'; must be 'auto'"),
+    ({**DAMPER, "series_stiffness": 1.0}, "", "needs 'damping' or 'damper_table'"),
+    (
         {**DAMPER, "damping": 1.0, "damper_table": [[0, 0], [1, 2]]},
+        "",
+        "either 'damping' or 'damper_table', not both",
+    ),
+    (
         {**DAMPER, "stiffness": 1.0, "spring_table": [[0, 0], [1, 2]]},
-        {**DAMPER, "damper_table": [[0, 0]]},
-        {**DAMPER, "damper_table": [[0, 1], [1, 2]]},
-        {**DAMPER, "damper_table": [[0.5, 0], [1, 2]]},
+        "",
+        "either 'stiffness' or 'spring_table', not both",
+    ),
+    ({**DAMPER, "damper_table": [[0, 0]]}, "damper_table", "a table needs two rows at least"),
+    ({**DAMPER, "damper_table": [[0, 1], [1, 2]]}, "damper_table", EQUAL),
+    ({**DAMPER, "damper_table": [[0.5, 0], [1, 2]]}, "damper_table", BEGIN),
+    (
         {**DAMPER, "damper_table": [[0, 0], [1, 2], [1, 3]]},
+        "damper_table",
+        "the first column must increase from row to row",
+    ),
+    (
         {**DAMPER, "damper_table": [[0, 0], [1, 2], [2, 1]]},
-        {**DAMPER, "kind": "bushing"},
-        {**DAMPER, "kind": "bushing", "point": [0, 0, 0]},
-        {"kind": "bushing", "bodies": ["a", "b"]},
-        {"kind": "bushing", "bodies": ["a", "b"], "point": [0, 0]},
-        {"kind": "bushing", "bodies": ["a"], "point": [0, 0, 0]},
-        bushing(stiffness=[1, -1, 1]),
-        bushing(series_stiffness=[1, 0, 0]),
-        {"kind": "roll_bar", "bodies": ["a", "b"], "stiffness": 0.0},
-        {"kind": "roll_bar", "bodies": ["a", "b"], "stiffness": 1.0, "sides": "both"},
-        {**STOP, "axis": "w"},
-        {**STOP, "table": [[0.0, 1.0], [1.0, 2.0]]},
-        {**STOP, "table": [[0.1, 0.0], [1.0, 2.0]]},
-        {"kind": "friction", "bodies": ["a", "b"], "point": [0, 0, 0]},
-        {**PAD, "stick_stiffness": [0.0, 0.0, 0.0]},
+        "damper_table",
+        "the force must not fall from row to row",
+    ),
+    (bushing(stifness=[1, 1, 1]), "stifness", "unknown key; did you mean 'stiffness'?"),
+    (bushing(points=DAMPER["points"]), "", "either 'point' or 'points' is needed"),
+    (bushing(point=None), "", "either 'point' or 'points' is needed"),
+    (bushing(point=[0, 0]), "point", "2 values; a list"),
+    (bushing(bodies=["frame"]), "bodies", "1 value; a list of 2"),
+    (bushing(stiffness=[1, -1, 1]), "stiffness.1", "-1; must be greater than or equal to 0"),
+    (bushing(series_stiffness=[1, 0, 0]), "", "along x needs 'damping' along x"),
+    ({**BAR, "stiffness": 0.0}, "stiffness", "0.0; must be greater than 0"),
+    ({**BAR, "sides": "both"}, "sides", "unknown key; allowed: bodies, damping, kind, stiffness"),
+    ({**STOP, "axis": "w"}, "axis", "'w'; must be 'x', 'y' or 'z'"),
+    ({**STOP, "table": [[0.0, 1.0], [1.0, 2.0]]}, "table", EQUAL),
+    ({**STOP, "table": [[0.1, 0.0], [1.0, 2.0]]}, "table", BEGIN),
+    (
+        {**PAD, "friction_force": None},
+        "",
+        "no friction: 'friction_force' or 'friction_coefficient' is needed",
+    ),
+    ({**PAD, "stick_stiffness": [0.0, 0.0, 0.0]}, "", "along z needs 'stick_stiffness' along z"),
+    (
         {**PAD, "friction_coefficient": [0.0, -0.1, 0.0]},
-        {**AIR, "bellows_stiffness": 0.0},
-        {**AIR, "orifice_damping": -1.0},
-        {**AIR, "horizontal_stiffness": [1.0, 1.0, 1.0]},
-        {"kind": "applied_force", "bodies": ["a"]},
-        {**WIND, "bodies": ["a", "b"]},
-        {**WIND, "axes": "rail"},
-        {**WIND, "force_table": [[0.0, 1.0]]},
-        {**WIND, "force_table": []},
+        "friction_coefficient.1",
+        "-0.1; must be greater than or equal to 0",
+    ),
+    ({**AIR, "bellows_stiffness": 0.0}, "bellows_stiffness", "0.0; must be greater than 0"),
+    ({**AIR, "orifice_damping": -1.0}, "orifice_damping", "-1.0; must be greater than 0"),
+    ({**AIR, "horizontal_stiffness": [1.0, 1.0, 1.0]}, "horizontal_stiffness", "a list of 2"),
+    ({**WIND, "force_table": None}, "", "'force_table' or 'torque_table' is needed"),
+    ({**WIND, "bodies": ["frame", "front"]}, "bodies", "2 values; a list of 1"),
+    ({**WIND, "axes": "rail"}, "axes", "'rail'; must be 'body' or 'track'"),
+    ({**WIND, "force_table": [[0.0, 1.0]]}, "force_table.0", "2 values; a list of 4"),
+    ({**WIND, "force_table": []}, "force_table", "0 values; a list of 1 at least"),
+    (
         {**WIND, "force_table": [[1.0, 0, 0, 0], [0.0, 0, 0, 0]]},
-    ],
-)
-def test_element_with_a_wrong_value_is_refused(element):
-    if element["kind"] == "bushing" and element.get("points"):
-        element = {**element, "stifness": [1, 1, 1]}
-    with pytest.raises(ValidationError):
-        vehicle(wheelsets={"w": WHEELSET}, elements={"e": element})
+        "force_table",
+        "the time or distance must increase from row to row",
+    ),
+]
+
+
+@pytest.mark.parametrize(("element", "key", "words"), WRONG)
+def test_element_with_a_wrong_value_is_refused_for_it_alone(element, key, words):
+    file = wagon().model_dump(exclude_none=True)
+    file["elements"] = {"e": {name: value for name, value in element.items() if value is not None}}
+    with pytest.raises(InputError) as caught:
+        load_vehicle_text(tomli_w.dumps(file))
+    (fault,) = caught.value.faults
+    assert fault.key == ".".join(filter(None, ["elements.e", key]))
+    assert words in "; ".join(filter(None, [fault.found, fault.allowed]))
 
 
 @pytest.mark.parametrize("element", [STOP, PAD, AIR, WIND])

@@ -122,6 +122,7 @@ def test_unequal_steps_are_interpolated_and_said():
     exact = np.cumsum(0.002 * rng.uniform(0.6, 1.4, 5000))
     clock = clock_of("a.csv", exact)
     assert "unequal" in clock.remarks[0]
+    assert abs(clock.time[-1] - exact[-1]) < 0.51 / clock.rate  # it ends where the record ends
     assert np.abs(clock.on_grid(np.sin(exact)) - np.sin(clock.time))[:-1].max() < 1e-5
 
 

@@ -207,11 +207,22 @@ def test_measuring_noise_is_smoothed_and_the_effect_is_told(tmp_path, noise):
     profile = load_profile(written(tmp_path, "wheel.csv", text), "wheel")
     note = next(line for line in profile.notes if "smoothed" in line)
     assert "um rms" in note
+    told = float(note.partition("noise of ")[2].partition(" um")[0])
+    assert told == pytest.approx(1e3 * noise, rel=0.3)  # of that along the contour little is seen
     # a contact angle's noise after smoothing moves the contact by some tenths of a millimetre
     geometry = contact_geometry(profile, load_profile("60E1"))
     exact = contact_geometry(load_profile("S1002"), load_profile("60E1"))
     found = geometry.equivalent_conicity([0.003])[0]
     assert found == pytest.approx(exact.equivalent_conicity([0.003])[0], abs=0.01)
+
+
+def test_a_wheel_hollow_beside_its_rolling_circle_is_zero_on_it(tmp_path):
+    """Its lowest point near the circle lies 5 mm outside of it, and not inside as on others."""
+    y, z = WHEEL
+    hollow = z + 0.1 * y * np.exp(-((y / 10.0) ** 2))
+    profile = load_profile(written(tmp_path, "w.csv", csv_mm(y, hollow + 3.0)), "wheel")
+    tread = np.abs(profile.y) < 0.02
+    assert np.interp(0.0, profile.y[tread], profile.z[tread]) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_clean_points_are_not_smoothed(tmp_path):

@@ -63,6 +63,27 @@ def test_the_force_outwards_ends_with_the_stroke(command, deflection, force):
     assert found == pytest.approx(force, rel=1e-6, abs=1e-6)
 
 
+def test_an_actuator_along_a_line_pulls_along_it_where_it_is_now():
+    """Its points are 3, 4 and 12 parts of 13 apart, and 0, 5 and 12 once one has moved."""
+    points = [[0.0, 0.0, -1.0], [0.3, 0.4, -2.2]]
+    rig = Rig(kind="actuator", point=None, points=points, power_limit=1e3)
+    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = 1300.0
+    for moved, line in (([0.0, 0.0], [3.0, 4.0, -12.0]), ([-0.3, 0.1], [0.0, 5.0, -12.0])):
+        found = rig.forces([*moved, 0.0, 0.0, 0.0, 0.0], np.zeros(6))
+        assert found[:3] == pytest.approx(100.0 * np.array(line), abs=1e-6)
+        assert found[3:] == pytest.approx(0.0, abs=1e-6)  # through the centre of the frame
+    # 12/13 of 2 m/s along the line: 1 kW over that
+    found = rig.forces(np.zeros(6), [0.0, 0.0, -2.0, 0.0, 0.0, 0.0])
+    assert np.linalg.norm(found[:3]) == pytest.approx(1e3 * 13.0 / 24.0, rel=1e-9)
+
+
+def test_an_actuator_along_a_line_needs_two_points():
+    point = [0.0, 0.0, -1.0]
+    for given in ({"point": point}, {"point": None, "points": [point, point]}):
+        with pytest.raises(ValueError, match="two different 'points'"):
+            Rig(kind="actuator", **given)
+
+
 def on_axle(**changes):
     return bogie({"kind": "actuator", "bodies": ["frame", "wheelset"], "acts": "axle", **changes})
 

@@ -26,6 +26,7 @@ from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
 from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
+from railsim.assessment.track_quality import quality_class
 from railsim.assessment.wear import (
     Patches,
     WholeLifeRailModel,
@@ -476,3 +477,24 @@ def test_worst_patch_stands_on_the_shakedown_map_where_its_index_says():
     assert friction.item() == pytest.approx(np.hypot(0.1 * 80e3 + 5.0, 0.3 * 80e3) / 80e3)
     assert index.item() == pytest.approx(friction.item() - 1.0 / pressure.item())
     assert area.ravel() == pytest.approx(np.pi * 6e-3 * 4e-3 * np.array([1.0, 1.0, 1.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("km_h", "alignment", "level"),
+    [
+        (80.0, (1.5, 1.8), (2.3, 2.6)),
+        (120.0, (1.2, 1.5), (1.8, 2.1)),
+        (160.0, (1.0, 1.3), (1.4, 1.7)),
+        (200.0, (0.8, 1.1), (1.2, 1.5)),
+        (300.0, (0.7, 1.0), (1.0, 1.3)),
+    ],
+)
+def test_track_quality_changes_at_the_values_of_uic_518(km_h, alignment, level):
+    """QN1 and QN2, standard deviations in mm, up to each speed (EN 14363:2005 prints them too)."""
+    classes = ("better than QN1", "between QN1 and QN2", "worse than QN2")
+    for k in (0, 1):
+        for factor, expected in ((0.999, classes[k]), (1.001, classes[k + 1])):
+            a, z = 1e-3 * factor * alignment[k], 1e-3 * factor * level[k]
+            assert quality_class(km_h / 3.6, a, 0.0) == expected
+            assert quality_class(km_h / 3.6, 0.0, z) == expected
+            assert quality_class((km_h - 1.0) / 3.6, a, z) == expected

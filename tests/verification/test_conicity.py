@@ -35,6 +35,17 @@ def test_within_the_dead_zone_it_is_zero():
     assert equivalent_conicity(Y, delta_r, [0.002])[0] == 0.0
 
 
+def test_points_on_the_straight_pieces_of_a_function_change_nothing():
+    """Ends and middle of the oscillation lie between points of the coarse function."""
+    coarse = np.array([-8e-3, -3.7e-3, -1.1e-3, 0.4e-3, 2.9e-3, 8e-3])
+    delta_r = np.array([-2.1e-3, -0.6e-3, -0.3e-3, 0.1e-3, 0.2e-3, 1.9e-3])
+    fine = np.union1d(coarse, Y)
+    amplitudes = [0.0009, 0.0021, 0.0043]
+    found = equivalent_conicity(coarse, delta_r, amplitudes)
+    expected = equivalent_conicity(fine, np.interp(fine, coarse, delta_r), amplitudes)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
 def test_wave_of_a_curved_function_agrees_with_time_integration():
     delta_r = 0.1 * Y + 3000.0 * Y**3 + 5.0 * Y**2
     amplitude = 0.005

@@ -407,6 +407,22 @@ def test_standard_deviation_of_a_spectrum_is_the_published_one(name, channel, mm
     assert found == pytest.approx(mm, abs=0.5 * digit + 1e-3 * mm)
 
 
+@pytest.mark.parametrize(
+    ("channel", "A", "f1", "f2"), [("cross_level", 0.7197, 0.0233, 0.1312),
+                                   ("gauge", 0.5927, 0.0292, 0.2329)],
+)  # fmt: skip
+def test_variance_of_the_american_spectra_of_1983_is_their_integral(channel, A, f1, f2):
+    """Class 6, S = 1e-7 A f2^2/((f^2 + f1^2)(f^2 + f2^2)), by partial fractions."""
+
+    def antiderivative(f):
+        return f2**2 / (f2**2 - f1**2) * (np.arctan(f / f1) / f1 - np.arctan(f / f2) / f2)
+
+    expected = 1e-7 * A * (antiderivative(1 / 3.0) - antiderivative(1 / 70.0))
+    height = 1.5 if channel == "cross_level" else 1.0
+    found = height**2 * SPECTRA["fra_1983_6"].band_variance(channel, (3.0, 70.0))
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
 def test_pieces_of_the_chinese_high_speed_spectra_join():
     for channel, density in SPECTRA["china_high_speed"].densities.items():
         f = np.geomspace(1e-2, 0.5, 20001)

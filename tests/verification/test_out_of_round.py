@@ -362,3 +362,12 @@ def with_file(folder, path):
     table = f'[{WHEELSET}.out_of_round.scan]\ntype = "sections"\nfile = "{path.name}"\n'
     file.write_text(head + table)
     return load_vehicle(file)
+
+
+@pytest.mark.parametrize("order", [3, 24])
+def test_nodes_and_steps_resolve_the_shortest_wave_of_the_harmonics(order):
+    """It is the wheel's circumference over the highest order."""
+    waves = [[1, 1e-4, 0.0], [order, 1e-5, 0.0]]
+    surface = wheel_surface((Harmonics(type="harmonics", waves=waves),), RADIUS, None, 0.75)
+    assert surface.wave == pytest.approx(2.0 * np.pi * RADIUS / order, rel=1e-12)
+    assert len(surface.ahead) >= 8 * order

@@ -15,7 +15,7 @@ from railsim.linear.track_response import QUANTITIES, RAILS, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.observation import Assumed, irregularity
-from railsim.observation.estimate import BANDS
+from railsim.observation.estimate import BANDS, Estimate, joined
 from railsim.observation.pieces import on_grid
 from railsim.result.sensors import all_sensors
 from railsim.track.irregularity import displacement
@@ -372,3 +372,23 @@ def test_vehicle_that_is_another_one(coach):
     for name in ("alignment", "level", "cross_level"):
         for band in BANDS:
             assert rms(wrong[name, band][1]) < 2.0 * rms(right[name, band][1])
+
+
+def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_last_place():
+    """Two pieces of 100 m that share 20 m; the wheelset lies 8 mm aside from 40 to 50 m."""
+
+    def piece(begin, value):
+        s = begin + np.arange(0.0, 100.5, 0.5)
+        rows = np.full((len(QUANTITIES), len(s)), value)
+        aside = np.where((s >= 40.0) & (s <= 50.0), 0.008, 0.001)[None]
+        same = np.zeros(len(QUANTITIES))
+        bands = dict.fromkeys(BANDS, rows)
+        return Estimate(
+            s, 20.0, rows, same, bands, dict.fromkeys(BANDS, same), same, same, same,
+            ("lateral.1",), aside, np.zeros(1),
+        )  # fmt: skip
+
+    found = joined("run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), ())
+    assert found.flanges == ((1, 40.0, 50.0),)
+    expected = np.interp(found.s, [80.0, 100.0], [1.0, 3.0])
+    np.testing.assert_allclose(found.values[0], expected, atol=1e-12)
