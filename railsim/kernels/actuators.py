@@ -22,7 +22,16 @@ from math import isfinite, sqrt
 from railsim.kernels import compiled
 from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.own_laws import call_at
-from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, RADIUS, TIME, VELOCITY
+from railsim.kernels.system import (
+    ANGULAR,
+    FORCE,
+    MOMENT,
+    POSITION,
+    RADIUS,
+    TIME,
+    VELOCITY,
+    internal_begin,
+)
 from railsim.kernels.vectors import (
     add_at,
     cross,
@@ -135,7 +144,7 @@ def own_force(system, work, state, i, x, rate, command):
     acts, block = system.actuators, work.memory
     first, states = acts.which[i, BLOCK], acts.which[i, OWN_STATES]
     inner = acts.which[i, OWN_STATE]
-    begin = 12 * system.bodies.kind.shape[0] + inner
+    begin = internal_begin(system.bodies.kind.shape[0]) + inner
     given = first + 1 + states
     block[given], block[given + 1] = x, rate
     block[given + 2], block[given + 3] = state[TIME], command
@@ -170,7 +179,7 @@ def actuator_force(system, work, state, i, x, rate):
         command = min(limit, max(-limit, command))
     if lag >= 0:
         work.drive[lag, 1] = command
-        command = state[12 * system.bodies.kind.shape[0] + lag]
+        command = state[internal_begin(system.bodies.kind.shape[0]) + lag]
     if mode == BY_FORCE:
         force = command
     elif mode == BY_DAMPER:

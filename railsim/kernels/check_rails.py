@@ -21,7 +21,7 @@ from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_CHECK, W_CHECK_GAMMA
 from railsim.kernels.rails import ASIDE, ASIDE_SLOPE, MIDDLE_Y, RAIL_SLOPE, ROLL, SLOPE_Y
 from railsim.kernels.support import SKIP
-from railsim.kernels.system import ARC_LENGTH
+from railsim.kernels.system import ARC_LENGTH, velocity_begin
 
 # columns of Contact.check: side, first and last row of its flangeway, stiffness [N/m], damping
 # [N s/m], coefficient of friction
@@ -67,7 +67,7 @@ def check_rail(system, work, speed, state, w, c, flangeway, slope):
     side = int(contact.check[c, SIDE])
     sign = 2.0 * side - 1.0
     n = system.bodies.kind.shape[0]
-    q, v = 6 * b, 6 * n + 6 * b
+    q, v = 6 * b, velocity_begin(n) + 6 * b
     below, reach = contact.check_wheel[w, c, BELOW], contact.check_wheel[w, c, REACH]
     roll, yaw = state[q + 3] - work.plane[w, ROLL], state[q + 5] - work.rail[w, side, RAIL_SLOPE]
     y = sign * (state[q + 1] - work.plane[w, MIDDLE_Y] - work.rail[w, side, ASIDE] - below * roll)

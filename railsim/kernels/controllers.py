@@ -34,7 +34,17 @@ from railsim.kernels.element_outputs import (
 from railsim.kernels.element_outputs import FORCE as ELEMENT_FORCE
 from railsim.kernels.own_laws import call_at
 from railsim.kernels.status import LAW_NOT_FINITE, RUNNING
-from railsim.kernels.system import ANGULAR, ARC_LENGTH, RADIUS, SPEED, TIME, WHEELSET
+from railsim.kernels.system import (
+    ANGULAR,
+    ARC_LENGTH,
+    RADIUS,
+    SPEED,
+    TIME,
+    WHEELSET,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
+)
 from railsim.kernels.track_frame import PHI, PSI, cell_of, polynomial
 from railsim.kernels.vectors import (
     cross,
@@ -109,7 +119,7 @@ def element_signal(system, work, state, i):
     which, out = system.signals.which, work.element
     group, e, column = which[i, GROUP], which[i, OF], which[i, COMPONENT]
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
-    inner = state[12 * n : 12 * n + m]
+    inner = state[internal_begin(n) : smoothed_begin(n, m)]
     for k in range(out.shape[1]):
         out[0, k] = 0.0
     if group == LINK:
@@ -170,7 +180,7 @@ def signal_value(system, work, state, derivative, i):
     if kind == ELEMENT:
         return element_signal(system, work, state, i)
     if kind == WHEEL_SPEED:
-        return -state[6 * n + 6 * b + 4] * system.bodies.row[b, RADIUS]
+        return -state[velocity_begin(n) + 6 * b + 4] * system.bodies.row[b, RADIUS]
     if kind == WHEEL:
         return work.wheel[b, which[i, GROUP], k]
     if kind in (CURVATURE, CANT):

@@ -32,7 +32,7 @@ from railsim.kernels.rails import (
     SINE,
     SLOPE_Z,
 )
-from railsim.kernels.system import Y_0, Z_0
+from railsim.kernels.system import Y_0, Z_0, velocity_begin
 from railsim.kernels.track_frame import OMEGA
 
 
@@ -49,7 +49,7 @@ def creepages(system, work, n, speed, state):
         x = state[6 * b]
         y = state[6 * b + 1] + system.bodies.row[b, Y_0]
         z = state[6 * b + 2] + system.bodies.row[b, Z_0]
-        v = 6 * n_bodies + 6 * b
+        v = velocity_begin(n_bodies) + 6 * b
         u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
         a1 = C[b, 0] * u1 + C[b, 1] * u2 + C[b, 2] * u3
         a2 = C[b, 3] * u1 + C[b, 4] * u2 + C[b, 5] * u3

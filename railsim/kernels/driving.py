@@ -18,6 +18,7 @@ from railsim.kernels.system import (
     TIME,
     Y_0,
     Z_0,
+    velocity_begin,
 )
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
 
@@ -65,7 +66,7 @@ def axle_torque(drives, e, frame_offset, bodies, state):
         factor, _ = table_value_slope(drives.table[demand:end], at)
         torque *= factor
     # forwards it turns about the negative y axis
-    rolling = -state[6 * bodies.kind.shape[0] + 6 * w + 4] * bodies.row[w, RADIUS]
+    rolling = -state[velocity_begin(bodies.kind.shape[0]) + 6 * w + 4] * bodies.row[w, RADIUS]
     if drives.row[e, BRAKES] > 0.0:
         torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
     if drives.row[e, SLIP_END] > 0.0:
@@ -119,7 +120,7 @@ def speed_change(system, work, state, derivative):
         f = bodies.frame[b]
         y = state[6 * b + 1] + bodies.row[b, Y_0]
         z = state[6 * b + 2] + bodies.row[b, Z_0]
-        return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
+        return derivative[velocity_begin(bodies.kind.shape[0]) + 6 * b] / (
             1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y
         )
     return 0.0
@@ -138,7 +139,7 @@ def apply_speed_change(system, work, state, rate, derivative):
         x = state[6 * b]
         y = state[6 * b + 1] + bodies.row[b, Y_0]
         z = state[6 * b + 2] + bodies.row[b, Z_0]
-        v = 6 * n + 6 * b
+        v = velocity_begin(n) + 6 * b
         derivative[v] -= rate * (1.0 + w2 * z - w3 * y)
         derivative[v + 1] -= rate * (w3 * x - w1 * z)
         derivative[v + 2] -= rate * (w1 * y - w2 * x)
@@ -151,7 +152,7 @@ def hold_reference(bodies, work, derivative):
     n = bodies.kind.shape[0]
     for k in range(bodies.references.shape[0]):
         b = bodies.references[k]
-        held = 6 * n + 6 * b
+        held = velocity_begin(n) + 6 * b
         for i in range(3):
             acceleration[b, i] -= derivative[held] * relative[b, i]
         derivative[6 * b] = 0.0
@@ -174,7 +175,7 @@ def turn_fixed(bodies, frames, state):
         w1, w2 = cy * w1 + sy * w2, cy * w2 - sy * w1
         w2, w3 = cr * w2 + sr * w3, cr * w3 - sr * w2
         w1, w3 = cp * w1 - sp * w3, cp * w3 + sp * w1
-        v = 6 * n + 6 * b
+        v = velocity_begin(n) + 6 * b
         state[v], state[v + 1], state[v + 2] = 0.0, 0.0, 0.0
         state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
 
@@ -189,7 +190,7 @@ def hold_fixed(bodies, work, speed, rate, derivative):
     n = bodies.kind.shape[0]
     for k in range(bodies.fixed.shape[0]):
         b = bodies.fixed[k]
-        f, v = bodies.frame[b], 6 * n + 6 * b
+        f, v = bodies.frame[b], velocity_begin(n) + 6 * b
         for i in range(3):
             turn = 0.0
             for j in range(3):

@@ -34,7 +34,7 @@ from railsim.kernels.lanes import (
     store_rows,
 )
 from railsim.kernels.rotation import arc_sine_lanes
-from railsim.kernels.system import AHEAD, ARC_LENGTH, LOCATED, SPEED
+from railsim.kernels.system import AHEAD, ARC_LENGTH, LOCATED, SPEED, smoothed_begin
 from railsim.kernels.track_frame import (
     MU_LEFT,
     Y_LEFT,
@@ -144,7 +144,7 @@ def predict_rate_changes(system, work, w, state):
     plane, rail, rate_change, h = work.plane, work.rail, work.rate_change, work.watch[AHEAD]
     b = system.contact.body[w]
     speed = state[SPEED]
-    own = 12 * system.bodies.kind.shape[0] + system.internal.kind.shape[0] + 6 * b
+    own = smoothed_begin(system.bodies.kind.shape[0], system.internal.kind.shape[0]) + 6 * b
     s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]] + speed * h
     i, u = cell_of(system.track, s)
     change = speed if i >= 0 else 0.0

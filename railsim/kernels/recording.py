@@ -8,6 +8,7 @@ from railsim.kernels import compiled
 from railsim.kernels.controllers import ACTUATOR, actuator_output
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.record import record
+from railsim.kernels.system import internal_begin
 
 
 @record
@@ -51,7 +52,7 @@ def record_row(recorder, row, system, state, derivative, work, n_patches):
     if recorder.patch.shape[0] > 0:
         record_patches(recorder.patch, row, work, n_patches)
     if recorder.chosen.shape[0] > 0:
-        first = 12 * system.bodies.kind.shape[0]
+        first = internal_begin(system.bodies.kind.shape[0])
         element_outputs(
             system,
             work,

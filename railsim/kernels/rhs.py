@@ -83,6 +83,9 @@ from railsim.kernels.system import (
     UNSETTLED,
     Y_0,
     Z_0,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
 )
 from railsim.kernels.track_frame import (
     ATTITUDE,
@@ -180,7 +183,7 @@ def kinematics(system, work, state):
         origin, A, turn, _ = frame_columns(frames, starts(eight_of(bodies.frame, own), FRAME_SIZE))
         R = product(A, C)
         frame_omega = times(speed, turn)
-        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
+        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), velocity_begin(n), 6)
         turning = rotate_back(C, frame_omega)
         r1, r2, r3 = euler_rates(sr, cr, sp, cp, minus((u1, u2, u3), turning))
         # elements sit on the axleboxes, which do not spin
@@ -208,7 +211,7 @@ def axlebox_kinematics(bodies, work, state):
         own = eight(bodies.axleboxes, first)
         carrier = starts(eight_of(bodies.parent, own), POSE_SIZE)
         s, c = sine_cosine_lanes(load_rows(state, starts(own, 6), 4, 1)[0])
-        rate = load_rows(state, starts(own, 6), 6 * n + 4, 1)[0]
+        rate = load_rows(state, starts(own, 6), velocity_begin(n) + 4, 1)[0]
         store_rows(rates, starts(own, RATES_SIZE), 4, (rate,))
         R, X, V, omega = motion_of(pose, carrier)
         turned = (
@@ -273,10 +276,10 @@ def axlebox_dynamics(bodies, work, derivative):
         m1, m2, m3 = minus((m1, m2, m3), times(moment, axle))
         add_rows(pose, carrier, PUSH, (zero, zero, f1, f2, f3, m1, m2, m3), count - first)
         rate = load_rows(rates, starts(own, RATES_SIZE), 4, 1)[0]
-        acceleration = moment / inertia
+        turning = zero, zero, zero, zero, moment / inertia, zero
         store_rows(derivative, starts(own, 6), 0, (zero, zero, zero, zero, rate, zero))
-        store_rows(derivative, starts(own, 6), 6 * n, (zero, zero, zero, zero, acceleration, zero))
-        store_rows(rates, starts(own, RATES_SIZE), 0, (zero, zero, zero, zero, acceleration, zero))
+        store_rows(derivative, starts(own, 6), velocity_begin(n), turning)
+        store_rows(rates, starts(own, RATES_SIZE), 0, turning)
 
 
 @compiled(python=False)
@@ -295,7 +298,7 @@ def dynamics(system, work, state, derivative):
         mass, i1, i2, i3, y_0, z_0, radius, spins = load_rows(
             bodies.row, starts(own, BODY_SIZE), 0, 8
         )
-        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
+        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), velocity_begin(n), 6)
         roll_rate, pitch_rate, yaw_rate = load_rows(rates, starts(own, RATES_SIZE), 3, 3)
         store_rows(derivative, starts(own, 6), 0, (vx, vy, vz, roll_rate, pitch_rate, yaw_rate))
         _, A, omega, omega_s = frame_columns(
@@ -331,7 +334,7 @@ def dynamics(system, work, state, derivative):
         ax, ay, az = minus(
             minus(a, times(square, moving)), times(twice, cross(omega, (vx, vy, vz)))
         )
-        store_rows(derivative, starts(own, 6), 6 * n, (ax, ay, az, d1, d2, d3))
+        store_rows(derivative, starts(own, 6), velocity_begin(n), (ax, ay, az, d1, d2, d3))
 
 
 def right_hand_side(system, work, state, derivative):
@@ -370,7 +373,7 @@ def rates_of_state(system, work, state, derivative):
 @compiled(python=False)
 def internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
-    first = 12 * system.bodies.kind.shape[0]
+    first = internal_begin(system.bodies.kind.shape[0])
     for i in range(system.internal.kind.shape[0]):
         derivative[first + i] = internal_rate(
             system.internal, system.curves, i, state[first + i], work.drive[i, 0], work.drive[i, 1]
@@ -427,7 +430,7 @@ def mechanics(system, work, state, derivative, rails):
         turn_fixed(bodies, work.frames, state)
     kinematics(system, work, state)
     m = system.internal.kind.shape[0]
-    inner = state[12 * n : 12 * n + m]
+    inner = state[internal_begin(n) : smoothed_begin(n, m)]
     work.laws[AHEAD], work.laws[RATE_OF_STOPS] = work.watch[0], 0.0
     link_forces(system, work, inner)
     if rarely(system.mounts.falling.shape[0] > 0):

@@ -36,6 +36,10 @@ from railsim.kernels.system import (
     TABLE,
     TIME,
     WHEELSET,
+    drive_begin,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
 )
 from railsim.kernels.track_frame import OMEGA_S
 from railsim.kernels.transient import keep_creepages
@@ -150,8 +154,8 @@ def soften_contact(bodies, jacobian, b, rate, before, h, last):
 def remember(system, work, state, derivative, h):
     """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
-    first = 12 * n + m
-    rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
+    rate = derivative[velocity_begin(n) : internal_begin(n)]
+    before = state[smoothed_begin(n, m) : drive_begin(n, m)]
     for k in range(6 * n):
         before[k] = 0.0
     for b in range(n):
@@ -160,7 +164,7 @@ def remember(system, work, state, derivative, h):
     for k in range(6 * n):
         before[k] = rate[k]
     for i in range(m):
-        state[first + 6 * n + i] = work.drive[i, 0]
+        state[drive_begin(n, m) + i] = work.drive[i, 0]
     if system.support.elastic:
         remember_track(system, work, state)
     state[LAST_STEP] = 0.0
@@ -178,8 +182,8 @@ def step_fast(system, work, state, derivative, decay, h):
     """
     bodies, C = system.bodies, work.relative
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
-    first = 12 * n + m
-    rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
+    rate = derivative[velocity_begin(n) : internal_begin(n)]
+    before = state[smoothed_begin(n, m) : drive_begin(n, m)]
     frames, half = work.frames, 0.5 * h * state[SPEED] * state[SPEED]
     if system.contact.transient != 0:
         keep_creepages(system, work, state)
@@ -190,7 +194,7 @@ def step_fast(system, work, state, derivative, decay, h):
     shift = 0.5 * (last - h)
     for b in range(n):
         q = 6 * b
-        v = 6 * n + q
+        v = velocity_begin(n) + q
         kind = bodies.kind[b]
         follows = system.support.elastic and kind != AXLEBOX
         beta = spin = SMOOTHING_ELASTIC if follows else SMOOTHING
@@ -227,18 +231,18 @@ def step_fast(system, work, state, derivative, decay, h):
             weight = spin if k == SPIN else beta
             state[v + k] += h * rate[q + k] + (0.5 * weight * h + shift) * change
             before[q + k] += weight * change
-    drives = first + 6 * n
+    drives = drive_begin(n, m)
     # after a step that is shorter by far there is nothing to extrapolate from
     ratio = h / last if h < LONGER * last else 0.0
     for i in range(m):
-        k = 12 * n + i
+        k = internal_begin(n) + i
         drive = work.drive[i, 0] + 0.5 * ratio * (work.drive[i, 0] - state[drives + i])
         state[drives + i] = work.drive[i, 0]
         state[k] = advanced(
             system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h, decay[i]
         )
         if slides_together(system.internal, i):
-            hold_within(system.internal, i, 12 * n, work.drive, state)
+            hold_within(system.internal, i, internal_begin(n), work.drive, state)
     state[LAST_STEP] = h
     advance_position(system.drive, state, derivative, h)
     if system.support.elastic:

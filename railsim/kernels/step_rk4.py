@@ -5,7 +5,7 @@ from railsim.kernels.internal import MAXWELL_CURVE, PAD, hold_within, slides_tog
 from railsim.kernels.rhs import internal_rates, mechanics
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import BALANCED, support_rates
-from railsim.kernels.system import LAST_STEP
+from railsim.kernels.system import LAST_STEP, internal_begin
 from railsim.kernels.transient import creepage_rates, keep_creepages
 
 
@@ -61,7 +61,6 @@ def step_rk4(system, work, state, derivative, stages, h):
             total[k] += weight * rate[k]
     for k in range(state.shape[0]):
         state[k] += h / 6.0 * total[k]
-    settle_limits(
-        system.internal, system.curves, 12 * system.bodies.kind.shape[0], work.drive, state
-    )
+    inner = internal_begin(system.bodies.kind.shape[0])
+    settle_limits(system.internal, system.curves, inner, work.drive, state)
     return RUNNING, 0

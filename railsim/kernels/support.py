@@ -39,7 +39,7 @@ from railsim.kernels.lanes import (
     where_beyond,
 )
 from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE, PAIRS, SIDES
-from railsim.kernels.system import LAST_STEP
+from railsim.kernels.system import LAST_STEP, contact_begin
 
 # columns of a wheelset's track in the state: u, u', r_0, s_0, u''
 RAIL_DOF, DOF = 4, 7
@@ -307,7 +307,7 @@ def imbalance(system, work, state, wheels):
 @compiled(inline=True)
 def transient_begin(system):
     """Index of the first wheelset's patches in the state."""
-    return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
+    return contact_begin(system.bodies.kind.shape[0], system.internal.kind.shape[0])
 
 
 @compiled(inline=True)

@@ -85,6 +85,7 @@ from railsim.kernels.system import (
     WHOLE,
     WHOLE_TOLERANCE,
     Z_0,
+    velocity_begin,
 )
 from railsim.kernels.wheel_surface import foreseen_heights
 
@@ -128,7 +129,7 @@ def motion_of_wheelsets(system, work, state, wheels):
     own = starts(body, 6)
     height = load_rows(system.bodies.row, starts(body, BODY_SIZE), Z_0, 1)[0]
     _, y, z, roll, _, yaw, _, _ = load_rows(state, own, 0, 8)
-    _, y_rate, z_rate, roll_rate = load_rows(state, own, 6 * n, 4)
+    _, y_rate, z_rate, roll_rate = load_rows(state, own, velocity_begin(n), 4)
     middle_y, middle_z, _, slope_z, lean, _, _, lean_slope = load_rows(
         work.plane, pair_starts(wheels, 0, PLANE_SIZE, 0), 0, 8
     )

@@ -21,6 +21,7 @@ its u_1, u_2, u_3 are those of its track frame.
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 from railsim.kernels.commands import Actuators, Controllers, Own, Signals
 from railsim.kernels.contact_table import RailTables
@@ -29,6 +30,37 @@ from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
 from railsim.kernels.record import record
 from railsim.kernels.track_frame import TrackTables
+
+
+@register_jitable(inline="always")
+def velocity_begin(n: int) -> int:
+    """Index of the first body's velocities in a state of `n` bodies."""
+    return 6 * n
+
+
+@register_jitable(inline="always")
+def internal_begin(n: int) -> int:
+    """Index of the first internal state."""
+    return 12 * n
+
+
+@register_jitable(inline="always")
+def smoothed_begin(n: int, m: int) -> int:
+    """Index of the first body's smoothed accelerations; `m` internal states."""
+    return 12 * n + m
+
+
+@register_jitable(inline="always")
+def drive_begin(n: int, m: int) -> int:
+    """Index of the last drive of the first internal state."""
+    return 18 * n + m
+
+
+@register_jitable(inline="always")
+def contact_begin(n: int, m: int) -> int:
+    """Index of what wheelsets keep: creep forces that follow, tracks under them."""
+    return 18 * n + 2 * m
+
 
 # kinds of bodies
 RIGID, WHEELSET, AXLEBOX, FIXED = range(4)

@@ -95,7 +95,16 @@ from railsim.kernels.rails import (
 )
 from railsim.kernels.status import RUNNING, WHEEL_LIFT, YAW_RANGE
 from railsim.kernels.support import SKIP
-from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, SIN_ROLL, SPEED, Y_0, Z_0
+from railsim.kernels.system import (
+    AHEAD,
+    COS_ROLL,
+    SIDEWAYS,
+    SIN_ROLL,
+    SPEED,
+    Y_0,
+    Z_0,
+    velocity_begin,
+)
 from railsim.kernels.table_ends import LIFT_RANGE, all_far, beside_sections, outside, without_rail
 from railsim.kernels.track_frame import OMEGA
 from railsim.kernels.wheel_surface import note_surfaces
@@ -134,8 +143,8 @@ def normal_contact(system, work, speed, state):
         height = system.bodies.row[b, Z_0]
         y = state[6 * b + 1] - plane[w, MIDDLE_Y]
         z = state[6 * b + 2] - plane[w, MIDDLE_Z] + height
-        y_rate = state[6 * n_bodies + 6 * b + 1] - speed * plane[w, SLOPE_Y]
-        z_rate = state[6 * n_bodies + 6 * b + 2] - speed * plane[w, SLOPE_Z]
+        y_rate = state[velocity_begin(n_bodies) + 6 * b + 1] - speed * plane[w, SLOPE_Y]
+        z_rate = state[velocity_begin(n_bodies) + 6 * b + 2] - speed * plane[w, SLOPE_Z]
         y, z = cosine * y + sine * z, cosine * z - sine * y
         turn = speed * plane[w, ROLL_SLOPE]
         y_rate, z_rate = (

@@ -29,7 +29,7 @@ from railsim.kernels.contact_columns import (
 from railsim.kernels.contact_table import N_PATCH, TREAD
 from railsim.kernels.rail_parts import lowest_gap, near_range, place_on_rails, plain_gap
 from railsim.kernels.rails import ASIDE, ROLL
-from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
+from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED, velocity_begin
 
 # columns of Contact.surface_row: first row of its values and of its angles to the next flat, number
 # of nodes over the angle and in y, first node and spacing in y [m]; length of its shortest flat and
@@ -162,7 +162,7 @@ def foreseen_heights(system, work, state, w, track, first):
             track[first + k] = 0.0
         return
     phi, _ = wheel_angle(system, state, w)
-    rate = -state[6 * n + 6 * b + 4]  # the turn of the track's frame left out
+    rate = -state[velocity_begin(n) + 6 * b + 4]  # the turn of the track's frame left out
     for side in range(2):
         sign = 2.0 * side - 1.0
         shear = contact.shear[contact.table[w, side]]

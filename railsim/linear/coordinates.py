@@ -17,7 +17,16 @@ from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import FREE, N_SCALARS, SPEED, WHEELSET, Drive, System
+from railsim.kernels.system import (
+    FREE,
+    N_SCALARS,
+    SPEED,
+    WHEELSET,
+    Drive,
+    System,
+    internal_begin,
+    velocity_begin,
+)
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.system import Linearisation, jacobian, without_forceless
 from railsim.model.assembly import Model
@@ -102,8 +111,9 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     names = [f"{model.index.bodies[b]}.{COMPONENTS[k]}" for b, k in positions]
     names += [f"{model.index.bodies[b]}.{COMPONENTS[k]}'" for b, k in velocities]
     rest = _internal_names(model)
-    indices = [6 * b + k for b, k in positions] + [6 * n + 6 * b + k for b, k in velocities]
-    indices += [12 * n + i for i in range(len(rest))]
+    indices = [6 * b + k for b, k in positions]
+    indices += [velocity_begin(n) + 6 * b + k for b, k in velocities]
+    indices += [internal_begin(n) + i for i in range(len(rest))]
     steps = [STEP] * len(positions) + [RATE_STEP] * len(velocities) + [FORCE_STEP] * len(rest)
     forceless = []
     if not held:
@@ -246,13 +256,14 @@ class FreeVehicle:
         trials[:, self.coordinates.indices] = x
         derivatives = self._evaluated(trials)
         derivatives[:, self._reference[0]] = trials[:, self._reference[1]]
-        velocities = derivatives[:, 6 * self._n : 12 * self._n].reshape(len(x), -1, 6)
+        of_velocities = slice(velocity_begin(self._n), internal_begin(self._n))
+        velocities = derivatives[:, of_velocities].reshape(len(x), -1, 6)
         change = derivatives[:, -1, None]
         if self._is_straight:
             velocities[:, self._whole, 0] += change
         else:
             velocities[:, self._whole, :3] += change[:, None] * self._directions(trials)
-        derivatives[:, 6 * self._n : 12 * self._n] = velocities.reshape(len(x), -1)
+        derivatives[:, of_velocities] = velocities.reshape(len(x), -1)
         return np.asarray(derivatives[:, self.coordinates.indices])
 
     def _directions(self, states: Floats) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.kernels.internal import PAD
 from railsim.kernels.step_rk4 import settle_limits
-from railsim.kernels.system import System
+from railsim.kernels.system import System, internal_begin
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 
@@ -45,7 +45,7 @@ class Sliding(SteadyRolling):
         kinds = np.append(internal.kind, -1)  # of an axis without internal state
         self._mounts, self._axes = np.nonzero(kinds[mounts.internal] == PAD)
         self._pads = mounts.internal[self._mounts, self._axes]
-        self._first = 12 * model.index.n_bodies
+        self._first = internal_begin(model.index.n_bodies)
         self._since = since
 
     def _evaluated(self, states: Floats) -> Floats:

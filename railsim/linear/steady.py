@@ -21,7 +21,7 @@ from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import AXLEBOX, SPEED, WHEELSET, System
+from railsim.kernels.system import AXLEBOX, SPEED, WHEELSET, System, internal_begin, velocity_begin
 from railsim.kernels.track_frame import OMEGA
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import conditions, difference_quotients
@@ -94,9 +94,9 @@ class SteadyRolling:
         """Return a guess with the velocities of steady rolling at a speed [m/s]."""
         state = guess.copy()
         n = self.model.index.n_bodies
-        spins = 6 * n + 6 * self._wheelsets + 4
+        spins = velocity_begin(n) + 6 * self._wheelsets + 4
         before = float(guess[-1])
-        state[6 * n : 12 * n] = 0.0
+        state[velocity_begin(n) : internal_begin(n)] = 0.0
         state[SPEED] = speed
         rolling = -speed / self.system.bodies.radius[self._wheelsets]
         state[spins] = guess[spins] * speed / before if np.all(guess[spins]) else rolling
@@ -117,7 +117,7 @@ class SteadyRolling:
         x, y = np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
         y, z = np.cos(roll) * y + np.sin(roll) * z, np.cos(roll) * z - np.sin(roll) * y
         x, z = np.cos(pitch) * x - np.sin(pitch) * z, np.cos(pitch) * z + np.sin(pitch) * x
-        first = 6 * n + 6 * self._rigid
+        first = velocity_begin(n) + 6 * self._rigid
         states[:, first + 3] = x
         states[:, first + 4] = np.where(self._no_pitch, states[:, first + 4], y)
         states[:, first + 5] = z
@@ -163,9 +163,9 @@ class SteadyRolling:
         rest = forces / self._inertias
         parts = []
         # those of a track or an air spring follow the bodies
-        of_bodies = np.flatnonzero(self._equations < 12 * n)
+        of_bodies = np.flatnonzero(self._equations < internal_begin(n))
         for k in of_bodies[np.argsort(-np.abs(rest[of_bodies]))[:3]]:
-            body, component = divmod(int(self._equations[k]) - 6 * n, 6)
+            body, component = divmod(int(self._equations[k]) - velocity_begin(n), 6)
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
         return "no steady state; largest remaining accelerations: " + ", ".join(parts)

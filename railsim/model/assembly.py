@@ -41,6 +41,7 @@ from railsim.kernels.system import (
     Drive,
     Support,
     System,
+    contact_begin,
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails
@@ -124,7 +125,7 @@ class Model:
     def n_state(self) -> int:
         """Length of the state vector."""
         system = self.system
-        first = 18 * self.index.n_bodies + 2 * len(system.internal.kind)
+        first = contact_begin(self.index.n_bodies, len(system.internal.kind))
         return first + sum(per_wheelset(system)) * len(system.contact.body) + N_SCALARS
 
 

@@ -47,6 +47,8 @@ from railsim.kernels.system import (
     SPEED,
     WHEELSET,
     System,
+    internal_begin,
+    velocity_begin,
 )
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.model.assembly import Model
@@ -267,8 +269,8 @@ def conditions(
             given = body in bodies.references and component == 0
             if given or (kind == WHEELSET and held) or (spin and not rolling):
                 continue
-            unknowns.append((6 * n if spin else 0) + 6 * body + component)
-            equations.append(6 * n + 6 * body + component)
+            unknowns.append((velocity_begin(n) if spin else 0) + 6 * body + component)
+            equations.append(velocity_begin(n) + 6 * body + component)
             of_body = (bodies.mass[body],) * 3 + tuple(bodies.inertia[body])
             inertias.append(float(of_body[component]))
     if support.elastic and not held:
@@ -279,7 +281,7 @@ def conditions(
         unknowns += track
         equations += [RATE + k for k in track]
         inertias += [REFERENCE_MASS] * len(track)
-    air = (12 * n + np.flatnonzero(system.internal.kind == AIR)).tolist()
+    air = (internal_begin(n) + np.flatnonzero(system.internal.kind == AIR)).tolist()
     return (
         np.array([*unknowns, *air]),
         np.array([*equations, *air]),
@@ -434,9 +436,9 @@ class _Balance:
         worst = np.argsort(-np.abs(rest))[:5]
         parts = []
         for k in worst:
-            if self._equations[k] >= 12 * n:
+            if self._equations[k] >= internal_begin(n):
                 continue
-            body, component = divmod(self._equations[k] - 6 * n, 6)
+            body, component = divmod(self._equations[k] - velocity_begin(n), 6)
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
         names = self._alternating(state, change)
@@ -460,5 +462,6 @@ def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) 
             continue
         # positions relative to the frame are small: its rate of turn is that of the body
         rate = speed * frames[model.system.bodies.frame[body], OMEGA : OMEGA + 3]
-        state[6 * n + 6 * body + ROLL : 6 * n + 6 * body + YAW + 1] += rate
+        first = velocity_begin(n) + 6 * body
+        state[first + ROLL : first + YAW + 1] += rate
     return state

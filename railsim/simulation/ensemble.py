@@ -34,7 +34,19 @@ from railsim.kernels.status import (
     WRONG_SIDE,
     YAW_RANGE,
 )
-from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, Mounts, System
+from railsim.kernels.system import (
+    N_SCALARS,
+    Bodies,
+    Contact,
+    Curves,
+    Mounts,
+    System,
+    contact_begin,
+    drive_begin,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
+)
 from railsim.model import rail_ranges
 from railsim.model.assembly import Model, per_wheelset, side_by_side
 from railsim.model.uneven_wheels import joined, rolling
@@ -110,7 +122,7 @@ class Ensemble:
             self.recorder = recorders[0]
             return
         self.system = joined_system(models)
-        n_state = 18 * n + 2 * m + sum(sizes) * wheelsets[-1].stop + N_SCALARS
+        n_state = contact_begin(n, m) + sum(sizes) * wheelsets[-1].stop + N_SCALARS
         self.recorder = _joined_recorder(systems, recorders, n_state)
 
     def state(self, states: Sequence[Floats]) -> Floats:
@@ -333,7 +345,7 @@ def _indices(
     """Indices of one vehicle's state in that of n bodies, m internal states, w wheelsets."""
     coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
     inner = np.arange(internal.start, internal.stop)
-    first = 18 * n + 2 * m
+    first = contact_begin(n, m)
     blocks = []
     for size in sizes:
         blocks.append(first + np.arange(size * wheelsets.start, size * wheelsets.stop))
@@ -341,10 +353,10 @@ def _indices(
     return np.concatenate(
         [
             coordinates,
-            6 * n + coordinates,
-            12 * n + inner,
-            12 * n + m + coordinates,
-            18 * n + m + inner,
+            velocity_begin(n) + coordinates,
+            internal_begin(n) + inner,
+            smoothed_begin(n, m) + coordinates,
+            drive_begin(n, m) + inner,
             *blocks,
             np.arange(first, first + N_SCALARS),
         ]

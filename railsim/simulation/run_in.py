@@ -37,7 +37,7 @@ from railsim.kernels.rails import (
 )
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import ARC_LENGTH, SPEED, System, Work
+from railsim.kernels.system import ARC_LENGTH, SPEED, System, Work, velocity_begin
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import circle, placed
 from railsim.linear.steady import NotConverged, led
@@ -230,7 +230,7 @@ def follow_rails(model: Model, state: Floats) -> None:
     speed, n = state[SPEED], model.index.n_bodies
     plane = _located(model, float(state[ARC_LENGTH])).plane
     for w, body in enumerate(model.system.contact.body):
-        first, rate = 6 * body, 6 * n + 6 * body
+        first, rate = 6 * body, velocity_begin(n) + 6 * body
         height = model.system.bodies.nominal[body, 1]
         # the centre of the wheelset leans over with the rails
         state[first + 1] += plane[w, MIDDLE_Y] - height * plane[w, SINE]

@@ -9,7 +9,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, SPEED
+from railsim.kernels.system import N_SCALARS, SPEED, drive_begin, internal_begin, smoothed_begin
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.work import CONSTANT_SPEED
@@ -51,9 +51,9 @@ class VehicleFlow:
             is_velocity = k >= c.n_positions
             found.append((int(c.indices[k]), RATE if is_velocity else LENGTH))
             if is_velocity:
-                found.append((12 * n + m + 6 * body + component, ACCELERATION))
-        found += [(12 * n + i, FORCE) for i in range(m)]
-        found += [(18 * n + m + i, DRIVE) for i in range(m)]
+                found.append((smoothed_begin(n, m) + 6 * body + component, ACCELERATION))
+        found += [(internal_begin(n) + i, FORCE) for i in range(m)]
+        found += [(drive_begin(n, m) + i, DRIVE) for i in range(m)]
         if system.support.elastic:
             end = model.n_state - N_SCALARS
             first = end - SUPPORT_SIZE * len(system.contact.body)
