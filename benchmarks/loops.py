@@ -12,8 +12,8 @@ from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
+from railsim.kernels.state import ARC_LENGTH, SPEED
 from railsim.kernels.support import AS_GIVEN
-from railsim.kernels.system import ARC_LENGTH, SPEED
 from railsim.kernels.wheel_contact import normal_contact
 from railsim.kernels.wheel_rail import add_creep_forces, wheel_rail
 

@@ -22,16 +22,8 @@ from math import isfinite, sqrt
 from railsim.kernels import compiled
 from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.own_laws import call_at
-from railsim.kernels.system import (
-    ANGULAR,
-    FORCE,
-    MOMENT,
-    POSITION,
-    RADIUS,
-    TIME,
-    VELOCITY,
-    internal_begin,
-)
+from railsim.kernels.state import TIME, internal_begin
+from railsim.kernels.system import ANGULAR, FORCE, MOMENT, POSITION, RADIUS, VELOCITY
 from railsim.kernels.vectors import (
     add_at,
     cross,

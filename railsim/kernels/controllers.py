@@ -33,18 +33,16 @@ from railsim.kernels.element_outputs import (
 )
 from railsim.kernels.element_outputs import FORCE as ELEMENT_FORCE
 from railsim.kernels.own_laws import call_at
-from railsim.kernels.status import LAW_NOT_FINITE, RUNNING
-from railsim.kernels.system import (
-    ANGULAR,
+from railsim.kernels.state import (
     ARC_LENGTH,
-    RADIUS,
     SPEED,
     TIME,
-    WHEELSET,
     internal_begin,
     smoothed_begin,
     velocity_begin,
 )
+from railsim.kernels.status import LAW_NOT_FINITE, RUNNING
+from railsim.kernels.system import ANGULAR, RADIUS, WHEELSET
 from railsim.kernels.track_frame import PHI, PSI, cell_of, polynomial
 from railsim.kernels.vectors import (
     cross,

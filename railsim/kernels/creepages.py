@@ -32,7 +32,8 @@ from railsim.kernels.rails import (
     SINE,
     SLOPE_Z,
 )
-from railsim.kernels.system import Y_0, Z_0, velocity_begin
+from railsim.kernels.state import velocity_begin
+from railsim.kernels.system import Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
 
 

@@ -2,8 +2,8 @@
 
 from railsim.kernels import compiled
 from railsim.kernels.rotation import sine_cosine
+from railsim.kernels.state import ARC_LENGTH, SPEED, TIME, velocity_begin
 from railsim.kernels.system import (
-    ARC_LENGTH,
     AXLEBOX,
     BRAKES,
     FORCE,
@@ -13,12 +13,9 @@ from railsim.kernels.system import (
     RADIUS,
     SLIP_BEGIN,
     SLIP_END,
-    SPEED,
     TABLE,
-    TIME,
     Y_0,
     Z_0,
-    velocity_begin,
 )
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
 

@@ -12,8 +12,9 @@ from railsim.kernels.branches import rarely
 from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.lanes import LANES, any_beyond, larger, load_lanes, smaller, spread
 from railsim.kernels.rails import against_rails
+from railsim.kernels.state import ARC_LENGTH, TIME
 from railsim.kernels.support import SUPPORT_SIZE, support_begin
-from railsim.kernels.system import ARC_LENGTH, TIME, Z_0
+from railsim.kernels.system import Z_0
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
 (

@@ -34,7 +34,8 @@ from railsim.kernels.contact_table import (
     look_up,
     stretched_roll,
 )
-from railsim.kernels.system import AHEAD, ARC_LENGTH
+from railsim.kernels.state import ARC_LENGTH
+from railsim.kernels.system import AHEAD
 
 BEGIN, END = range(2)  # columns of RailTables.range_row
 FIRST_PART, COUNT, PLAIN = range(3)  # of RailTables.piece

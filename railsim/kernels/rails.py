@@ -34,7 +34,8 @@ from railsim.kernels.lanes import (
     store_rows,
 )
 from railsim.kernels.rotation import arc_sine_lanes
-from railsim.kernels.system import AHEAD, ARC_LENGTH, LOCATED, SPEED, smoothed_begin
+from railsim.kernels.state import ARC_LENGTH, SPEED, smoothed_begin
+from railsim.kernels.system import AHEAD, LOCATED
 from railsim.kernels.track_frame import (
     MU_LEFT,
     Y_LEFT,

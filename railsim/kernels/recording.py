@@ -8,7 +8,7 @@ from railsim.kernels import compiled
 from railsim.kernels.controllers import ACTUATOR, actuator_output
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.record import record
-from railsim.kernels.system import internal_begin
+from railsim.kernels.state import internal_begin
 
 
 @record

@@ -52,6 +52,14 @@ from railsim.kernels.lanes import (
     store_rows,
 )
 from railsim.kernels.rotation import sine_cosine_lanes
+from railsim.kernels.state import (
+    ARC_LENGTH,
+    SPEED,
+    TIME,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
+)
 from railsim.kernels.status import END_OF_TRACK, LAW_NOT_FINITE, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
@@ -64,7 +72,6 @@ from railsim.kernels.support import (
 )
 from railsim.kernels.support_step import correct_support
 from railsim.kernels.system import (
-    ARC_LENGTH,
     BODY_SIZE,
     COS_ROLL,
     EVALUATIONS,
@@ -78,14 +85,9 @@ from railsim.kernels.system import (
     RATES_SIZE,
     RELATIVE_SIZE,
     SIN_ROLL,
-    SPEED,
-    TIME,
     UNSETTLED,
     Y_0,
     Z_0,
-    internal_begin,
-    smoothed_begin,
-    velocity_begin,
 )
 from railsim.kernels.track_frame import (
     ATTITUDE,
@@ -398,7 +400,7 @@ def mechanics(system, work, state, derivative, rails):
     ----------
     system : System;  work : Work
     state, derivative : float64[n_state]
-        See `railsim.kernels.system`; the velocities of fixed bodies in `state` are set.
+        See `railsim.kernels.state`; the velocities of fixed bodies in `state` are set.
     rails : int
         What becomes of elastic rails in `state`, see `support.AS_GIVEN`.
 

@@ -19,27 +19,29 @@ from railsim.kernels.contact_columns import (
 from railsim.kernels.driving import table_value_slope
 from railsim.kernels.internal import advanced, hold_within, slides_together
 from railsim.kernels.rhs import euler_rates
+from railsim.kernels.state import (
+    ARC_LENGTH,
+    LAST_STEP,
+    SPEED,
+    TIME,
+    drive_begin,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
+)
 from railsim.kernels.support_step import note_wheelsets, remember_track, step_support
 from railsim.kernels.system import (
-    ARC_LENGTH,
     AXLEBOX,
     COS_PITCH,
     COS_ROLL,
     I_1,
     I_2,
     I_3,
-    LAST_STEP,
     MASS,
     SIN_PITCH,
     SIN_ROLL,
-    SPEED,
     TABLE,
-    TIME,
     WHEELSET,
-    drive_begin,
-    internal_begin,
-    smoothed_begin,
-    velocity_begin,
 )
 from railsim.kernels.track_frame import OMEGA_S
 from railsim.kernels.transient import keep_creepages

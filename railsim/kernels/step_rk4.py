@@ -3,9 +3,9 @@
 from railsim.kernels import compiled
 from railsim.kernels.internal import MAXWELL_CURVE, PAD, hold_within, slides_together, within_table
 from railsim.kernels.rhs import internal_rates, mechanics
+from railsim.kernels.state import LAST_STEP, internal_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import BALANCED, support_rates
-from railsim.kernels.system import LAST_STEP, internal_begin
 from railsim.kernels.transient import creepage_rates, keep_creepages
 
 

@@ -39,12 +39,12 @@ from railsim.kernels.lanes import (
     where_beyond,
 )
 from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE, PAIRS, SIDES
-from railsim.kernels.system import LAST_STEP, contact_begin
+from railsim.kernels.state import LAST_STEP, contact_begin
 
 # columns of a wheelset's track in the state: u, u', r_0, s_0, u''
 RAIL_DOF, DOF = 4, 7
 RATE, MEAN_RATE, MEAN_CHANGE, ACCELERATION = DOF, 2 * DOF, 3 * DOF, 4 * DOF
-# then what the slopes of the contact forces have learnt at each wheel, see `learn`: what is added
+# then what the slopes of contact forces have learnt at each wheel, see `learning`: what is added
 # to those of Y and Q over y and over the lateral slip; y and slip of the last step; error of the
 # forces foreseen where the rails have moved for it already; set of the patches, in bits
 LEARNT = 5 * DOF

@@ -15,11 +15,12 @@ from railsim.kernels.division import begin_division, prepare_steps, striking
 from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.recording import record_row
 from railsim.kernels.rhs import mechanics
+from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.step_fast import remember, step_fast
 from railsim.kernels.step_rk4 import all_rates, step_rk4
 from railsim.kernels.support import AFTER_STEP
-from railsim.kernels.system import ARC_LENGTH, STEPS, WHOLE
+from railsim.kernels.system import STEPS, WHOLE
 from railsim.kernels.vibration import high_pass, watch
 
 FAST, RK4 = range(2)

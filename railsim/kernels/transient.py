@@ -34,8 +34,8 @@ from railsim.kernels.contact_columns import (
     XI_X,
     A,
 )
+from railsim.kernels.state import LAST_STEP
 from railsim.kernels.support import PATCH_STATE, SKIP, TRACED, TRANSIENT_SIZE, transient_begin
-from railsim.kernels.system import LAST_STEP
 
 # columns of Work.transient[w, side, patch], and of each patch in the state but for the last: c and
 # xi along, across and in spin; whether it carries; V/a [1/s]

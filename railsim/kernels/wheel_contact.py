@@ -93,18 +93,10 @@ from railsim.kernels.rails import (
     SLOPE_Z,
     predict_rate_changes,
 )
+from railsim.kernels.state import SPEED, velocity_begin
 from railsim.kernels.status import RUNNING, WHEEL_LIFT, YAW_RANGE
 from railsim.kernels.support import SKIP
-from railsim.kernels.system import (
-    AHEAD,
-    COS_ROLL,
-    SIDEWAYS,
-    SIN_ROLL,
-    SPEED,
-    Y_0,
-    Z_0,
-    velocity_begin,
-)
+from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, SIN_ROLL, Y_0, Z_0
 from railsim.kernels.table_ends import LIFT_RANGE, all_far, beside_sections, outside, without_rail
 from railsim.kernels.track_frame import OMEGA
 from railsim.kernels.wheel_surface import note_surfaces

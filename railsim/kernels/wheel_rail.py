@@ -75,9 +75,9 @@ from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.own_laws import own_friction
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rails import locate_rails
+from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions, step_compliance
-from railsim.kernels.system import ARC_LENGTH
 from railsim.kernels.transient import follow_creepages, give_back_creepages
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 

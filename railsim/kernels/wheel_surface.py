@@ -29,7 +29,8 @@ from railsim.kernels.contact_columns import (
 from railsim.kernels.contact_table import N_PATCH, TREAD
 from railsim.kernels.rail_parts import lowest_gap, near_range, place_on_rails, plain_gap
 from railsim.kernels.rails import ASIDE, ROLL
-from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED, velocity_begin
+from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
+from railsim.kernels.system import AHEAD, RADIUS
 
 # columns of Contact.surface_row: first row of its values and of its angles to the next flat, number
 # of nodes over the angle and in y, first node and spacing in y [m]; length of its shortest flat and

@@ -4,7 +4,7 @@ import math
 
 from railsim.arrays import Floats
 from railsim.definitions import Settings, Track
-from railsim.kernels.system import ARC_LENGTH
+from railsim.kernels.state import ARC_LENGTH
 from railsim.model.uneven_wheels import UnevenWheels
 
 LENGTH = 50.0  # m; the tables reach beyond both ends

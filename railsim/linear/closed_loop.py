@@ -18,8 +18,8 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import ModelError
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
+from railsim.kernels.state import TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import TIME
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.system import Linearisation, jacobian, without_forceless

@@ -15,18 +15,10 @@ import numpy as np
 from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.state import N_SCALARS, SPEED, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import (
-    FREE,
-    N_SCALARS,
-    SPEED,
-    WHEELSET,
-    Drive,
-    System,
-    internal_begin,
-    velocity_begin,
-)
+from railsim.kernels.system import FREE, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.system import Linearisation, jacobian, without_forceless
 from railsim.model.assembly import Model

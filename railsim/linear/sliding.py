@@ -14,8 +14,9 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.kernels.internal import PAD
+from railsim.kernels.state import internal_begin
 from railsim.kernels.step_rk4 import settle_limits
-from railsim.kernels.system import System, internal_begin
+from railsim.kernels.system import System
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 

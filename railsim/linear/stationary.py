@@ -16,7 +16,8 @@ from railsim.constants import CANT_BASE
 from railsim.definitions import Track
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_columns import W_Q, W_Y
-from railsim.kernels.system import ARC_LENGTH, FORCE, MOMENT, System
+from railsim.kernels.state import ARC_LENGTH
+from railsim.kernels.system import FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
 from railsim.linear.circle import POSITION, circle, placed
 from railsim.linear.sliding import Placed, SlidingPath, has_pads

@@ -20,8 +20,9 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.state import SPEED, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import AXLEBOX, SPEED, WHEELSET, System, internal_begin, velocity_begin
+from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import conditions, difference_quotients

@@ -26,13 +26,13 @@ from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError, input_error
 from railsim.kernels.aligned import CACHE_LINE, aligned
 from railsim.kernels.contact_table import N_PATCH
+from railsim.kernels.state import N_SCALARS, contact_begin
 from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
 from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE, TRACED, TRANSIENT_SIZE
 from railsim.kernels.system import (
     AXLEBOX,
     FIXED,
     FREE,
-    N_SCALARS,
     RIGID,
     TABLE,
     WHEELSET,
@@ -41,7 +41,6 @@ from railsim.kernels.system import (
     Drive,
     Support,
     System,
-    contact_begin,
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails

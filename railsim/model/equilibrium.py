@@ -28,6 +28,7 @@ from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.state import ARC_LENGTH, N_SCALARS, SPEED, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import (
     DOF,
@@ -38,18 +39,7 @@ from railsim.kernels.support import (
     REFERENCE_MASS,
     SUPPORT_SIZE,
 )
-from railsim.kernels.system import (
-    ARC_LENGTH,
-    AXLEBOX,
-    FIXED,
-    N_SCALARS,
-    RIGID,
-    SPEED,
-    WHEELSET,
-    System,
-    internal_begin,
-    velocity_begin,
-)
+from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET, System
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.model.assembly import Model
 from railsim.model.preloads import least_squares, with_preloads, with_these_preloads

@@ -20,9 +20,10 @@ from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.recording import Recorder
 from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.state import N_SCALARS, SPEED
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, PARTS, PER_PART, SHARE, SIDEWAYS, SPEED, System, Work
+from railsim.kernels.system import PARTS, PER_PART, SHARE, SIDEWAYS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import parts_of_wheel, work_arrays

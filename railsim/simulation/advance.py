@@ -24,8 +24,9 @@ from railsim.errors import RailsimError
 from railsim.kernels.compiler import entry
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import AGAIN, ARC_LENGTH, N_PARTS, SPEED, TIME
+from railsim.kernels.system import AGAIN, N_PARTS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import VIBRATION
 from railsim.model.assembly import Model
@@ -58,7 +59,7 @@ class SavedState:
     Attributes
     ----------
     motion : float64[n_state]
-        See `railsim.kernels.system`.
+        See `railsim.kernels.state`.
     counted : tuple of ndarray
         What steps count and remember beside it: commands, samples, memory of laws, extremes.
     grid : tuple

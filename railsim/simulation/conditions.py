@@ -30,7 +30,7 @@ class TakenUp(NamedTuple):
     Attributes
     ----------
     motion : float64[n_state]
-        See `railsim.kernels.system`.
+        See `railsim.kernels.state`.
     memory : float64[...], optional
         Commands, samples and memory of laws; None where nothing of it is known.
     """

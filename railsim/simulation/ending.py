@@ -6,8 +6,9 @@ import math
 import time
 
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.kernels.state import TIME
 from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, STATUS
-from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS, TIME
+from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS
 from railsim.result import Result
 from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run

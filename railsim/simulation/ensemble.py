@@ -22,6 +22,14 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.element_columns import BOTH_ENDS, ROTATES, falling_friction, mount_laws
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.recording import Recorder
+from railsim.kernels.state import (
+    N_SCALARS,
+    contact_begin,
+    drive_begin,
+    internal_begin,
+    smoothed_begin,
+    velocity_begin,
+)
 from railsim.kernels.status import (
     BESIDE_RAIL,
     DERAILED,
@@ -34,19 +42,7 @@ from railsim.kernels.status import (
     WRONG_SIDE,
     YAW_RANGE,
 )
-from railsim.kernels.system import (
-    N_SCALARS,
-    Bodies,
-    Contact,
-    Curves,
-    Mounts,
-    System,
-    contact_begin,
-    drive_begin,
-    internal_begin,
-    smoothed_begin,
-    velocity_begin,
-)
+from railsim.kernels.system import Bodies, Contact, Curves, Mounts, System
 from railsim.model import rail_ranges
 from railsim.model.assembly import Model, per_wheelset, side_by_side
 from railsim.model.uneven_wheels import joined, rolling

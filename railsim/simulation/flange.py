@@ -11,8 +11,9 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
+from railsim.kernels.state import LAST_STEP
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import LAST_STEP, System
+from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, without_loads

@@ -32,8 +32,9 @@ from railsim.kernels.controllers import ACTUATOR
 from railsim.kernels.driving import recorded_axle_torques
 from railsim.kernels.rails import RAIL_SIZE, recorded_against_rails
 from railsim.kernels.recording import Recorder
+from railsim.kernels.state import N_SCALARS
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, Z_0
+from railsim.kernels.system import Z_0
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import parts_of_wheel, smooth_planes

@@ -12,7 +12,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.kernels.controllers import START
-from railsim.kernels.system import TIME
+from railsim.kernels.state import TIME
 from railsim.model.assembly import SharedTables, assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import stored_equilibrium

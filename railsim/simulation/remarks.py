@@ -13,8 +13,9 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.table import TableGrid
+from railsim.kernels.state import TIME
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.system import DIVIDED, TIME, UNSETTLED, Support
+from railsim.kernels.system import DIVIDED, UNSETTLED, Support
 from railsim.kernels.vibration import (
     ALTERNATES_AT,
     ALTERNATION,

@@ -36,8 +36,9 @@ from railsim.kernels.rails import (
     locate_rails,
 )
 from railsim.kernels.rhs import locate_frames
+from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import ARC_LENGTH, SPEED, System, Work, velocity_begin
+from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import circle, placed
 from railsim.linear.steady import NotConverged, led

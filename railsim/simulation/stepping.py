@@ -22,8 +22,8 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import InputError, argument_fault, nearest
 from railsim.kernels.actuators import COMMAND, send
 from railsim.kernels.controllers import BASE, VALUE
+from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.laws import allowed
 from railsim.model.assembly import SharedTables

@@ -22,8 +22,9 @@ from railsim.definitions.loading import load_track
 from railsim.errors import Faults, ModelError
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
+from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import ARC_LENGTH, System
+from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import POSITION, circle, left_out, placed
 from railsim.linear.coordinates import coordinates

@@ -14,8 +14,9 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
+from railsim.kernels.state import TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import TABLE, TIME, Drive, System
+from railsim.kernels.system import TABLE, Drive, System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
 from railsim.linear.eigenmodes import Eigenmodes

@@ -8,8 +8,8 @@ rates are counted from steady rolling at the speed at hand.
 import numpy as np
 
 from railsim.arrays import Floats, Integers
+from railsim.kernels.state import N_SCALARS, SPEED, drive_begin, internal_begin, smoothed_begin
 from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, SPEED, drive_begin, internal_begin, smoothed_begin
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.work import CONSTANT_SPEED

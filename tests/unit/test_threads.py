@@ -52,4 +52,4 @@ def test_all_pools_of_processes_begin_so():
     paths = Path(railsim.__file__).parent.rglob("*.py")
     texts = {path.name: path.read_text(encoding="utf-8") for path in paths}
     pools = {name for name, text in texts.items() if "ProcessPoolExecutor(" in text}
-    assert pools == {name for name, text in texts.items() if " workers_begin()" in text} - OWN
+    assert pools == {name for name, text in texts.items() if "workers_begin()" in text} - OWN

@@ -15,8 +15,9 @@ from railsim.kernels.contact_table import (
     stretched_roll,
 )
 from railsim.kernels.rhs import locate_frames, right_hand_side
+from railsim.kernels.state import N_SCALARS
 from railsim.kernels.support import SUPPORT_SIZE
-from railsim.kernels.system import AXLEBOX, N_SCALARS, WHEELSET
+from railsim.kernels.system import AXLEBOX, WHEELSET
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.track_frame import FRAME_SIZE
 from railsim.model.assembly import assemble

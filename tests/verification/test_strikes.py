@@ -15,8 +15,8 @@ import railsim
 from railsim.definitions.loading import load_track as load_any_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.kernels.state import N_SCALARS
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE, WEIGHT
-from railsim.kernels.system import N_SCALARS
 from railsim.simulation import simulate, simulate_together
 from railsim.simulation.remarks import MOST_Q
 

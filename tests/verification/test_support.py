@@ -8,6 +8,7 @@ from railsim.definitions.track.support import PRESETS
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
+from railsim.kernels.state import N_SCALARS
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import (
     BALLAST,
@@ -20,7 +21,6 @@ from railsim.kernels.support import (
     factors,
     support_begin,
 )
-from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.time_step import SCHEMES, empty_recorder
 from railsim.model.work import work_arrays

@@ -11,6 +11,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.track.definition import Track
 from railsim.kernels.contact_columns import W_NORMAL
+from railsim.kernels.support import SETTLED
 from railsim.simulation import simulate
 
 DATA = Path(__file__).parents[1] / "data"
@@ -321,10 +322,16 @@ def test_slow_run_over_a_twist_gives_the_static_change_of_load():
     assert change == pytest.approx(np.array([[1, -1], [-1, 1]]) * expected, rel=0.02)
 
 
-def test_irregular_rails_mirrored_give_the_mirrored_result(coach):
-    """Left and right of everything exchanged, through dips, kinks, twists and random rails."""
+@pytest.mark.parametrize("support", ["rigid", "ballasted"])
+def test_irregular_rails_mirrored_give_the_mirrored_result(coach, support):
+    """Left and right of everything exchanged, through dips, kinks, twists and random rails.
+
+    On rigid rails only round-off differs.  On elastic ones it may decide, at single steps, whether
+    an error of the forces is corrected: one up to `SETTLED` of the static wheel load is not.
+    """
     irregular = curve(
         length=100.0,
+        support={"preset": support},
         friction=[0.4, 0.3],
         gauge_widening=((0.0, 0.0, 0.0), (100.0, 0.002, 0.001)),
         irregularities=[
@@ -336,9 +343,10 @@ def test_irregular_rails_mirrored_give_the_mirrored_result(coach):
     )
     here = simulate(coach, irregular, speed=15.0)
     there = simulate(mirrored_vehicle(coach), mirrored_track(irregular), speed=15.0)
-    # round-off of 1e-16 grows where wheels leave and meet their flanges, and in learnt slopes
-    assert np.max(np.abs(here.Q - there.Q[:, :, ::-1])) < 1e-2
-    assert np.max(np.abs(here.Y + there.Y[:, :, ::-1])) < 1e-2
+    largest = 2e-6 if support == "rigid" else SETTLED * np.mean(here.Q0)  # N
+    for difference in (here.Q - there.Q[:, :, ::-1], here.Y + there.Y[:, :, ::-1]):
+        assert np.max(np.abs(difference)) < largest
+        assert np.median(np.abs(difference)) < 1e-6
     assert np.max(np.abs(here.wheelset_yaw + there.wheelset_yaw)) < 1e-10
     assert np.ptp(here.Q) > 1.5e4  # it is no smooth run
 

@@ -384,8 +384,9 @@ def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_
         same = np.zeros(len(QUANTITIES))
         bands = dict.fromkeys(BANDS, rows)
         return Estimate(
-            s, 20.0, rows, same, bands, dict.fromkeys(BANDS, same), same, same, same,
-            ("lateral.1",), aside, np.zeros(1),
+            s=s, speed=20.0, values=rows, deviations=same, bands=bands,
+            band_deviations=dict.fromkeys(BANDS, same), wave_numbers=same, seen=same, power=same,
+            outputs=("lateral.1",), forces=aside, force_deviations=np.zeros(1),
         )  # fmt: skip
 
     found = joined("run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), ())

@@ -6,7 +6,7 @@ import pytest
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.kernels.contact_columns import T_Y
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.system import LAST_STEP
+from railsim.kernels.state import LAST_STEP
 from railsim.kernels.transient import (
     CARRIED,
     CARRIES,
