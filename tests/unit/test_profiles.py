@@ -199,6 +199,14 @@ def test_simpack_file_is_processed_in_its_own_order(tmp_path):
     assert same_contact(profile, "S1002") < 2e-6
 
 
+@pytest.mark.parametrize("key", ["units.ang.f", "units.len.f"])
+@pytest.mark.parametrize("factor", [0, -1])
+def test_simpack_units_that_scale_nothing_are_refused(tmp_path, key, factor):
+    path = written(tmp_path, "p.prw", simpack(*WHEEL, **{key: factor}))
+    with pytest.raises(InputError, match=f"{key}: {factor}; units per"):
+        load_profile(path, "wheel")
+
+
 @pytest.mark.parametrize("noise", [2e-3, 10e-3])
 def test_measuring_noise_is_smoothed_and_the_effect_is_told(tmp_path, noise):
     rng = np.random.default_rng(3)
