@@ -393,9 +393,8 @@ class Output:
         return progress_bar(words, quiet=self.quiet)
 
     def remark(self, text: object) -> None:
-        """Print a remark on stderr, as during a computation; ``--quiet`` not at all."""
-        if not self.quiet:
-            echo(f"remark: {text}", err=True)
+        """Print a remark on stderr, as during a computation: what is damaged also if quiet."""
+        echo(f"remark: {text}", err=True)
 
     def wrote(self, path: str | Path, **facts: Any) -> None:
         """Answer with the only file that a command has written; ``--quiet`` not at all."""
