@@ -57,7 +57,7 @@ class Scene:
     the rail [N]; None for a mode. `contact` (float64[frame, wheelset, 2, 3]): Where they act: of
     the most loaded patch, from the wheelset's centre, NaN without contact; of results without it
     the nominal rolling circles [m]. `sections`: Wheel and rail profiles of each wheelset, left and
-    right, see `railsim.animation.wheels`. `seats` (float64[frame, wheelset, 2]): Height of the
+    right, see `sections`. `seats` (float64[frame, wheelset, 2]): Height of the
     wheelsets' centres, z, at which their wheels touch the drawn rails, and by how much these stand
     further apart than the gauge [m]. `patches`: ``y``, ``z`` [m] and ``N`` [N] of all patches,
     [frame, wheelset, side, patch].

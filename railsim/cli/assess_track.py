@@ -48,6 +48,7 @@ def command(
     from railsim.plot.study import heat_strip
     from railsim.report.assessed_track import assessed_track_page
     from railsim.studies.assess_track import assess_track
+    from railsim.studies.geometry_limits import CELL
     from railsim.studies.rows import speed_of
 
     with output.progress("assess-track") as progress:
@@ -61,8 +62,8 @@ def command(
             **how,
         )
     output.written += found.write()
-    table, strip = found.table(), heat_strip(found.cells, found.shares)
-    output.write("heat_strip.png", heat_strip(found.cells, found.shares))
+    table, strip = found.table(), heat_strip(found.cells, found.shares, CELL)
+    output.write("heat_strip.png", strip)
     page = assessed_track_page(found.table(), found.share, strip, found.notes, found.sections)
     output.write("report.html", page)
     more = len(table) - SHOWN

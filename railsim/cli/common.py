@@ -393,7 +393,7 @@ class Output:
         return progress_bar(words, quiet=self.quiet)
 
     def remark(self, text: object) -> None:
-        """Print a remark on stderr, as during a computation."""
+        """Print a remark on stderr, as during a computation: what is damaged also if quiet."""
         echo(f"remark: {text}", err=True)
 
     def wrote(self, path: str | Path, **facts: Any) -> None:

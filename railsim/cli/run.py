@@ -86,7 +86,8 @@ def command(
     with output.progress(case.name) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **run_facts(result)}
-    remarks = [f"{track}: {remark}" for remark in track_remarks(case.track)]
+    of_track = [f"{track}: {remark}" for remark in track_remarks(case.track)]
+    remarks = () if quiet else (*of_track, *result.remarks)
     parts = [*result_parts(result, remarks), "", str(path)]
     if plots and len(result["time"]):
         from railsim.plot.histories import histories

@@ -102,15 +102,16 @@ def write_folder(
     return [folder / name for name in content]
 
 
-def make_folder(folder: Path) -> None:
-    """Make a folder for output, with those above it.
+def make_folder(folder: Path, parameter: str = "path") -> None:
+    """Make a folder for output, with those above it; `parameter` of a function that names it.
 
     Raises InputError: it cannot be made.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        _refuse(f"cannot make {folder} ({error.strerror})", "choose another folder")
+        words = f"cannot make {folder} ({error.strerror})"
+        _refuse(words, "choose another folder", parameter=parameter)
 
 
 def _refuse(found: str, allowed: str, option: str = "--out", *, parameter: str = "path") -> None:

@@ -16,6 +16,7 @@ from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, argument_error
+from railsim.files.access import make_folder
 from railsim.identification.identified import Channel, Identified, Place
 from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem
@@ -107,7 +108,7 @@ def identify(
     place = place and form == "history"
     kept = None if folder is None else Path(folder)
     if kept is not None:
-        kept.mkdir(parents=True, exist_ok=True)
+        make_folder(kept, "folder")
     with Workers(workers or available_cores()) as pool:
         problem = Problem(
             model, wanted, ready, Form(form, band), place, pool, kept, progress or (lambda _: None)

@@ -128,7 +128,7 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
 
 
 def track_indices(model: Model) -> tuple[list[int], list[str]]:
-    """Integers of the displacements of elastic rails and sleepers in the state, and their names."""
+    """Indices of the displacements of elastic rails and sleepers in the state, and their names."""
     support = model.system.support
     if not support.elastic:
         return [], []

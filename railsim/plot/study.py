@@ -357,15 +357,17 @@ LABELS = {"Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "floor y", "body_z": "f
 
 
 @styled()
-def heat_strip(cells: Floats, shares: Mapping[tuple[str, float, str], Floats]) -> Figure:
+def heat_strip(
+    cells: Floats, shares: Mapping[tuple[str, float, str], Floats], length: float
+) -> Figure:
     """Draw one row for each vehicle, speed and quantity; the colour is the share of the limit.
 
-    `cells`: begin of each along the track, all of one length [m].
+    `cells`: begin of each along the track [m]; `length`: of each [m].
     """
     figure = Picture(10.0, 1.2 + 0.24 * len(shares))
     axes, rows = figure.subplots(), np.arange(len(shares) + 1)
     if shares:
-        edges = np.append(cells, 2.0 * cells[-1] - cells[-2]) / 1e3
+        edges = np.append(cells, cells[-1] + length) / 1e3
         values = np.array([*shares.values()])
         mesh = axes.pcolormesh(edges, rows, values, cmap="inferno_r", vmin=0.0, vmax=1.2)
         figure.colorbar(mesh, ax=axes, label="share of the limit (1)")

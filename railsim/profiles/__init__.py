@@ -59,7 +59,7 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
         from railsim.profiles.recognition import recognised_profile
 
         points = read_profile_file(path)
-        points.file = name_or_path
+        points.file = str(name_or_path)
         return recognised_profile(points, kind)
     else:
         raise input_error(

@@ -200,6 +200,10 @@ def _simpack(file: str, lines: list[str]) -> Points:
         raise input_error(
             file, f"{per_metre:g}", "units per metre, 1000 for millimetres", key="units.len.f"
         )
+    per_radian = values.get("units.ang.f", 1.0)
+    if per_radian <= 0.0:
+        allowed = "units per radian, 57.2958 for degrees"
+        raise input_error(file, f"{per_radian:g}", allowed, key="units.ang.f")
     found = _points(file, rows, unit=1.0 / per_metre, name=title)
     if kind_flag is not None:
         found.kind = "wheel" if kind_flag == 1.0 else "rail"
@@ -223,7 +227,7 @@ def _process_simpack(points: Points, values: dict[str, float]) -> None:
     """Shift, rotate, cut and mirror as the file asks, in its order."""
     points.y = points.y + values.get("shift.y", 0.0)
     points.z = points.z + values.get("shift.z", 0.0)
-    angle = values.get("rotate", 0.0) / (values.get("units.ang.f", 1.0) or 1.0)
+    angle = values.get("rotate", 0.0) / values.get("units.ang.f", 1.0)
     if angle != 0.0:
         cosine, sine = math.cos(angle), math.sin(angle)
         y, z = points.y, points.z

@@ -161,7 +161,8 @@ def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
         pairs = [(f"{key}.{name}" if key else str(name), value) for name, value in node.items()]
         return [row for name, value in pairs for row in _flat(value, name)]
     if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
-        return [(key, f"{len(node)} rows: {'; '.join(map(in_words, node))}"[:60])]
+        count = f"{len(node)} row{'s' * (len(node) > 1)}"
+        return [(key, f"{count}: {'; '.join(map(in_words, node))}"[:60])]
     return [(key, node)]
 
 

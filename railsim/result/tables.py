@@ -72,10 +72,7 @@ def full_curves_table(result: Result, curves: Sequence[MidCurve]) -> Table:
 
 
 def result_parts(result: Result, remarks: Sequence[str] = ()) -> list[str | Table]:
-    """Return how a run ended, its peaks and its values in curves, as lines and tables.
-
-    `remarks` stand before those of the result.
-    """
+    """Return how a run ended, `remarks`, its peaks and its values in curves: lines and tables."""
     facts = result.attributes
     end = f"{result.status}: {facts['status_reason']}"
     if len(result["time"]):
@@ -86,7 +83,7 @@ def result_parts(result: Result, remarks: Sequence[str] = ()) -> list[str | Tabl
         f"  {end}",
         f"  step {1e3 * float(facts['step']):.4g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
-        *(f"  remark: {remark}" for remark in (*remarks, *result.remarks)),
+        *(f"  remark: {remark}" for remark in remarks),
         "",
     ]
     if len(result["time"]):

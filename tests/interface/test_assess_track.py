@@ -7,9 +7,10 @@ import pytest
 
 import railsim
 from railsim.cli import main
+from railsim.plot.study import heat_strip
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
-from railsim.studies.geometry_limits import GEOMETRY, RecordedGeometry
+from railsim.studies.geometry_limits import CELL, GEOMETRY, RecordedGeometry
 from railsim.track.irregularity import displacement
 
 LENGTH, SPEED, DEFECT = 1000.0, 40.0, 640.0
@@ -95,6 +96,12 @@ def test_command(judged, recording, capsys, monkeypatch):
     assert "alignment" in page
     assert "false alarms" in page
     assert "missed" in data["flagged"]
+
+
+def test_the_strip_of_a_single_cell_is_as_long_as_the_cell():
+    shares = {("coach", 40.0, "sum_Y"): np.array([0.5])}
+    axes = heat_strip(np.array([100.0]), shares, CELL).axes[0]
+    assert axes.dataLim.intervalx == pytest.approx([0.1, 0.125])  # km
 
 
 def test_vehicles_that_hunt_are_said():

@@ -19,6 +19,16 @@ def test_check_prints_what_half_the_step_changes(tmp_path, capsys):
     assert "less that at half" in printed
 
 
+def test_quiet_prints_no_remarks(tmp_path, capsys):
+    given = ["--set", "track.speed=60", "--overwrite", "--out", str(tmp_path / "run.h5")]
+    assert main([*SHORT, *given]) == 0
+    assert "  remark: curve_r250: " in capsys.readouterr().out
+    assert main([*SHORT, *given, "--quiet"]) == 0
+    printed = capsys.readouterr()
+    assert "complete: the run reached its end" in printed.out
+    assert "remark: " not in printed.out + printed.err
+
+
 def test_check_in_json_is_the_difference_of_two_runs(tmp_path, capsys):
     path = tmp_path / "run.h5"
     assert main([*SHORT, "--out", str(path), "--check-step", "--json"]) == 0

@@ -23,6 +23,7 @@ import railsim
 from railsim.cli import main
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day, in_words
+from railsim.report.inputs import _flat
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
 from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
@@ -261,6 +262,11 @@ def test_values_are_told_in_words():
     rows = worst_rows([{**r, "labels": {"speed": 20.0 + i}} for i, r in enumerate(records(7))])
     values = [[float(value) for value, _ in row[1:]] for row in rows]
     assert all(row == sorted(row, reverse=True) and len(row) == 5 for row in values)
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "1 row: 0, 1"), (2, "2 rows: 0, 1; 0, 1")])
+def test_rows_of_a_table_are_counted_in_the_differences(count, words):
+    assert _flat({"damper": [(0.0, 1.0)] * count}) == [("damper", words)]
 
 
 def test_thinned_curves_keep_every_peak_and_their_order():

@@ -199,6 +199,24 @@ def test_simpack_file_is_processed_in_its_own_order(tmp_path):
     assert same_contact(profile, "S1002") < 2e-6
 
 
+def test_a_path_is_kept_as_text(tmp_path):
+    path = tmp_path / "wheel.csv"
+    path.write_text(csv_mm(*WHEEL), encoding="utf-8")
+    assert load_profile(path, "wheel").source == str(path)
+    path.write_text("y,z\n1,2\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_profile(path, "wheel")
+    assert caught.value.faults[0].file == str(path)
+
+
+@pytest.mark.parametrize("key", ["units.ang.f", "units.len.f"])
+@pytest.mark.parametrize("factor", [0, -1])
+def test_simpack_units_that_scale_nothing_are_refused(tmp_path, key, factor):
+    path = written(tmp_path, "p.prw", simpack(*WHEEL, **{key: factor}))
+    with pytest.raises(InputError, match=f"{key}: {factor}; units per"):
+        load_profile(path, "wheel")
+
+
 @pytest.mark.parametrize("noise", [2e-3, 10e-3])
 def test_measuring_noise_is_smoothed_and_the_effect_is_told(tmp_path, noise):
     rng = np.random.default_rng(3)

@@ -260,6 +260,12 @@ def test_bad_input_is_one_line(found, keys, how, words):
     assert words in str(caught.value)
 
 
+def test_a_file_in_place_of_the_folder_is_said(found, tmp_path):
+    (tmp_path / "kept").write_text("a file", encoding="utf-8")
+    with pytest.raises(railsim.InputError, match="folder: cannot make"):
+        railsim.identify(quarter(), found[1], [PRIMARY], workers=1, folder=tmp_path / "kept")
+
+
 def test_channels_of_another_vehicle_are_refused(found):
     with pytest.raises(railsim.InputError) as caught:
         railsim.identify("coach_25t", found[1], ["bodies.carbody.mass"], workers=1)
