@@ -4,8 +4,8 @@ The contact ellipse is cut into rectangular cells of constant traction.  `cell_i
 difference of the surface displacements of wheel and rail at a point from the traction of one cell
 (integrals of the solution of Boussinesq and Cerruti over the rectangle, closed form).
 `rolling_matrices` differences them along the rolling direction, `rolling_traction` finds the
-traction that obeys Coulomb's law everywhere.  :mod:`railsim.contact.exact` prepares the grid and
-describes the discretisation; all quantities here are dimensionless (G = mu N = sqrt(a b) = 1).
+traction that obeys Coulomb's law everywhere.  :mod:`railsim.contact.exact_creep` prepares the grid
+and describes the discretisation; all quantities here are dimensionless (G = mu N = sqrt(a b) = 1).
 
 Sources: Kalker, J.J. (1990), Three-Dimensional Elastic Bodies in Rolling Contact, Kluwer, ch. 4
 (the discrete problem); Johnson, K.L. (1985), Contact Mechanics, Cambridge, sec. 3.6 (point force
