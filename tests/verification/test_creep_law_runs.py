@@ -225,7 +225,7 @@ def test_command_says_once_that_the_range_was_left(long_patches, tmp_path, capsy
     file = tmp_path / "run.h5"
     assert cli.main(["run", str(DATA / "single_bogie.toml"), "straight", "--speed", "20",
                      "--duration", "0.1", "--set", "settings.creep_law=polach",
-                     "--out", str(file), "--quiet"]) == 0  # fmt: skip
+                     "--out", str(file)]) == 0  # fmt: skip
     printed = "".join(capsys.readouterr())
     assert printed.count("range of a/b") == 1
     assert open_result(file).remarks[0] in printed
