@@ -1,7 +1,8 @@
 """Slopes of the contact forces on elastic rails that learn from the errors of their forecasts.
 
 After each step of `support_step` the difference of the forces found and foreseen is known.  It goes
-into four numbers a wheel, part of the state, that are added to the slopes of the contact.
+into four numbers a wheel, part of the state, that are added to the slopes of the contact (`learn`).
+Where corrections show that they are wrong they are forgotten (`relax_corrections`).
 """
 
 from railsim.kernels import compiled
@@ -23,7 +24,8 @@ from railsim.kernels.support import BEFORE, L_PATCHES, PATCHES, RELAXATION, SUPP
 WAY, SLIP, WHOLE_STEP = 5e-6, 2.5e-3, 1.25e-3
 GAIN, REST, FORGOTTEN = 0.3, 0.05, 0.01
 LARGE_Y, LARGE_Z = 0.1, 0.3
-# least relaxation of a correction; growth of the squared imbalance beyond which it is forgotten
+# `relax_corrections`: least relaxation; growth of the squared imbalance from which on what the
+# slopes have learnt is forgotten
 LEAST_RELAXATION, WORSE = 0.05, 4.0
 # bounds of what slopes learn [N/m, N s/m]: a rail stays damped
 LEAST_K, MOST_K, MOST_D = -2e7, 3e8, 3e5
