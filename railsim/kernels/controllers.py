@@ -7,6 +7,8 @@ resolution, and is known after its delay.  Everything that changes is in `Work.m
 
 from math import cos, floor, isfinite, log, pi, sqrt
 
+import numpy as np
+
 from railsim.kernels import compiled
 from railsim.kernels.actuators import (
     ABOUT,
@@ -118,15 +120,16 @@ def element_signal(system, work, state, i):
     group, e, column = which[i, GROUP], which[i, OF], which[i, COMPONENT]
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
     inner = state[internal_begin(n) : smoothed_begin(n, m)]
+    row = np.int64(0)  # not the literal, for which the outputs would be compiled once more
     for k in range(out.shape[1]):
-        out[0, k] = 0.0
+        out[row, k] = 0.0
     if group == LINK:
-        link_output(system, work, inner, e, 0, out)
+        link_output(system, work, inner, e, row, out)
     elif group == MOUNT:
-        mount_output(system, work, inner, e, 0, out)
+        mount_output(system, work, inner, e, row, out)
     else:
-        actuator_output(system, work, state, e, 0, out)
-    return out[0, column]
+        actuator_output(system, work, state, e, row, out)
+    return out[row, column]
 
 
 @compiled(python=False)
