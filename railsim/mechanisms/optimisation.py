@@ -32,17 +32,16 @@ from railsim.units import duration_in_words
 
 @dataclass(frozen=True)
 class Effort:
-    """How far a start is followed: rounds, steps in each, and the relative gain that ends it."""
+    """How far a start is followed."""
 
     rounds: int
-    steps: int
-    gain: float
+    steps: int  # in each round
+    gain: float  # relative, of a round: a smaller one ends it
+    checks: int  # between the positions at most; where a constraint is broken, one is added
 
 
-SEARCH = Effort(2, 20, 1e-2)
-FINISH = Effort(4, 25, 1e-3)
-EXCHANGES = 6
-"""Times that positions of broken constraints are added, until none is broken between positions."""
+SEARCH = Effort(2, 20, 1e-2, 0)
+FINISH = Effort(4, 25, 1e-3, 7)
 EVERY = 5  # share of the positions that every start is first judged at
 FINALISTS = 3  # starts that are followed to the end, at all positions
 MOST_STARTS = 10_000
@@ -63,7 +62,8 @@ def optimise(
     starts, seed : int, optional
         Instead of the file's.
     workers : int
-        Processes; the result does not depend on them.
+        Processes; the result does not depend on them, but where this one lets the linear algebra
+        library use several threads: these change last digits, which may turn a start elsewhere.
 
     Raises
     ------
@@ -212,10 +212,10 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
         return Start(index, named, named, np.nan, np.nan, problem.evaluations)
     u, here = _rounds(problem, u, here, effort)
     violation = here.violation
-    for _ in range(EXCHANGES if effort is FINISH else 0):
+    for left in reversed(range(effort.checks)):
         breach, shares = _between(judge, judge.lower + u * problem.span, choice)
         violation = max(here.violation, breach)
-        if not shares or here.violation > FEASIBLE:
+        if not left or not shares or here.violation > FEASIBLE:
             break
         problem.add(shares)
         judged = problem(u)

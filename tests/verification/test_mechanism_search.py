@@ -51,10 +51,11 @@ d = [0.05, 0.25]
 """
 
 
-def test_an_optimum_keeps_its_limits_between_the_positions_too(tmp_path):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_optimum_keeps_its_limits_between_the_positions_too(tmp_path, workers):
     path = tmp_path / "arm.toml"
     path.write_text(ARM)
-    best = optimise(load_mechanism(path))
+    best = optimise(load_mechanism(path), starts=4, workers=workers)  # 4: in processes, if several
     # the longest lever with the rod's angle at the pin 40 degrees at most: d = r sin(40 deg);
     # held at 17 positions only it was 0.19291 and the angle 49.982 degrees
     assert best.parameters["d"] == pytest.approx(0.3 * np.sin(np.radians(40.0)), rel=1e-6)
