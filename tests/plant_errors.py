@@ -103,6 +103,7 @@ def tests_of(path: str, count: int) -> list[str]:
         words = set(re.findall(r"\w+", text))
         score = 5.0 * (dotted in text) + 3.0 * len(names & words) + 2.0 * (module.stem in words)
         score += 1.5 * (module.stem.split("_")[0] in file.stem) + 1.0 * (room in file.stem)
+        score += 4.0 * (file.stem == f"test_{module.stem}")
         score += 0.5 * (f"railsim.{room}" in text)
         scores[str(file.relative_to(ROOT))] = score - 0.00001 * len(text)
     best = sorted(scores, key=lambda name: -scores[name])

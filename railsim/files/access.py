@@ -347,7 +347,7 @@ def sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
                 if not stat.S_ISREG(os.fstat(handle).st_mode):
                     continue
                 if locked(handle):
-                    path.unlink(missing_ok=True)
+                    path.unlink()
                 else:
                     alive += 1
             finally:

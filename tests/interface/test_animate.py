@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
+from railsim.animation.movie import _polygons
 from railsim.animation.page import scene_data
 from railsim.cli import main
 from railsim.definitions.vehicle.flatten import flatten
@@ -204,6 +206,38 @@ def test_film_has_a_picture_for_each_frame(result, tmp_path):
     with Image.open(path) as film:
         assert film.n_frames == 4
         assert np.asarray(film.convert("RGB")).std() > 10.0
+
+
+def test_a_moved_body_is_seen_where_it_would_be_if_it_stood_there(result):
+    """Moved by 0.2 m aside and 0.1 m down, enlarged twice: as one that belongs 0.4 and 0.2 m off.
+
+    To the right is to the right on the screen, down is down, and a track that is turned as a
+    whole is seen as before.
+    """
+    scene = result_scene(result, frames=2)
+    car = scene.bodies[0]
+    still = replace(scene, bodies=(car,), pose=np.zeros((2, 1, 6)))
+    pose = np.zeros((2, 1, 6))
+    pose[0, 0, 1:3] = 0.2, 0.1
+    there = replace(car, y=car.y + 0.4, z=car.z + 0.2)
+
+    def seen(scene, gain=1.0):
+        return [points for *_, points, face, _ in _polygons(scene, 0, gain) if face[0] != "#"]
+
+    moved = seen(replace(still, pose=pose), 2.0)
+    np.testing.assert_allclose(moved, seen(replace(still, bodies=(there,))), atol=1e-12)
+    right, down = np.mean(moved, axis=(0, 1)) - np.mean(seen(still), axis=(0, 1))
+    assert right > 0.2
+    assert down > 0.1
+    track = dict(scene.track)
+    angle = 2.0
+    turned = replace(still, track={
+        **track,
+        "x": np.cos(angle) * track["x"] - np.sin(angle) * track["y"],
+        "y": np.sin(angle) * track["x"] + np.cos(angle) * track["y"],
+        "heading": track["heading"] + angle,
+    })  # fmt: skip
+    np.testing.assert_allclose(seen(turned), seen(still), atol=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")

@@ -27,7 +27,7 @@ def run():
             {
                 "output_rate": 1000.0,
                 "outputs": {"sensors": True, "track": True},
-                "initial": {"carbody": {"roll": 0.01, "vy": 0.1}},
+                "initial": {"carbody": {"roll": 0.01, "pitch": 3e-4, "vy": 0.1}},
             }
         ),
     )
@@ -83,11 +83,18 @@ def test_roll_rate_is_the_rate_of_the_roll():
 
 
 def test_an_accelerometer_feels_gravity_and_the_absolute_acceleration_does_not():
-    """At rest on 50 mm of cant it reads g sin(cant angle) to the left, towards the lower side."""
+    """At rest on 50 mm of cant it reads g sin(cant angle) to the left, towards the lower side.
+
+    Nose up it reads g sin(pitch) ahead, and downwards what is missing of g.
+    """
     difference = of("seat", "acceleration") - of("seat", "absolute_acceleration")
     body = run().bodies.index("carbody")
     lean = run()["body_position"][:, body, 3] + np.arcsin(0.05 / 1.5)
+    pitch = run()["body_position"][:, body, 4]
+    assert 9.81 * np.max(np.abs(pitch)) > 2e-3
+    assert difference[:, 0] == pytest.approx(9.81 * np.sin(pitch), abs=2e-4)
     assert difference[:, 1] == pytest.approx(-9.81 * np.sin(lean), abs=2e-3)
+    assert difference[:, 2] == pytest.approx(9.81 * (1.0 - np.cos(lean)), abs=2e-3)
 
 
 def test_an_axlebox_does_not_spin():

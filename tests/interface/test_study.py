@@ -202,6 +202,9 @@ def test_pictures_of_runs_and_of_vehicles_against_each_other(tmp_path, simulated
         f"{COACH}_{CURVE}_20.png",
         f"compare_{CURVE}_20.png",
     ]
+    (tmp_path / f"{COACH}_{CURVE}_20.h5").unlink()  # computed, and drawn, again
+    assert main(given) == 0
+    assert simulated == [20.0] * 3
 
 
 def test_json_holds_every_record(tmp_path, simulated, capsys):

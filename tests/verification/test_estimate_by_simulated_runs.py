@@ -53,6 +53,21 @@ def test_a_steep_law_is_solved_where_simple_steps_diverge():
     assert np.std(found.fields - truth) < 3.0 * CHANGE < 0.2 * np.std(linear - truth)
 
 
+def test_gaps_and_constants_of_the_data_change_nothing():
+    """r = y less the channel's mean where y is known, whatever stands in its gaps."""
+    truth = smooth()
+    there = np.ones(truth.shape, dtype=bool)
+    there[0, 100:180] = there[1, 50:60] = False
+    y = np.where(there, truth + np.array([[5.0], [-3.0]]), 1e3)
+    found = refined(
+        lambda r: Reading(1.0 * r, np.empty((0, N))), lambda data: data, lambda r: r,
+        (y, there), (np.zeros_like(y), np.ones(2)), 40,
+    )  # fmt: skip
+    mean = np.sum(truth * there, axis=1, keepdims=True) / there.sum(axis=1, keepdims=True)
+    assert found.change < CHANGE
+    assert np.abs(found.fields - np.where(there, truth - mean, 0.0)).max() < 5.0 * CHANGE
+
+
 def test_a_run_that_ends_early_is_said():
     found = refined(
         lambda r: "derailed: wheelset 1", lambda y: y, lambda r: r,

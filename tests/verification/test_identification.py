@@ -407,15 +407,17 @@ def test_friction_of_a_curve_is_found_beside_a_stiffness(tmp_path):
     assert all(channel.is_white for channel in one.channels)
 
 
-def test_a_stretched_arc_length_is_said(tmp_path):
-    """A counter 0.3 % off: the parameters are found all the same, and the counter is named."""
-    path = measured(tmp_path, quarter(), FACTORS)
-    rows = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
+def test_a_stretched_arc_length_is_said(found, tmp_path):
+    """A counter 0.3 % off: the parameters are found all the same, and that run is named."""
+    path = measured(tmp_path, quarter(), FACTORS, name="off")
+    rows = np.loadtxt(tmp_path / "off.csv", delimiter=",", skiprows=1)
     rows[:, 1:3] *= 1.003
-    head = (tmp_path / "run.csv").read_text().partition("\n")[0]
-    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=head, comments="")
-    one = railsim.identify(quarter(), path, [PRIMARY, SECONDARY], band=(0.5, 14.0), workers=1)
-    assert any("stretched by -3.0" in words for words in one.remarks)
+    head = (tmp_path / "off.csv").read_text().partition("\n")[0]
+    np.savetxt(tmp_path / "off.csv", rows, delimiter=",", header=head, comments="")
+    runs, keys = [found[1], path], [PRIMARY, SECONDARY]
+    one = railsim.identify(quarter(), runs, keys, band=(0.5, 14.0), workers=1)
+    (words,) = (words for words in one.remarks if "stretched" in words)
+    assert words.startswith("off: its arc length is stretched by -3.0")
 
 
 def test_a_share_of_profiles_begins_in_the_deepest_of_several_valleys():

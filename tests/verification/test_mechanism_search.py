@@ -6,7 +6,7 @@ import pytest
 from railsim.definitions.loading import load_mechanism
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.judgement import Judgement
+from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
 
@@ -65,6 +65,32 @@ def test_an_optimum_keeps_its_limits_between_the_positions_too(tmp_path, workers
     assert np.degrees(folded(fine.angle("mu"))).min() > 50.0 - 1e-4
     (check,) = (c for c in checks(best.after) if c.name == "mu")
     assert np.degrees(check.value) == pytest.approx(50.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "travel"),
+    [("linear", (1.4, 0.4)), ("constant_force", (0.4, 1.4)), ("peak_force", (1.4, 0.4))],
+)
+def test_gradients_are_those_of_differences_where_parameters_move_the_output(
+    tmp_path, kind, travel
+):
+    """The zone lies at fixed heights: another arm reaches them at other angles."""
+    start, end = travel
+    low, high = sorted((start - end) * h for h in (-0.05, -0.15))
+    path = tmp_path / "arm.toml"
+    head = ARM.partition("[angles.mu]")[0]
+    path.write_text(
+        head.replace("start = 0.4", f"start = {start}").replace("end = 2.4", f"end = {end}")
+        + f"[zone]\nlow = {low}\nwork = {low}\nhigh = {high}\n"
+        + f'[optimise]\nobjective = "{kind}"\nrange = "zone"\ntarget = 2.0\nslope = 3.0\n'
+        + "[optimise.bounds]\nr = [0.2, 0.4]\nd = [0.05, 0.25]\n"
+    )
+    judge, x, h = Judge(load_mechanism(path)), np.array([0.31, 0.12]), 1e-6
+    found = [
+        (judge(x + step, {}).objective - judge(x - step, {}).objective) / (2.0 * h)
+        for step in h * np.eye(2)
+    ]
+    assert judge(x, {}).gradient == pytest.approx(found, rel=1e-6)
 
 
 def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):

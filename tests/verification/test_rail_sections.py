@@ -13,11 +13,14 @@ from scipy.optimize import brentq
 
 from railsim.contact.curves import HALF_WIDTHS, wheel_curve
 from railsim.contact.rail_sections import kinematic_height, rail_parts, rolled_curve
+from railsim.contact.section_tables import Range, section_table
 from railsim.contact.table import _wheel_arrays, ellipse_functions, strip_influence
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.section_files import SectionList, read_sections
 from railsim.errors import InputError
 from railsim.kernels import table_slice as kernel
+from railsim.kernels.contact_table import G as HEIGHT
+from railsim.model.assembly import assemble
 from railsim.profiles import load_profile
 from railsim.result.filters import low_passed
 from railsim.simulation import simulate
@@ -146,6 +149,29 @@ def test_height_on_a_nose_that_rises(wheel):
     assert height == pytest.approx(row["z_mm"], abs=0.003)
     _, ahead, _ = kinematic_height(nose, 1e-3 * row["s_mm"], (wheel.y, wheel.r), RADIUS, 0.0)
     assert 1e3 * ahead == pytest.approx(row["xcp_tr_mm"], abs=0.5)
+
+
+def test_every_table_along_a_rising_rail_lies_higher_by_its_way():
+    """Rising 1:500 all along: heights of the tables lie on a line of that slope within 0.2 um."""
+    y = np.linspace(-0.035, 0.035, 40)
+    s = np.linspace(-0.5, 1.0, 16)
+    sections = SectionList(s, tuple(np.array([y, 1.3e4 * y**4 - 2e-3 * at]) for at in s))
+    settings = load_settings()
+    model = assemble(load_vehicle("coach_manchester"), load_track("straight"), settings)
+    plain, profiles = model.tables[0], (load_profile("S1002"), load_profile("60E1"))
+    given = Range(sections, 0.0, 0.22, 0.75, *profiles, plain, settings.normal_contact)
+    table = section_table(given)
+    (rows,) = table.description["parts"]
+    along, zones = np.array(rows)[:, 0], np.array(rows)[:, 1:].astype(int)
+    fields = table.values.reshape(-1, *table.values.shape[2:])
+    middle, zero = fields.shape[2] // 2, round(-table.y0 / table.dy)
+    height = fields[zones, 0, middle, zero, HEIGHT].min(axis=1)
+    own = (along > 0.0) & (along < 0.22)
+    assert own.sum() >= 3
+    line = height[own][0] - 2e-3 * (along[own] - along[own][0])
+    np.testing.assert_allclose(height[own], line, atol=2e-7)
+    # the first follows from the plain rail, which the range begins with
+    assert height[1] - height[own][0] == pytest.approx(2e-3 * along[own][0], abs=2e-6)
 
 
 @pytest.mark.further
