@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from railsim.contact.creep import LAWS, creep_force
+from railsim.contact.creep_curves import Patch, forces_by_law
 from railsim.contact.kalker import kalker_coefficients
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.definitions.settings import Settings
@@ -180,3 +181,15 @@ def test_linear_is_shen_hedrick_elkins_without_spin():
 def test_options_out_of_range_are_refused(option):
     with pytest.raises(InputError):
         creep_force(**PATCH, xi_x=0.0, xi_y=0.0, phi=0.0, **option)
+
+
+def test_forces_over_their_bounds_do_not_depend_on_the_size_of_the_patch():
+    """Elastic bodies are similar: a patch of twice the axes and four times the load, all laws."""
+    small = forces_by_law(Patch(A, B, N, MU, G))
+    large = forces_by_law(Patch(2.0 * A, 2.0 * B, 4.0 * N, MU, G))
+    for force in ("T_x", "T_y", "M_z"):
+        expected = [row[force] for row in small]
+        assert [row[force] for row in large] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    one = next(row for row in small if row["case"] == "spin" and row["law"] == "linear")
+    _, _, c23, c33 = (float(c) for c in kalker_coefficients(A / B, 0.28))
+    assert one["M_z"] / one["T_y"] == pytest.approx(c33 / c23, rel=1e-9)
