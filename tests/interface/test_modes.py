@@ -3,11 +3,14 @@
 import json
 import re
 
+import numpy as np
 import pytest
 from selection import points
 
 import railsim
 from railsim.cli import main
+from railsim.linear.modes import Mode, Modes
+from railsim.linear.vehicle import Contact
 
 
 def test_modes_at_one_speed(capsys):
@@ -17,6 +20,14 @@ def test_modes_at_one_speed(capsys):
     assert lines[0].endswith("contact tangent")
     assert any(line.startswith("lower sway") for line in lines)
     assert any(line.startswith("front hunting") for line in lines)
+
+
+def test_what_the_table_leaves_out_is_counted():
+    """Above 50 Hz, decaying without oscillation; a mode that a locus lacks here is none."""
+    values = [-1.0 + 376.0j, -1.0 + 390.0j, -3.0 + 0.0j, complex(np.nan), -1.0 + 12.0j]
+    found = Modes(20.0, Contact(), tuple(Mode("", value, {}, {}) for value in values))
+    assert len(found.table().records()) == 1
+    assert found.notes == ("2 oscillations above 50 Hz and 1 modes that do not oscillate: --json",)
 
 
 def test_root_locus_in_json_and_folder(capsys, tmp_path):

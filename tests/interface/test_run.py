@@ -16,6 +16,7 @@ from started import started
 import railsim
 from railsim.cli import main
 from railsim.errors import ModelError
+from railsim.simulation.assumptions import assumptions
 from railsim.simulation.step_choice import StepChoice
 
 COACH = ["run", "coach_manchester", "curve_r250"]
@@ -129,6 +130,18 @@ def test_irregular_rails_are_told(tmp_path, capsys):
     assert main(given) == 0
     expected = "rails     erri_b176_low, seed 7, 3 to 70 m; dip at 2 m; 2 more"
     assert expected in capsys.readouterr().out
+
+
+def test_support_is_told_and_whether_its_values_are_the_presets():
+    coach = railsim.load_vehicle("coach_manchester")
+    for changes, words in (
+        ({"preset": "rigid"}, "rails rigid"),
+        ({"preset": "p2"}, "rails elastic, p2"),
+        ({"preset": "p2", "rail_mass": 80.0}, "rails elastic, p2 with own values"),
+    ):
+        track = railsim.load_track("straight").replace(support=changes)
+        lines = assumptions(coach, track, railsim.Settings(), 20.0)
+        assert f"  support   {words}" in lines
 
 
 def test_run_may_start_anywhere(tmp_path):

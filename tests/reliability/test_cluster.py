@@ -28,10 +28,11 @@ def arrays(folder):
 
 def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
     case = load_case(RunSpec("coach_manchester", "straight", 20.0, until=10.0))
-    job = Job(case, tmp_path / "elsewhere" / case.file_name)
+    job = Job(case, *(tmp_path / "elsewhere" / name for name in (case.file_name, "a.png")))
     (record,), files = perform_there((job,), "nobody made this mark")
     assert record["status"] == "complete"
-    assert set(files) == {case.file_name}
+    assert set(files) == {case.file_name, "a.png"}
+    assert files["a.png"].startswith(b"\x89PNG")
     assert not job.path.parent.exists()
     (tmp_path / "here.h5").write_bytes(files[case.file_name])
     assert open_run(tmp_path / "here.h5").status == "complete"

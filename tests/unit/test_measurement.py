@@ -1,5 +1,6 @@
 """Measured runs: what files say becomes channels in SI, or one clear fault."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -205,6 +206,17 @@ def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):
     inner = slice(20, -20)
     assert run.rate == pytest.approx(50.0)
     assert run["load"][inner] == pytest.approx(LOAD[::10][inner], rel=1e-3)
+
+
+def test_resampling_at_its_own_rate_changes_nothing(tmp_path):
+    """Nor is the last value lost where its time, times the rate, is a little less than whole."""
+    whole = railsim.load_measurement(written(tmp_path))
+    for count in range(2, 300):
+        run = replace(
+            whole, time=whole.time[:count], distance=whole.distance[:count],
+            speed=whole.speed[:count], channels={"load": whole["load"][:count]},
+        )  # fmt: skip
+        assert run.resampled(RATE)["load"] == pytest.approx(run["load"], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,8 @@ def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
         assert found.residual < 1e3 * RESIDUAL
         weight = found.model.system.gravity * np.sum(found.model.system.bodies.mass)
         assert np.sum(found.Q0) == pytest.approx(weight, rel=1e-6)
+        # what the step of a force is measured with
+        assert found.model.system.contact.load == pytest.approx(np.full(2, weight / 4.0))
 
 
 def test_message_names_the_elements_that_alternate(monkeypatch):

@@ -97,5 +97,13 @@ def test_friction_elements_need_their_run_in(monkeypatch):
 
 def test_curving_without_the_forces_of_friction_elements_says_so():
     """Newton's method knows no way into the curve."""
-    found = railsim.curving(test_vehicle("two_axle_wagon"), radius=[600.0])
+    found = railsim.curving(test_vehicle("two_axle_wagon"), radius=[600.0, -600.0])
     assert any("friction elements hold nothing" in remark for remark in found.remarks)
+    # the table of the two is of the outer wheel on either hand
+    right, left = found.table().records()
+    for name in ("Q", "Y_over_Q", "T_gamma"):
+        assert left[name] == pytest.approx(right[name], rel=1e-6)
+    for name in ("Y", "lateral", "attack"):
+        assert left[name] == pytest.approx(-right[name], rel=1e-6)
+    assert right["Y"] < 0.0
+    assert right["Y_over_Q"] == pytest.approx(-right["Y"] / right["Q"])
