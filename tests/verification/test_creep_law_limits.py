@@ -71,16 +71,6 @@ def test_adhesion_curve_is_met_in_every_direction():
         assert not force.M_z.any()
 
 
-def test_tabulated_forces_do_not_depend_on_the_size_of_the_patch():
-    """Similar patches under like pressure: T/(mu N) and M_z/(mu N sqrt(ab)) are the same."""
-    small = forces_by_law(Patch(4e-3, 2e-3, 20e3, 0.3))
-    large = forces_by_law(Patch(12e-3, 6e-3, 180e3, 0.3))
-    for one, other in zip(small, large, strict=True):
-        for name in ("T_x", "T_y", "M_z"):
-            assert one[name] == pytest.approx(other[name], rel=1e-9, abs=1e-12)
-    assert max(abs(row["M_z"]) for row in small) > 0.1
-
-
 def test_spin_of_the_adhesion_curve_is_the_creepage_of_its_force_in_linear_theory():
     _, c22, c23, _ = (float(c) for c in kalker_coefficients(A / B))
     phi = 0.2
