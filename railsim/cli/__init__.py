@@ -146,7 +146,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from click.shell_completion import shell_complete
 
         return shell_complete(railsim, {}, "railsim", COMPLETE, os.environ[COMPLETE])
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         status = _status(arguments)
         cache = sys.modules.get("railsim.kernels.cache")
@@ -164,9 +163,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _status(arguments: list[str]) -> int:
+def _status(given: Sequence[str] | None) -> int:
     """Call a command and return the exit status that its end stands for."""
-    with remembered_interrupts():
+    arguments = sys.argv[1:] if given is None else list(given)
+    with remembered_interrupts(last=given is None):
         try:
             return _called(arguments)
         except InputError as error:

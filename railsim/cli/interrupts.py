@@ -8,14 +8,15 @@ So the signal is remembered as well, and looked at where the work goes on, by
 
 And Python raises nothing at all for as long as one call outside it takes: compiling the time loop
 is minutes.  So a thread listens too; where the program has not ended `PATIENCE` after a signal, it
-ends it, and leaves no hidden file behind.  Streams that are closed or full are made usable here.
+ends it, and leaves no hidden file behind.  Further signals change nothing: they would only disturb
+the end that has begun.  Streams that are closed or full are made usable here.
 """
 
 import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from types import FrameType
@@ -47,8 +48,12 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def remembered_interrupts() -> Iterator[None]:
-    """Remember what is heard within the block; signals that the caller ignores stay ignored."""
+def remembered_interrupts(*, last: bool = False) -> Iterator[None]:
+    """Remember what is heard within the block; signals that the caller ignores stay ignored.
+
+    `last`: The process ends after the block. Once a signal is heard the thread listens until then:
+    the end waits for other threads and processes.
+    """
     before = {}
     if threading.current_thread() is threading.main_thread():
         for number in SIGNALS:
@@ -62,36 +67,36 @@ def remembered_interrupts() -> Iterator[None]:
             told(lost)
 
     sys.unraisablehook = tell
+    end_listening = _listening(set(before)) if before else None
     try:
-        with _listening(set(before)):
-            yield
-    finally:
-        sys.unraisablehook = told
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        _heard.clear()
-
-
-@contextmanager
-def _listening(numbers: set[int]) -> Iterator[None]:
-    """Let a thread end the program where a signal of these is not obeyed within the block."""
-    if not numbers:
         yield
-        return
+    finally:
+        if not (last and _heard):
+            if end_listening is not None:
+                end_listening()
+            sys.unraisablehook = told
+            for number, handler in before.items():
+                signal.signal(number, handler)
+            _heard.clear()
+
+
+def _listening(numbers: set[int]) -> Callable[[], None]:
+    """Let a thread end the program where a signal of these is not obeyed; return how that ends."""
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     ended = threading.Event()
     listener = threading.Thread(target=_listen, args=(reader, numbers, ended), daemon=True)
     listener.start()
     before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    try:
-        yield
-    finally:
+
+    def end() -> None:
         signal.set_wakeup_fd(before)
         ended.set()
         os.close(writer)  # the listener reads an end
         listener.join()
         os.close(reader)
+
+    return end
 
 
 def _listen(reader: int, numbers: set[int], ended: threading.Event) -> None:
@@ -111,8 +116,15 @@ def _end_now(number: int) -> None:
 
 
 def _hear(number: int, _: FrameType | None) -> None:
+    if hasattr(signal, "pthread_sigmask") and number in signal.pthread_sigmask(
+        signal.SIG_BLOCK, ()
+    ):
+        # this thread lets it wait, and another one has taken it
+        signal.pthread_kill(threading.get_ident(), number)
+        return
     _heard.append(number)
-    raise Interrupted(number)
+    if len(_heard) == 1:
+        raise Interrupted(number)
 
 
 def raise_pending_signal() -> None:

@@ -209,6 +209,28 @@ def test_signal_is_obeyed_while_python_cannot(tmp_path):
         assert os.listdir(tmp_path) == []
 
 
+def test_end_that_hangs_is_ended_and_a_second_signal_does_not_disturb_it():
+    """As where a thread of a pool waits for a lock for ever: Python waits for it before it ends."""
+    program = (
+        "import atexit, sys, time; import railsim.cli as cli;"
+        "import railsim.cli.interrupts as interrupts; interrupts.PATIENCE = 2.0;"
+        "atexit.register(time.sleep, 2 * 600);"
+        "cli._called = lambda _: print('begun', flush=True) or time.sleep(600);"
+        "sys.exit(cli.main())"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", f"import signal; {ALLOWED}{program}"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "begun\n"
+    process.send_signal(signal.SIGINT)
+    assert process.stderr.readline() == "railsim: interrupted\n"
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=NEVER)
+    assert process.returncode == 130
+    assert errors == "railsim: interrupted\n"  # by what ends it
+
+
 # a shell that starts the tests in the background has them ignore Ctrl-C, nohup the hang-up
 ALLOWED = (
     "signal.signal(signal.SIGINT, signal.default_int_handler);"
