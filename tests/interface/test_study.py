@@ -27,8 +27,10 @@ import railsim.studies.run
 from railsim.cli import main
 from railsim.errors import InputError, ModelError
 from railsim.studies import execute
+from railsim.studies.case import load_case
 from railsim.studies.journal import Journal
 from railsim.studies.plan import parse_grid
+from railsim.studies.spec import RunSpec
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
 LEFT = {"study.journal", "study.json", "summary.csv"}  # beside the results
@@ -433,6 +435,16 @@ def test_grid_may_vary_values_in_tables(tmp_path):
     assert str(caught.value).startswith(
         "grid: settings.drive.speed_table.2.1: no member '2' in drive.speed_table; allowed"
     )
+
+
+def test_a_run_without_a_speed_begins_with_that_of_its_speed_table(tmp_path):
+    settings = tmp_path / "s.toml"
+    table = "drive = {mode = 'table', speed_table = [[0.0, 20.0], [300.0, 15.0]]}"
+    settings.write_text(f'format = "railsim-settings/1"\n{table}\n')
+    case = load_case(RunSpec(COACH, CURVE, None, settings=settings, start=150.0))
+    assert case.speed == 17.5
+    with pytest.raises(InputError, match="speed: no speed is given"):
+        load_case(RunSpec(COACH, CURVE, None))
 
 
 def test_grid_values_may_be_lists():
