@@ -48,6 +48,17 @@ def test_tables_fold_to_the_width_and_lose_nothing(width):
         assert [line.split() for line in lines] == [line.split() for line in shown]
 
 
+@pytest.mark.parametrize("width", [30, 40, 60])
+def test_words_are_broken_only_where_they_are_longer_than_the_table(width):
+    words = "wheelset leading establishment of guidance".split()
+    short = "to and fro " * 5
+    table = Table(["name", "here", "there"], [[short, " ".join(words), short]] * 2)
+    lines = table.lines(width)
+    assert max(map(len, lines)) <= width
+    shown = " ".join(lines).split()
+    assert all(shown.count(word) == 2 for word in words)
+
+
 def test_numbers_are_not_folded():
     columns = [Column("name"), *(Column(f"length {k}", unit="mm", format=".3f") for k in range(6))]
     table = Table(columns, [["a long name of a body " * 3, *(12.3456 + k for k in range(6))]])
