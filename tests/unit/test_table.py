@@ -50,7 +50,7 @@ def test_tables_fold_to_the_width_and_lose_nothing(width):
 
 @pytest.mark.parametrize("width", [30, 40, 60])
 def test_words_are_broken_only_where_they_are_longer_than_the_table(width):
-    words = "wheelset leading establishment of guidance".split()
+    words = ["wheelset", "leading", "establishment", "of", "guidance"]
     short = "to and fro " * 5
     table = Table(["name", "here", "there"], [[short, " ".join(words), short]] * 2)
     lines = table.lines(width)
