@@ -52,10 +52,10 @@ def test_without_load_the_spring_is_a_shear_beam(K_V, D, H0, load):
     )
 
 
+@pytest.mark.parametrize("y", [5e-3, 1.25e-3])
 @given(K_V=stiffnesses, D=diameters, H0=heights)
-def test_series_and_closed_form_meet_without_a_step(K_V, D, H0):
-    # deflections just below and above the switch at y = (k_h Hs / 2)^2 = 5e-3
-    y = 5e-3
+def test_series_and_closed_form_meet_without_a_step(y, K_V, D, H0):
+    # deflections just below and above the switches, where y = (k_h Hs / 2)^2 or 4 y is 5e-3
     factor = (4 + 2 * NU) / (4 * (1 + NU)) / D**2
     roots = np.roots([factor * (0.5 / (1 + NU) - 1.0), factor * H0, -y])
     dz = min(root.real for root in roots if root.real > 0)
