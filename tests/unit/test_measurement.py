@@ -1,5 +1,6 @@
 """Measured runs: what files say becomes channels in SI, or one clear fault."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import railsim
 from railsim.definitions.measurement import MeasurementFile
 from railsim.measurement.alignment import aligned
 from railsim.measurement.clock import clock_of, delayed
+from railsim.measurement.likeness import suspicions
 from railsim.measurement.position import position
 from railsim.track.alignment import Alignment
 
@@ -199,6 +201,49 @@ def test_clipped_signals_are_said_and_left_out(tmp_path):
     inside = np.isfinite(run["box"])
     assert run["box"][inside] == pytest.approx(BOX[inside], abs=1e-7)
     assert 0.4 < inside.mean() < 0.6
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, []),
+        ({"a": {"factor": -1.0}}, ["a has the opposite sign"]),
+        ({"b": {"factor": 1e3}}, ["b is 1000 times the simulated one"]),
+        ({"b": {"factor": 1.0 / 9.81}}, ["b is 1/9.81 (g) times"]),
+        ({"c": {"late": 0.1}}, ["c comes 100 ms later"]),
+        ({"c": {"late": -0.1}}, ["c comes -100 ms later"]),
+        ({name: {"late": 0.1} for name in "abc"}, []),  # of the place, not of the channels
+        ({"a": {"drift": 0.2}}, ["a: its clock runs apart by "]),
+        (
+            {name: {"drift": 0.2} for name in "abc"},
+            ["All channels run apart from the simulation by "],
+        ),
+    ],
+)
+def test_signs_units_delays_and_clocks_that_look_wrong_are_said(changes, words):
+    """Signals of 0.3 s and longer, put right or wrong; nothing of clocks where none are judged."""
+    step = 0.01
+    time = step * np.arange(4000)
+    rng = np.random.default_rng(4)
+    phases, rates = rng.uniform(0.0, 6.3, (3, 60)), rng.uniform(0.3, 20.0, (3, 60))
+
+    def signal(k, at):
+        return np.cos(np.multiply.outer(at, rates[k]) + phases[k]).sum(axis=-1)
+
+    simulated = {name: signal(k, time) for k, name in enumerate("abc")}
+    measured = {}
+    for k, name in enumerate("abc"):
+        own = {"factor": 1.0, "late": 0.0, "drift": 0.0, **changes.get(name, {})}
+        at = time - own["late"] - own["drift"] * time / time[-1]
+        measured[name] = own["factor"] * signal(k, at)
+    found = suspicions(measured, simulated, step)
+    assert len(found) == min(len(words), 1)
+    assert all(word in text for word in words for text in found)
+    for milliseconds in re.findall(r"apart .*by (\S+) ms", " ".join(found)):
+        assert float(milliseconds) == pytest.approx(200.0, abs=1e3 * step)
+    of_clocks = any("drift" in own or "late" in own for own in changes.values())
+    without = suspicions(measured, simulated, step, clocks=False)
+    assert without == ([] if of_clocks else found)
 
 
 def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):

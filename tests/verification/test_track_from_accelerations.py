@@ -225,6 +225,31 @@ def test_recording_is_read_as_a_track(short, tmp_path):
     assert rows[:, 4] - rows[:, 2] == pytest.approx(found.values[2], abs=1e-8)
 
 
+def test_files_hold_all_estimates_and_forces_in_their_units(short, tmp_path):
+    found = short[3]
+    found.write(tmp_path)
+    arrays = {"s_m": found.s}
+    for q, name in enumerate(QUANTITIES):
+        own = {"": (found.values, found.deviations)}
+        own |= {f"_{band}": (found.bands[band], found.band_deviations[band]) for band in BANDS}
+        for band, (values, deviations) in own.items():
+            arrays[f"{name}{band}_mm"] = 1e3 * values[q]
+            arrays[f"{name}{band}_deviation_mm"] = 1e3 * deviations[q]
+    forces = {"s_m": found.s}
+    for name, values, deviations in zip(
+        found.outputs, found.forces, found.force_deviations, strict=True
+    ):
+        unit, factor = ("mm", 1e3) if name.startswith("lateral") else ("kN", 1e-3)
+        forces[f"{name}_{unit}"] = factor * values
+        forces[f"{name}_deviation_{unit}"] = factor * deviations
+    for file, expected in (("estimates.csv", arrays), ("forces.csv", forces)):
+        head = (tmp_path / file).read_text().partition("\n")[0].split(",")
+        table = np.loadtxt(tmp_path / file, delimiter=",", skiprows=1)
+        assert set(head) == set(expected)
+        for name, column in zip(head, table.T, strict=True):
+            assert np.allclose(column, expected[name], rtol=1e-4, atol=2e-5)
+
+
 @pytest.mark.further
 def test_gaps_signs_and_units(short, coach):
     """A gap of 40 m in one axlebox hardly matters; a wrong sign and a wrong unit are said."""
