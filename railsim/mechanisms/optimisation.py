@@ -62,8 +62,8 @@ def optimise(
     starts, seed : int, optional
         Instead of the file's.
     workers : int
-        Processes; the result does not depend on them, but where this one lets the linear algebra
-        library use several threads: these change last digits, which may turn a start elsewhere.
+        Processes. The result does not depend on their number, unless the linear algebra library
+        uses several threads here: last digits differ then, and a start may end elsewhere.
 
     Raises
     ------

@@ -43,8 +43,7 @@ from railsim.studies.records import Record
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
-GRACE = 3.0  # seconds that running jobs have to stop
-PATIENCE = 20.0  # seconds that a terminated process has to end: it may be compiling
+GRACE = 3.0  # seconds that running jobs have to stop, and terminated processes to end
 POLL = 0.2  # seconds between updates of the progress
 ALWAYS_KEPT = ("time", "distance", "Q0")
 
@@ -459,10 +458,10 @@ def _end(processes: set[BaseProcess]) -> None:
     """Wait a moment for processes to end, terminate the rest, and kill what does not hear that."""
     with signals_later():
         for process in processes:
-            process.join(GRACE / max(1, len(processes)))
+            process.join(GRACE / len(processes))
         for process in processes:
-            if process.is_alive():
-                process.terminate()
-                process.join(PATIENCE)
-                process.kill()
-                process.join()
+            process.terminate()
+        for process in processes:
+            process.join(GRACE / len(processes))
+            process.kill()
+            process.join()

@@ -52,7 +52,6 @@ def test_a_mass_on_springs_to_the_ground_has_its_closed_frequencies():
     frequencies = [mode.natural_frequency for mode in found.oscillations]
     closed = np.sqrt([1e5] * 3 + [2e5, 3e5, 4e5]) / np.sqrt(1e3) / (2.0 * np.pi)
     assert frequencies == pytest.approx(closed, rel=1e-6)
-    assert "0 oscillations above 50 Hz and 0 modes that do not oscillate" in found.notes[0]
 
 
 def test_a_run_on_the_rig_oscillates_as_the_closed_solution():
