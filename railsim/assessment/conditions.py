@@ -159,7 +159,7 @@ def vehicle_conditions(
     found.append(_loads(reports))
     frictions = [mu for run in runs for mu in run.track().friction]
     least = limits.friction
-    words = f"{min(frictions):.3g} to {max(frictions):.3g}"
+    words = " to ".join(dict.fromkeys(f"{mu:.3g}" for mu in (min(frictions), max(frictions))))
     required = f"{least.value:g} at least" if least else ""
     met = bool(least and min(frictions) >= least.value)
     found.append(_compared("friction", words, least, required, met=met))

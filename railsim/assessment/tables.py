@@ -21,7 +21,7 @@ SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "sm
 def tables(assessment: Assessment) -> list[Table]:
     """Return the tables of an assessment."""
     return [
-        *map(zone_table, assessment.zones),
+        *(zone_table(zone) for zone in assessment.zones if zone.nearest),
         *(_comfort(run, points) for run, points in assessment.comfort.items()),
         *(_wear(run, wheels) for run, wheels in assessment.wear.items()),
         *(table for run, report in assessment.safety.items() for table in _safety(run, report)),

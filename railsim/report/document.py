@@ -21,6 +21,7 @@ from railsim.plot.style import styled
 from railsim.version import __version__
 
 Cell = str | tuple[str, str]  # a value, or a value with small print below it
+PASSED, OPEN, FAILED = "", "open", "failed"  # kinds of verdicts: green, without colour, red
 
 
 @dataclass(frozen=True)

@@ -9,21 +9,21 @@ from railsim.assessment import Assessment, assess
 from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.influences import RADIUS
 from railsim.assessment.running import by_vehicle
-from railsim.assessment.verdict import DERAILED, FAIL, PASS
+from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
-from railsim.report.document import Cell, Section, Table
+from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table
 from railsim.result import Result
 from railsim.result.sensors import sensors
 from railsim.text import printable
 
+KINDS = {PASS: PASSED, FAIL: FAILED, DERAILED: FAILED}
 NADAL = (
-    "Nadal's limit (tan gamma - mu)/(1 + mu tan gamma), gamma the flange angle of the profile, mu "
-    "the friction of the track; Y/Q unfiltered at the outputs. The climb is the longest stretch "
-    "above the limit. Overturning is (sum Q_left - sum Q_right)/(sum Q) of a bogie; 1 = a side "
-    "without load."
+    "Nadal's limit (tan γ - μ)/(1 + μ tan γ), γ the flange angle of the profile, μ the friction of "
+    "the track; Y/Q unfiltered at the outputs. The climb is the longest stretch above the limit. "
+    "Overturning is (ΣQ left - ΣQ right)/ΣQ of a bogie; 1: a side without load."
 )
 NOTE = (
     "Estimate from the sections within the standard's conditions, below it the share of the limit, "
@@ -36,14 +36,14 @@ METHOD = {"one": "1-dim.", "two": "2-dim.", "largest": "largest value", "smalles
 MOST = 256  # runs that are assessed; more would take long
 
 
-def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[bool, str]], Section]:
+def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Section]:
     """Assess all runs as `railsim assess` does, also those that are sampled too coarsely.
 
-    EN 14363 as far as the runs cover its zones; Nadal's limit for each run.  Returns: whether each
-    verdict is a pass, and the verdict in a sentence; the section of the page.
+    EN 14363 as far as the runs cover its zones; Nadal's limit for each run.  Returns: the kind
+    of each verdict on the page, and the verdict in a sentence; the section of the page.
     """
     runs = {name: result for name, result in results.items() if len(result["time"])}
-    verdicts, found = list[tuple[bool, str]](), Section("Comparison with limits", id="limits")
+    verdicts, found = list[tuple[str, str]](), Section("Comparison with limits", id="limits")
     if len(runs) > MOST:
         words = f"{len(runs)} runs are not compared with limits; at most {MOST} runs are."
         found.details.append(remark_table([words]))
@@ -54,7 +54,7 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[bool, str]], Sec
         parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
         edition = one.limits.edition if one.limits else ""
         words = f"{one.vehicle}, {edition}: {one.verdict} ({parts})."
-        verdicts.append((one.verdict == PASS, words))
+        verdicts.append((KINDS.get(one.verdict, OPEN), words))
         found.tables.append(_reasons(one))
         found.details += [_conditions(one), _sections(one), *_rows(one)]
         found.details += [_influences(one)] if one.influences else []
@@ -65,7 +65,7 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[bool, str]], Sec
         table, above = _safety(derailment)
         found.tables.append(table)
         if above:
-            verdicts.append((False, f"Limits exceeded: {'; '.join(above)}."))
+            verdicts.append((FAILED, f"Limits exceeded: {'; '.join(above)}."))
     if words_of := _gathered([*remarks, *more], runs):
         found.details.append(remark_table(words_of))
     return verdicts, found
@@ -89,12 +89,16 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
 
 
 def _reasons(one: Assessment) -> Table:
-    """Return the verdicts of a vehicle with their reasons."""
-    deciding, rows, failed = getattr(one.limits, "deciding", ()), [], []
-    for k, (name, verdict) in enumerate(one.verdicts.items()):
-        words = WORDS[name] + ("" if name in deciding else ", for information")
-        rows.append([words, verdict.value, "; ".join(verdict.reasons)])
-        failed += [k] if verdict.value in (FAIL, DERAILED) else []
+    """Return the verdicts of a vehicle with a row for each reason; equal verdicts once."""
+    deciding, rows, failed = getattr(one.limits, "deciding", ()), list[list[str]](), list[int]()
+    groups: dict[Verdict, list[str]] = {}
+    for name, verdict in one.verdicts.items():
+        words = WORDS[name] + ("" if name in deciding else " (for information)")
+        groups.setdefault(verdict, []).append(words)
+    for verdict, names in groups.items():
+        for k, reason in enumerate(verdict.reasons or ("",)):
+            failed += [len(rows)] if KINDS.get(verdict.value) == FAILED else []
+            rows.append(["" if k else ", ".join(names), "" if k else verdict.value, reason])
     header, caption = ["verdict on", "", "reasons"], f"Verdicts: {one.vehicle}"
     return Table(header, rows, caption, range(3), failed)
 
@@ -124,7 +128,7 @@ def _sections(one: Assessment) -> Table:
         for row in one.sections
         for s in [row.section]
     ]  # fmt: skip
-    return Table(header, rows, f"Sections: {one.vehicle}", (0, 1, 10, 11))
+    return Table(header, rows, f"Sections: {one.vehicle}", (0, 10, 11))
 
 
 def _rows(one: Assessment) -> list[Table]:
@@ -145,6 +149,8 @@ def _rows(one: Assessment) -> list[Table]:
                 text(row.limit) if bounded else "none",
                 _origin(row.source, row.checked) if bounded else "for information",
             ])  # fmt: skip
+        if not rows:
+            continue  # no section counts; the reasons are among the conditions
         tables.append(Table(
             header, rows, f"All values: {one.vehicle}, {zone.title}", (0, 1, 5, 11),
             note="line and s_e: regression over the cant deficiency at the admissible one, and its "

@@ -20,7 +20,18 @@ from railsim.notation import QUANTITIES
 from railsim.page import rendered
 from railsim.plot.assessment import assessment_figure
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.document import Cell, Drawing, Section, Table, as_png, day, listed, of_values
+from railsim.report.document import (
+    FAILED,
+    PASSED,
+    Cell,
+    Drawing,
+    Section,
+    Table,
+    as_png,
+    day,
+    listed,
+    of_values,
+)
 from railsim.report.inputs import Used, inputs_of, what_was_run
 from railsim.report.limits import assessed, remark_table
 from railsim.report.published import beside_published
@@ -124,15 +135,16 @@ def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
 
 
 def _verdict(
-    records: Sequence[Record], verdicts: Sequence[tuple[bool, str]]
-) -> list[dict[str, Any]]:
+    records: Sequence[Record], verdicts: Sequence[tuple[str, str]]
+) -> list[dict[str, str]]:
     counts = Counter(str(record["status"]) for record in records)
     whole = counts == {"complete": len(records)}
     words = ", ".join(f"{number} {status}" for status, number in counts.items())
     text = f"All {len(records)} runs are complete." if whole else f"Of {len(records)} runs {words}."
     if len(records) == 1:
         text = f"The run is {words[2:]}."
-    return [{"ok": whole, "text": text}, *({"ok": ok, "text": told} for ok, told in verdicts)]
+    first = PASSED if whole else FAILED, text
+    return [{"kind": kind, "text": words} for kind, words in (first, *verdicts)]
 
 
 def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
@@ -244,7 +256,7 @@ def _published(results: Mapping[str, Result]) -> list[Section]:
             cells.append([row.run, quantity.words, where, *numbers, difference, row.rails])
         first = own[0].study
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
-        header = ["run", "", "read", "published", "here", "difference", "rails of the run"]
+        header = ["run", "quantity", "evaluated at", "published", "computed", "difference", "rails"]
         tables.append(Table(header, cells, first.name, (0, 1, 2, 6), note=note))
     title = "Comparison with published values"
     return [Section(title, tables=tables, id="published")] if tables else []

@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 from railsim.definitions.study.analyses import unit_of_number
-from railsim.notation import QUANTITIES, Quantity
+from railsim.notation import DECIMALS, QUANTITIES, Quantity
 from railsim.text import printable
 
 Record = Mapping[str, Any]
@@ -90,13 +90,16 @@ def command(record: Record, inputs: Mapping[str, Any]) -> str:
 def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
     """Return the values of all runs in the units of printed tables, by the keys of quantities.
 
-    Returns: each with ``words``, ``unit``, and one of ``values`` for each run, or None.
+    Returns: each with ``words``, ``unit``, ``decimals`` (None: four digits), and one of ``values``
+    for each run, or None.
     """
     found: dict[str, dict[str, Any]] = {}
 
     def add(run: int, key: str, words: str, unit: str, value: float) -> None:
-        empty = {"words": words, "unit": unit, "values": [None] * len(records)}
-        column = found.setdefault(key, empty)
+        column = found.setdefault(key, {
+            "words": words, "unit": unit, "decimals": DECIMALS.get(unit or "-"),
+            "values": [None] * len(records),
+        })  # fmt: skip
         if value == value:
             column["values"][run] = float(f"{value:.6g}")
 
@@ -106,6 +109,7 @@ def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
         for key, value in record.get("quantities", {}).items():
             if value is not None:  # of an analysis or of a user function, in SI
                 add(number, key, printable(key), unit_of_number(key), value)
+                found[key]["decimals"] = None  # of any size
     return found
 
 
@@ -139,8 +143,10 @@ def spread_rows(records: Sequence[Record]) -> list[list[str]]:
         if len(pairs) < LEAST:
             continue
         low, high = min(pairs), max(pairs)
-        middle = f"{median(value for value, _ in pairs):.4g}"
-        low_cells, high_cells = ([f"{v:.4g}", str(records[i]["name"])] for v, i in (low, high))
+        middle = _shown(median(value for value, _ in pairs), column)
+        low_cells, high_cells = (
+            [_shown(value, column), str(records[i]["name"])] for value, i in (low, high)
+        )
         rows.append([_heading(column), *low_cells, middle, *high_cells])
     return rows
 
@@ -158,15 +164,23 @@ def worst_rows(records: Sequence[Record]) -> list[list[tuple[str, str] | str]]:
         column = there[key]
         row: list[tuple[str, str] | str] = [_heading(column)]
         for number in _ranked(column["values"])[:WORST]:
-            told = (f"{own['words']} {_text(own['values'][number])}" for own in varied.values())
+            told = (
+                f"{own['words']} {_text(own['values'][number])} {own['unit']}".rstrip()
+                for own in varied.values()
+            )
             where = ", ".join(told) or str(records[number]["name"])
-            row.append((f"{column['values'][number]:.4g}", where))
+            row.append((_shown(column["values"][number], column), where))
         rows.append(row + [""] * (1 + WORST - len(row)))
     return rows
 
 
 def _heading(column: Mapping[str, str]) -> str:
     return column["words"] + (f" ({column['unit']})" if column["unit"] else "")
+
+
+def _shown(value: float, column: Mapping[str, Any]) -> str:
+    decimals = column["decimals"]
+    return f"{value:.4g}" if decimals is None else f"{value:.{decimals}f}"
 
 
 def _text(value: Any) -> str:

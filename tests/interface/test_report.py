@@ -110,7 +110,22 @@ async function probe(frame) {
 """
 
 
-def probed(folder, html, probe=PROBE):
+# What is read on paper: the names of the runs, and no table beyond the edge.
+PAPER = """
+function probe(frame) {
+  const d = frame.contentWindow.document, edge = d.documentElement.clientWidth + 1;
+  return {
+    errors: frame.contentWindow.railsimErrors,
+    names: Array.from(d.querySelectorAll(".readings .chip")).filter(e => e.offsetWidth > 0)
+      .map(e => e.textContent),
+    wide: Array.from(d.querySelectorAll("table")).filter(e =>
+      e.getBoundingClientRect().right > edge).map(e => e.innerText.slice(0, 80)),
+  };
+}
+"""
+
+
+def probed(folder, html, probe=PROBE, widths=(1200, 390)):
     """Open a page at desktop and phone width in one browser; return what was found in each."""
     catch = (
         "window.railsimErrors = [];"
@@ -121,7 +136,7 @@ def probed(folder, html, probe=PROBE):
     watched = watched.replace("<title>", f"<script>{catch}</script><title>", 1)
     (folder / "page.html").write_text(watched, encoding="utf-8")
     frames = "".join(
-        f'<iframe src="page.html" style="width:{w}px;height:900px"></iframe>' for w in (1200, 390)
+        f'<iframe src="page.html" style="width:{w}px;height:900px"></iframe>' for w in widths
     )
     (folder / "probe.html").write_text(
         f"<body>{frames}<pre id=found></pre><script>{probe}"
@@ -206,6 +221,23 @@ def test_page_works_in_a_browser_at_desktop_and_phone_width(html, tmp_path):
         assert all(all(labels) for labels in found["axes"])
         assert found["changed"]
         assert 0.01 < found["ink"] < 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="no chromium")
+def test_printed_page_names_the_runs_of_its_curves_and_cuts_off_no_table(folder, tmp_path):
+    long = {f"coach_manchester_curve_r250_{name}": folder / f"{name}.h5" for name in "abc"}
+    results = {name: railsim.open_result(file) for name, file in long.items()}
+    many = {f"{name}_{k}": r for k in range(4) for name, r in list(results.items())[:2]}
+    runs = [{**run_facts(r), "name": n, "labels": {"speed": 10.0}} for n, r in many.items()]
+    printed = page("Runs", runs, many).replace("@media print", "@media all")
+    printed = printed.replace("@media screen and (max-width", "@media print and (max-width")
+    printed = re.sub("style-src [^;]*", "style-src 'unsafe-inline'", printed)
+    # A4 without its margins, at 96 dots per inch
+    (found,) = probed(tmp_path, printed.replace("<details", "<details open"), PAPER, (688,))
+    assert found["errors"] == []
+    assert found["names"] == list(many)
+    assert found["wide"] == []
 
 
 @pytest.mark.slow
@@ -469,6 +501,12 @@ def test_page_and_assessment_of_a_folder_agree(tmp_path, capsys):
     assert f"{100.0 * row['share']:.0f} %, {row['place']}" in html
     assert all(escape(condition["found"]) in html for condition in found["conditions"])
     assert html.count("run2") > 0
+    # verdicts that are incomplete for the same reasons: neither green nor red, each reason once
+    named = found["vehicle"]
+    assert set(verdicts.values()) == {"incomplete"}
+    assert f'<p class="verdict open">{escape(named)}, ' in html
+    for reason in found["verdicts"]["safety"]["reasons"]:
+        assert html.count(f">{escape(reason)}<") == 1
     # a section without curves says so instead of showing controls
     assert "The results hold none of the quantities that are drawn here." in html
     assert '"curves":[]' in html

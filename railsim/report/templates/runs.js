@@ -13,6 +13,7 @@
   function colour(name) { return getComputedStyle(root).getPropertyValue(name).trim(); }
   function runColour(i) { return colour("--k" + (i % 8)); }
   function faint(c) { return "color-mix(in srgb, " + c + " 20%, transparent)"; }
+  function rough(v) { return Number(v.toPrecision(2)).toString(); }
   function shown(v) { return v === null || v === undefined || isNaN(v) ? "" : Number(v.toPrecision(4)).toString(); }
   function choose(parent, words, options, change) {
     var label = made("label", parent, words + " "), select = made("select", label);
@@ -32,7 +33,8 @@
   function place(plot, box, height) {
     function fit() { plot.setSize({ width: Math.max(200, box.clientWidth), height: height }); }
     drawn.push({ plot: plot, fit: fit });
-    if (window.ResizeObserver) { new ResizeObserver(fit).observe(box); }
+    /* in the next frame: a change of size within the observer is one it complains of */
+    if (window.ResizeObserver) { new ResizeObserver(function () { requestAnimationFrame(fit); }).observe(box); }
   }
   function redraw() { drawn = drawn.filter(function (d) { return d.plot.root.isConnected; }); drawn.forEach(function (d) { d.fit(); d.plot.redraw(false, true); }); }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
@@ -176,7 +178,7 @@
     }
     function detail() {
       var step = x.length > 2 ? x[2] - x[0] : width;
-      note.textContent = data.axis + ". Each pair of points is the smallest and the largest value of " + shown(step) + " " + unit + "; zoomed, down to " + shown(width) + " " + unit + ".";
+      note.textContent = data.axis + ". Each pair of points is the smallest and the largest value within " + rough(step) + " " + unit + "; zoomed, down to " + rough(width) + " " + unit + ".";
     }
     function told(u) {
       var idx = u.cursor.idx;

@@ -11,7 +11,7 @@ window.railsimStudy = function (data, tools) {
   function words(c) { return c.words + (c.unit ? " (" + c.unit + ")" : ""); }
   function parameter(k) { return data.parameters[names[k]]; }
   function isNumber(c) { return c.values.every(function (v) { return typeof v === "number"; }); }
-  function text(v) { return typeof v === "number" ? shown(v) : String(v); }
+  function text(v, decimals) { return typeof v !== "number" ? String(v) : typeof decimals === "number" ? v.toFixed(decimals) : shown(v); }
   function compare(a, b) { return typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b)); }
   /* Classes of a parameter: its values, or ranges of equal width where there are too many. */
   function classes(c, most) {
@@ -200,7 +200,8 @@ window.railsimStudy = function (data, tools) {
       button.type = "button";
       button.addEventListener("click", function () { falling = by === k ? !falling : typeof c.values[0] === "number"; by = k; draw(); });
     });
-    function row(r) { return columns.map(function (c) { return c.values[r] === null ? "" : text(c.values[r]); }); }
+    function row(r) { return columns.map(function (c) { return c.values[r] === null ? "" : text(c.values[r], c.decimals); }); }
+    function kind(c) { return c.values.some(function (v) { return typeof v === "string"; }) ? "words" : undefined; }
     function draw() {
       var wanted = filter.value.toLowerCase().split(/\s+/), found;
       order.sort(function (a, b) {
@@ -215,11 +216,11 @@ window.railsimStudy = function (data, tools) {
       body.textContent = "";
       found.forEach(function (r) {
         var line = made("tr", body, undefined, data.runs[r].status === "complete" ? "" : "failed");
-        row(r).forEach(function (cell) { made("td", line, cell); });
+        row(r).forEach(function (cell, k) { made("td", line, cell, kind(columns[k])); });
         line.addEventListener("click", function () { command.textContent = [data.runs[r].reason, data.runs[r].command].filter(Boolean).join(" — "); });
       });
       count.textContent = found.length === total ? total + " runs" : found.length + " of " + total + " runs";
-      Array.from(head.children).forEach(function (th, k) { th.className = k === by ? (falling ? "falling" : "rising") : ""; });
+      Array.from(head.children).forEach(function (th, k) { th.className = [kind(columns[k]), k === by ? (falling ? "falling" : "rising") : ""].join(" "); });
     }
     filter.addEventListener("input", draw);
     made("p", box, "Click a heading to sort, a row for its reason and its command.", "notes");
