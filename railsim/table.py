@@ -93,7 +93,8 @@ class Column:
         '72'
         """
         if isinstance(value, Amount):
-            return value.column.text(value.value)
+            unit = f" {value.column.unit}" if value.with_unit and value.column.unit else ""
+            return value.column.text(value.value) + unit
         if value is None:
             return ""
         if isinstance(value, bool) or not isinstance(value, Real):
@@ -105,10 +106,15 @@ class Column:
 
 
 class Amount(NamedTuple):
-    """A cell whose quantity is not its column's, as where rows are quantities."""
+    """A cell whose quantity is not its column's, as where rows are quantities.
+
+    >>> Column("value").text(Amount(95040.0, Column("Q", unit="kN", format=".1f"), with_unit=True))
+    '95.0 kN'
+    """
 
     value: Any
     column: Column
+    with_unit: bool = False  # whether its unit stands behind it
 
 
 class Table:

@@ -370,7 +370,7 @@ def heat_strip(
         edges = np.append(cells, cells[-1] + length) / 1e3
         values = np.array([*shares.values()])
         mesh = axes.pcolormesh(edges, rows, values, cmap="inferno_r", vmin=0.0, vmax=1.2)
-        figure.colorbar(mesh, ax=axes, label="share of the limit (1)")
+        figure.colorbar(mesh, ax=axes, label="share of the limit")
     words = [
         f"{vehicle}, {3.6 * speed:.0f} km/h, {LABELS.get(q, q)}" for vehicle, speed, q in shares
     ]

@@ -8,7 +8,7 @@ from railsim.report.document import Section, as_png, document, pictures
 from railsim.table import Table
 
 MOST_ROWS = 200
-CAPTIONS = {"heat": "Largest share of each limit over the arc length; blank where no run came."}
+CAPTIONS = {"heat": "Largest share of each limit over the arc length; blank without a run."}
 METHOD = (
     "Q, Y/Q, sum Y and accelerations of the floor, low-passed at 20 Hz, Y/Q and sum Y as mean over "
     "2 m, against the limits of EN 14363. A section counts as flagged by vehicles where one of "
@@ -22,7 +22,8 @@ def assessed_track_page(
 ) -> str:
     """Return the page as HTML: places beyond a share of a limit, heat strip, sections."""
     number = len(places)
-    text = f"At {number} places a vehicle exceeds {share:g} of a limit."
+    at = f"{number} place{'s' * (number != 1)}"
+    text = f"At {at} a vehicle exceeds {100.0 * share:g} % of a limit."
     texts = [f"The first {MOST_ROWS} of {number}; all are in places.csv."]
     places.rows = places.rows[:MOST_ROWS]
     heat = pictures({"heat": as_png(strip)}, CAPTIONS)

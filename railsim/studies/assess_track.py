@@ -37,15 +37,18 @@ from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, RecordedGeometry
 from railsim.studies.outcome import Outcome
 from railsim.studies.spec import StudySpec
-from railsim.table import Column, Table
+from railsim.table import Amount, Column, Table
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
 APART = 25.0  # m
 RATE, LOW_PASS, SLIDING = 100.0, 20.0, 2.0  # 1/s, Hz, m
 QUANTITIES = {
-    "Q": "Q", "Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "acceleration of the floor, y",
-    "body_z": "acceleration of the floor, z",
-}  # fmt: skip
+    "Q": Column("Q", unit="kN", format=".1f"),
+    "Y_over_Q": Column("Y/Q", format=".3f"),
+    "sum_Y": Column("sum Y", unit="kN", format=".1f"),
+    "body_y": Column("lateral acceleration of the floor", unit="m/s2", format=".2f"),
+    "body_z": Column("vertical acceleration of the floor", unit="m/s2", format=".2f"),
+}
 UNCHECKED = "The limits of EN 13848-5 are from memory, not compared with the printed standard."
 
 
@@ -105,22 +108,26 @@ class TrackAssessment:
         """Return the places."""
         columns: list[Column | str] = ["vehicle", Column("speed", unit="km/h", format=".0f"),
                    Column("s", "at s", "m", ".0f"), "quantity", "location",
-                   Column("value", "value (SI)", "", ".4g"),
+                   Column("value", format=".2f"),
                    Column("share", "of the limit", "", ".2f"),
                    "shape"]  # fmt: skip
-        rows = [[p.vehicle, p.speed, p.s, QUANTITIES[p.quantity], p.where, p.value,
-                 p.value / p.limit, p.shape] for p in self.places]  # fmt: skip
+        rows = []
+        for p in self.places:
+            shown = QUANTITIES[p.quantity]
+            value = Amount(p.value, shown, with_unit=True)
+            rows.append([p.vehicle, p.speed, p.s, shown.name, p.where, value, p.value / p.limit,
+                         p.shape])  # fmt: skip
         return Table(columns, rows)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Misses and false alarms in words."""
         both, missed, false, none, left = self.flagged.tolist()
-        not_run = f" {left} sections some vehicle did not run over." if left else ""
+        not_run = f" Over {left} sections some vehicle did not run." if left else ""
         return (
-            f"Of {both + missed + false + none} sections of {SECTION:g} m vehicles and geometry "
-            f"both flag {both}, only the vehicles {missed} (missed by geometry limits), only "
-            f"geometry limits {false} (false alarms).{not_run}",
+            f"Of {both + missed + false + none} sections of {SECTION:g} m, {both} are flagged by "
+            f"vehicles and geometry, {missed} only by vehicles (missed by geometry limits), "
+            f"{false} only by geometry (false alarms).{not_run}",
             UNCHECKED,
             *self.remarks,
         )
