@@ -50,11 +50,14 @@ QUANTITIES = {one.name: one for one in (
     Compared("Q_max", "wheel load", "kN", "Q", FORCES, lambda x, _: ends(x, 1)),
     Compared("Y_over_Q_max", "Y/Q, 2 m", "", "Y_over_Q", FORCES, _outwards, True, 2.0),
     Compared("sum_Y_max", "track shift force, 2 m", "kN", "sum_Y", FORCES, _outwards, False, 2.0),
-    Compared("body_y_qst", "body lateral, quasi-static", "m/s2", "bodyy", FORCES, middle, True),
-    Compared("body_y_max", "body lateral, 0.4 to 10 Hz", "m/s2", "bodyy", RIDE_BAND, both_ends),
-    Compared("body_z_max", "body vertical, 0.4 to 10 Hz", "m/s2", "bodyz", RIDE_BAND, both_ends),
-    Compared("body_y_rms", "body lateral, rms", "m/s2", "bodyy", RIDE_BAND, rms),
-    Compared("body_z_rms", "body vertical, rms", "m/s2", "bodyz", RIDE_BAND, rms),
+    Compared("body_y_qst", "lateral body acceleration, quasi-static", "m/s2",
+             "bodyy", FORCES, middle, True),
+    Compared("body_y_max", "lateral body acceleration, 0.4 to 10 Hz", "m/s2",
+             "bodyy", RIDE_BAND, both_ends),
+    Compared("body_z_max", "vertical body acceleration, 0.4 to 10 Hz", "m/s2",
+             "bodyz", RIDE_BAND, both_ends),
+    Compared("body_y_rms", "lateral body acceleration, rms", "m/s2", "bodyy", RIDE_BAND, rms),
+    Compared("body_z_rms", "vertical body acceleration, rms", "m/s2", "bodyz", RIDE_BAND, rms),
 )}  # fmt: skip
 """What is compared, in the order of tables."""
 
@@ -172,7 +175,7 @@ class ModelValidation:
             [
                 Column("quantity"), Column("words", " "), Column("unit"),
                 Column("sections", format="d"), Column("values", format="d"),
-                Column("mean", format=".2f"), Column("mean_limit", "limit +-", format=".2f"),
+                Column("mean", format=".2f"), Column("mean_limit", "limit, ±", format=".2f"),
                 Column("deviation", "standard deviation", format=".2f"),
                 Column("limit", format=".2f"), Column("verdict"),
             ],
@@ -180,11 +183,19 @@ class ModelValidation:
         )  # fmt: skip
 
     def section_table(self) -> Table:
-        """Return all values, measured and simulated [SI]."""
-        rows = [[*vars(p).values(), p.difference] for one in self.comparisons for p in one.pairs]
-        words = (*Pair.__dataclass_fields__, "difference")
-        columns = [Column(name, format=".6g" if k > 2 else "") for k, name in enumerate(words)]
-        return Table(columns, rows)
+        """Return all values, measured and simulated, shown in the units of `table`."""
+        rows: list[list[object]] = []
+        for one in self.comparisons:
+            c = one.quantity.column
+            for p in one.pairs:
+                values = (Amount(v, c) for v in (p.measured, p.simulated, p.difference))
+                radius = p.radius if math.isfinite(p.radius or math.inf) else None  # straight
+                rows.append([p.quantity, p.run, p.place, p.begin, p.end, radius, *values])
+        lengths = [Column(name, unit="m", format=".0f") for name in ("begin", "end", "radius")]
+        words = ("measured", "simulated", "difference")
+        return Table(
+            ["quantity", "run", "place", *lengths, *(Column(w, format=".3f") for w in words)], rows
+        )
 
     def record(self) -> dict[str, Any]:
         """Return the comparison as plain values, SI."""

@@ -344,7 +344,7 @@ def parameter_table(record: Mapping[str, Any]) -> Table:
         [
             Column("parameter"),
             Column("value", "value (SI)", format=".5g"),
-            Column("factor", "factor on the file", format=".4f"),
+            Column("factor", "factor on the file's value", format=".4f"),
             Column("deviation", "standard deviation (%)", format=".2f"),
             Column("low", "95 % from", format=".4f"),
             Column("high", "to", format=".4f"),
@@ -358,7 +358,7 @@ def correlation_table(record: Mapping[str, Any]) -> Table:
     names = [one["name"] for one in record["parameters"]]
     columns = [Column("parameter"), *(Column(name, format=".2f") for name in names)]
     pairs = zip(names, record["correlation"], strict=True)
-    return Table(columns, [[name, *row] for name, row in pairs])
+    return Table(columns, [[name, *row] for name, row in pairs], "Correlation of the values")
 
 
 def residual_table(record: Mapping[str, Any]) -> Table:
@@ -371,7 +371,7 @@ def residual_table(record: Mapping[str, Any]) -> Table:
             Column("before", "before (% of rms)", format=".1f"),
             Column("after", "after (% of rms)", format=".1f"),
             Column("level", "residual over noise", format=".2f"),
-            Column("probability", "probability of white", format=".2g"),
+            Column("probability", "p-value, white", format=".2g"),
             Column("white"),
         ],
         [{**one, "white": words[one["white"]]} for one in record["channels"]],

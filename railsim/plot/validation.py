@@ -19,7 +19,11 @@ NEAR = 200.0  # m to both sides of the middle of a run, of which channels are dr
 
 def _shown(quantity: str) -> tuple[float, str]:
     found = quantity_of(quantity)
-    return (found.scale, found.shown_unit) if found is not None else (1.0, "SI")
+    return (found.scale, _written(found.shown_unit)) if found is not None else (1.0, "SI")
+
+
+def _written(unit: str) -> str:
+    return unit.replace("s2", "s²")
 
 
 def scatter(validation: ModelValidation) -> Figure:
@@ -37,10 +41,10 @@ def scatter(validation: ModelValidation) -> Figure:
                 axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
         axes.plot(*both, ".", color="C3" if one.verdict == "fail" else "C0")
         axes.set(xlim=ends, ylim=ends)
-        unit = one.quantity.column.unit
+        unit = f" ({_written(one.quantity.column.unit)})" if one.quantity.column.unit else ""
         axes.set_title(f"{one.quantity.name}: {one.verdict}", fontsize="small")
-        axes.set_xlabel(f"measured{f' ({unit})' if unit else ''}", fontsize="small")
-        axes.set_ylabel("simulated", fontsize="small")
+        axes.set_xlabel(f"measured{unit}", fontsize="small")
+        axes.set_ylabel(f"simulated{unit}", fontsize="small")
     return figure
 
 
@@ -83,7 +87,10 @@ def _over_arc(
         for name, colour in lines.items():
             axes.plot(s[rows], scale * getattr(one, name)[rows], color=colour, lw=lw, label=name)
         axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
-    grid[0].legend(fontsize="small", ncols=len(lines), loc="upper right")
+    grid[0].legend(
+        fontsize="small", ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+    )  # fmt: skip
     grid[-1].set_xlabel("arc length (m)")
     return figure
 
@@ -136,6 +143,7 @@ def residual_spectra(found: Identified) -> Figure:
         axes.plot(f[inside], summed, color="C0" if one.is_white else "C3")
         white = "white" if one.is_white else "not white"
         axes.set_title(f"{one.name}: {white}", fontsize="small")
+        axes.set_ylabel("share of the power", fontsize="small")
         axes.set_xlabel("frequency (Hz)", fontsize="small")
     return figure
 

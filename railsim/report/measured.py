@@ -36,6 +36,7 @@ VALIDATION = (
     "20 Hz, accelerations of the body between 0.4 and 10 Hz. A difference is simulated less "
     "measured, positive where the simulation overestimates the magnitude.",
 )
+UNITS = "Units as in the table of differences; radius positive for curves to the right."
 IDENTIFICATION = (
     "Least squares over the Fourier coefficients of the differences in the band (or the values "
     "named), weighted by the noise of each channel; the covariance is the inverse of J'J with the "
@@ -103,11 +104,12 @@ def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
     sections = [
         Section("Differences and limits", tables=[found.table()]),
         Section("Pictures", drawings=[*_drawn(validation_figures(found)), *more]),
-        Section("Values of the sections (SI)", tables=[found.section_table()]),
+        Section("Values of the sections", [UNITS], [found.section_table()]),
     ]
     title = f"{found.vehicle} against {', '.join(found.runs)}"
     method = (*VALIDATION, found.edition)
-    return Part(title, text, found.verdict != FAIL, found.remarks, sections, method)
+    good = found.verdict not in words
+    return Part(title, text, good, found.remarks, sections, method)
 
 
 def identification_figures(found: Identified) -> dict[str, Figure]:
