@@ -41,6 +41,6 @@ def irregularity_figure(found: Irregularity) -> Figure:
                 lw=0.9, label=QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None,
             )  # fmt: skip
     axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")
-    axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="variance explained (1)")
+    axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="share of the variance explained")
     axes[SHOWN].legend(loc="lower right")
     return figure

@@ -137,7 +137,7 @@ def _conicity(axes: Axes, conicity: Conicity) -> None:
     """Equivalent conicity, on the amplitudes of the diagram beside it."""
     values, amplitudes = np.array(conicity.conicity), 1e3 * np.array(conicity.amplitude)
     axes.plot(values, amplitudes, color="0.25")
-    axes.set(xlabel="equivalent conicity (1)", title="Conicity (EN 15302)")
+    axes.set(xlabel="equivalent conicity", title="Conicity (EN 15302)")
     shown = values[amplitudes <= max(axes.get_ylim()[1], SMALL_AMPLITUDES)]
     axes.set_xlim(0.0, 1.1 * np.max(shown) if len(shown) else None)
     axes.tick_params(labelleft=False)
