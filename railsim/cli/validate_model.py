@@ -16,6 +16,7 @@ from railsim.cli.common import (
     option,
     output_options,
 )
+from railsim.errors import input_error
 from railsim.files.access import RESULTS
 
 if TYPE_CHECKING:
@@ -61,6 +62,8 @@ def command(
 
     output.reserve(*FILES)
     names = [f for f in files if not (os.path.isdir(f) or Path(f).suffix.lower() in RESULTS)]
+    if not names:
+        raise input_error("MEASURED.toml", "none given", "a measurement file for each run")
     runs = [load_measurement(name) for name in names]
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
     found = validate_model(runs, results, limits=limits)
@@ -86,7 +89,6 @@ def _results(
     names: list[str], runs: "list[Measurement]", files: list[str], vehicle: str | None
 ) -> "list[Result]":
     """Return the results that belong to measured runs; simulated where none are given."""
-    from railsim.errors import input_error
     from railsim.result import open_run
 
     if not files:

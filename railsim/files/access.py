@@ -201,7 +201,7 @@ def read_text(path: str | Path, limit: int) -> str:
     try:
         return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise input_error(str(path), "not a UTF-8 text", "a text file") from None
+        raise input_error(str(path), "not UTF-8 text", "convert it, as by `iconv -t utf-8`") from None
 
 
 # writing ------------------------------------------------------------------------------------------

@@ -171,10 +171,12 @@ def _parsed(text: str) -> Parameter:
 
 
 def present(definition: FileDefinition, key: str) -> tuple[list[str], Any]:
-    """Return the whole path of a key and what the definition has there."""
+    """Return the whole path of a key and what the definition has there; KeyError: nothing."""
     tables = tomllib.loads(definition.to_toml())
     path = full_path(tables, key_path(key))
     parent, last = descend(tables, path)
+    if isinstance(parent, dict) and last not in parent:
+        raise KeyError(f"no value '{last}'", nearest(last, parent))
     return path, parent[last]
 
 

@@ -251,6 +251,7 @@ def test_tables_scale_their_forces_only():
         ([PRIMARY], {"band": (0.5, 90.0)}, "225 at least for a band up to 90 Hz"),
         ([PRIMARY], {"form": "shapes"}, "history, spectra, sections"),
         ([PRIMARY + ":2:3"], {}, "factors below and above 1"),
+        (["bodies.body.mas"], {}, "no value 'mas'; did you mean 'mass'?"),
     ],
 )
 def test_bad_input_is_one_line(found, keys, how, words):
