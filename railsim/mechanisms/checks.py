@@ -142,7 +142,7 @@ def _gas_spring(result: Analysis, name: str, spring: GasSpring) -> Iterator[Chec
     above = value < 0.5 * (low + high)
     limit, sense = (low, "above") if above else (high, "below")
     note = "temperature against the range in service"
-    yield Check(f"{name}_temperature", value, limit, sense, "C", note)
+    yield Check(f"{name}_temperature", value, limit, sense, "°C", note)
     if spring.rod_end is not None:
         note = "height of the body's end over the rod's, compressed: the rod must point down"
         drop = rod_drop(result, name)

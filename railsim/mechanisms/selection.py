@@ -120,7 +120,7 @@ def _gas_spring(
         stroke = next((c for c in strokes if c >= compressed * (1.0 - ROUNDING)), None)
         if stroke is None:
             why.append(f"compressed by {compressed * 1e3:.1f} mm, {strokes[-1] * 1e3:g} mm at most")
-    said = () if stroke is None else (f"stroke {stroke * 1e3:g} mm",)
+    said = () if stroke is None else (f"stroke {stroke * 1e3:.4g} mm",)
     values: dict[str, float] = {}
     if not why and stroke is not None:
         values = _with_row(result, name, spring, row, stroke, extended)

@@ -110,7 +110,8 @@ def selection_table(choices: Sequence[Choice]) -> Table:
             ("force", "force_least", "force_most"),
             ("extreme", "force_lowest", "force_highest"),
         ):
-            row[column] = f"{v[low]:.1f} to {v[high]:.1f}" if low in v else "-"
+            ends = dict.fromkeys(f"{v[end]:.1f}" for end in (low, high) if end in v)
+            row[column] = " to ".join(ends) or "-"
         rows.append(row)
     return Table(SELECTION, rows)
 
@@ -255,11 +256,18 @@ def scatter_table(found: Sequence[Scatter]) -> Table:
     """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
     for one in found:
-        column = Column("", unit=shown_unit(one.unit), format=".4f")
+        column = Column("", unit=shown_unit(one.unit), format=_decimals(one))
         most = max(one.single, key=lambda name: abs(one.single[name]))
         values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
-        change = one.single[most] * column.scale
+        change = f"{one.single[most] * column.scale:+{column.format}}"
         name = f"{one.name} ({column.unit})" if column.unit else one.name
-        rows.append([name, *values, f"{most} ({change:+.4f})"])
+        rows.append([name, *values, f"{most} ({change})" if one.single[most] else "-"])
     numbers = [Column(name, format=">") for name in ("nominal", "RSS, ±", "worst case, ±")]
     return Table(["result", *numbers, "most by"], rows)
+
+
+def _decimals(one: Scatter) -> str:
+    """Return the format with four digits of the scatter, four decimals at most."""
+    shown = abs(one.worst) * Column("", unit=shown_unit(one.unit)).scale
+    before = int(np.floor(np.log10(shown))) if shown else 0
+    return f".{min(max(3 - before, 0), 4)}f"
