@@ -38,6 +38,9 @@ def command(kinds: tuple[str, ...], draw: str | None, output: Output) -> None:
     parts: list[str | Table] = []
     for kind in kinds or known:
         rows = [entry for entry in entries if entry["kind"] == kind]
+        if not rows:
+            parts += [f"{kind}: none", ""]
+            continue
         graded = any(entry["trust"] for entry in rows)
         quality = [Column("trust", "source quality")] * graded
         parts += [kind, Table([Column("name"), *quality, Column("title", " ")], rows), ""]

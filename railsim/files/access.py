@@ -201,7 +201,8 @@ def read_text(path: str | Path, limit: int) -> str:
     try:
         return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise input_error(str(path), "not UTF-8 text", "convert it, as by `iconv -t utf-8`") from None
+        allowed = "convert it, as by `iconv -t utf-8`"
+        raise input_error(str(path), "not UTF-8 text", allowed) from None
 
 
 # writing ------------------------------------------------------------------------------------------
