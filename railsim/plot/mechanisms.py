@@ -25,7 +25,7 @@ from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.plot.point_names import name_points
-from railsim.plot.style import ABOVE, BESIDE, DISTINCT, LIMIT, Picture, distinct, note
+from railsim.plot.style import ABOVE, BESIDE, DISTINCT, LIMIT, Picture, distinct, note, styled
 
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
@@ -109,6 +109,7 @@ def three_rows(
     return figure, rows
 
 
+@styled()
 def drawing_figure(result: Analysis) -> Figure:
     """The mechanism in four positions, and its working parts with the names of their points."""
     model = result.model
@@ -184,6 +185,7 @@ def mark_points(axes: Axes, motion: Motion, box: Any) -> None:
     name_points(axes, named, [line.xy[0] * 1e3 for line in lines(motion)])
 
 
+@styled()
 def kinematics_figure(result: Analysis) -> Figure:
     """Angles of bodies and rods over the driver, their rates and accelerations."""
     motion, travel = result.motion, quantity("travel", result.definition)
@@ -201,6 +203,7 @@ def kinematics_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def actuators_figure(result: Analysis) -> Figure:
     """Lengths of the actuators, their speeds and accelerations; in time where there is a law."""
     courses, over = actuators(result.motion), values_of("travel", result)
@@ -213,6 +216,7 @@ def actuators_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def path_figure(result: Analysis) -> Figure:
     """Path of the output, with the zone."""
     figure, axes = single(4.6, 5.2)
@@ -226,6 +230,7 @@ def path_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def angles_figure(result: Analysis) -> Figure:
     """Transmission angles, folded, with their limit, and pressure angles of cams."""
     figure, axes = single(7.0, 3.6)
@@ -242,6 +247,7 @@ def angles_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def cam_figure(result: Analysis) -> Figure:
     """Rate of the rocker on every arc of the cam, with the transitions."""
     motion = result.motion
@@ -276,6 +282,7 @@ def cam_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def force_figure(result: Analysis) -> Figure:
     """Ratios and force of the actuator over its length and over the height."""
     over = [name for name in ("length", way(result)) if name in result.output]
@@ -297,6 +304,7 @@ def force_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def pressure_figure(result: Analysis) -> Figure:
     """Pressure that the mechanism needs, over the height."""
     figure, axes = single(6.4, 3.4)
@@ -309,6 +317,7 @@ def pressure_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def contact_figure(result: Analysis) -> Figure:
     """Static contact force at constant pressure, over the height."""
     contact = result.contact
@@ -324,6 +333,7 @@ def contact_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def carpet_figure(result: Analysis) -> Figure:
     """Carpet of the air spring: force over height and pressure, with the mechanism's load."""
     assert result.definition.solve is not None
@@ -346,6 +356,7 @@ def carpet_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def gas_spring_figure(result: Analysis) -> Figure:
     """Length and force of the gas springs over the driver."""
     names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
@@ -358,6 +369,7 @@ def gas_spring_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def time_figure(result: Analysis) -> Figure:
     """Motion in time: driver, output's speed and acceleration, driving force."""
     timed = result.timed
@@ -382,6 +394,7 @@ def time_figure(result: Analysis) -> Figure:
     return figure
 
 
+@styled()
 def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     """Unknown force over the driver, for all cases of a mechanism."""
     figure, axes = single(6.6, 3.6)
@@ -397,6 +410,7 @@ def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     return figure
 
 
+@styled()
 def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) -> Figure:
     """Ratio and force of several mechanisms over the height.
 
@@ -426,6 +440,7 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
     return figure
 
 
+@styled()
 def held_figure(results: Mapping[str, Analysis]) -> Figure:
     """Pressures that several mechanisms need, and their contact forces at the held pressures."""
     figure = Picture(7.6, 3.8)
@@ -460,6 +475,7 @@ def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Float
     return x, y
 
 
+@styled()
 def search_figure(optimum: "Optimum") -> Figure:
     """Objective at the end of every start, feasible or not, and the best."""
     figure, axes = single(6.4, 3.6)

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 
 from railsim.arrays import Floats
 from railsim.definitions.spring import TrailingArmSuspension
-from railsim.plot.style import ABOVE, DISTINCT, LIMIT, Picture, note
+from railsim.plot.style import ABOVE, DISTINCT, LIMIT, Picture, note, styled
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks
 from railsim.springs.arm import Arm
@@ -35,6 +35,7 @@ SCALES = {"load": 1e-3, "K_sys": 1e-3, "deflection": 1e3, "rotation": float(np.d
 SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 
+@styled()
 def stiffness_figure(result: Verification) -> Figure:
     """System stiffness, and the rate that small movements feel, over load and deflection."""
     figure = Picture(7.6, 3.2, edges=(0.085, 0.15, 0.985, 0.97, 0.06))
@@ -55,6 +56,7 @@ def stiffness_figure(result: Verification) -> Figure:
     return figure
 
 
+@styled()
 def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """Deflection, rotation of the arm and heights of the springs over the load."""
     figure = Picture(7.6, 5.4, edges=(0.085, 0.09, 0.985, 0.98, 0.2, 0.38))
@@ -87,6 +89,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     return figure
 
 
+@styled()
 def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     """Active coils that give the designed stiffness, over the wire diameter."""
     figure = Picture(5.6, 3.7, edges=(0.1, 0.13, 0.98, 0.85))
@@ -113,6 +116,7 @@ def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     return figure
 
 
+@styled()
 def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatigue]) -> Figure:
     """Goodman-Smith diagram with the stress range of each spring."""
     if suspension.fatigue is None:
@@ -136,6 +140,7 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
     return figure
 
 
+@styled()
 def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """The arm and its springs in every load case, to scale, from the lightest load on."""
     cases = sorted(result.cases, key=lambda case: case.load)
@@ -158,6 +163,7 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
     return figure
 
 
+@styled()
 def search_figure(result: "SearchResult") -> Figure:
     """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
     figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.98, 0.97))
@@ -174,6 +180,7 @@ def search_figure(result: "SearchResult") -> Figure:
     return figure
 
 
+@styled()
 def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -> Figure:
     """Ride height by single deviation under one load, and its range under every load."""
     figure = Picture(7.6, 3.5, edges=(0.235, 0.19, 0.985, 0.97, 0.22))

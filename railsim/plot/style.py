@@ -44,7 +44,7 @@ DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#
 
 SIDE_LINES = {"left": "-", "right": (0, (4.0, 1.6))}
 SHADES = {"CLO": "0.95", "CIR": "0.90"}
-NARROW = 0.011  # share of the axes' width that a letter of a section's name takes
+LETTER = 4.0  # width of a letter of a section's name, in axes not yet laid out [points]
 
 LIMIT = "#b3122b"
 
@@ -134,9 +134,10 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
     if not named or not shown:
         return
     low, high = axes.get_xlim()
+    width = 72.0 * axes.bbox.width / axes.figure.dpi
     for span in shown:
         words = "CLO" if span.section.type == "CLO" else f"R {1.0 / span.section.start_value:.6g}"
-        if (span.high - span.low) / (high - low) < NARROW * len(words):
+        if width * (span.high - span.low) / (high - low) < LETTER * len(words):
             continue
         at, look = (0.5 * (span.low + span.high), 1.0), {"fontsize": 6.5, "color": "0.4"}
         note(axes, words.replace("-", "−"), at, (0, 2), "center", "bottom", frame=ABOVE, **look)

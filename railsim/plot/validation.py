@@ -10,7 +10,7 @@ from railsim.arrays import Floats
 from railsim.assessment.model_comparison import ModelValidation, Overlay
 from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
-from railsim.plot.style import grid_of
+from railsim.plot.style import grid_of, styled
 
 MOST = 12  # channels of a picture
 LONGEST = 20_000  # values of a line
@@ -26,6 +26,7 @@ def _written(unit: str) -> str:
     return unit.replace("s2", "s²")
 
 
+@styled()
 def scatter(validation: ModelValidation) -> Figure:
     """Draw simulated over measured section values with the bands of the mean and the deviation."""
     shown = validation.comparisons
@@ -48,6 +49,7 @@ def scatter(validation: ModelValidation) -> Figure:
     return figure
 
 
+@styled()
 def differences(validation: ModelValidation) -> Figure:
     """Draw the distribution of the differences over the limit of their standard deviation."""
     shown = validation.comparisons
@@ -65,6 +67,7 @@ def differences(validation: ModelValidation) -> Figure:
     return figure
 
 
+@styled()
 def overlays(validation: ModelValidation, between: tuple[float, float] | None = None) -> Figure:
     """Draw measured and simulated channels of the first run over the arc length."""
     shown = _first(validation.overlays)
@@ -95,6 +98,7 @@ def _over_arc(
     return figure
 
 
+@styled()
 def spectra(validation: ModelValidation) -> Figure:
     """Draw power spectral densities of measured and simulated channels of the first run."""
     shown = _first(validation.overlays)
@@ -117,6 +121,7 @@ def _density(one: Overlay, values: Floats) -> tuple[Floats, Floats]:
     return f[inside], np.maximum(power[inside], 1e-12 * power[inside].max())
 
 
+@styled()
 def fits(found: Identified) -> Figure:
     """Draw the channels of the first run, measured, before and after, over a part of the line."""
 
@@ -128,6 +133,7 @@ def fits(found: Identified) -> Figure:
     return _over_arc(_first(found.channels), part, lines, 0.8)
 
 
+@styled()
 def residual_spectra(found: Identified) -> Figure:
     """Draw the cumulative periodograms of the residuals: a straight line where they are white."""
     shown = _first(found.channels)

@@ -15,7 +15,6 @@ from railsim.files.access import read_bytes
 from railsim.identification import Identified
 from railsim.identification.identified import correlation_table, parameter_table, residual_table
 from railsim.plot import validation as plots
-from railsim.plot.style import styled
 from railsim.report.document import Drawing, Section, as_png, document, of_values, pictures
 
 RECORDS = ("model_validation.json", "identified.json")
@@ -90,10 +89,9 @@ def _drawn(figures: Mapping[str, Figure]) -> list[Drawing]:
 
 def validation_figures(found: ModelValidation) -> dict[str, Figure]:
     """Return the pictures of a comparison by their names; those of channels where it has them."""
-    with styled():
-        figures = {"scatter": plots.scatter(found), "differences": plots.differences(found)}
-        if found.overlays:
-            figures |= {"overlays": plots.overlays(found), "spectra": plots.spectra(found)}
+    figures = {"scatter": plots.scatter(found), "differences": plots.differences(found)}
+    if found.overlays:
+        figures |= {"overlays": plots.overlays(found), "spectra": plots.spectra(found)}
     return figures
 
 
@@ -114,8 +112,7 @@ def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
 
 def identification_figures(found: Identified) -> dict[str, Figure]:
     """Return the pictures of an identification by their names."""
-    with styled():
-        return {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
+    return {"fits": plots.fits(found), "residuals": plots.residual_spectra(found)}
 
 
 def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part:

@@ -101,7 +101,6 @@ def files(collected: Collected) -> dict[str, bytes]:
     return content | {REPORT: page(collected, drawn).encode()}
 
 
-@styled()
 def figures(collected: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
     result, optimum = collected.result, collected.optimum

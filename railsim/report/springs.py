@@ -14,7 +14,6 @@ from railsim.definitions.spring import TrailingArmSuspension
 from railsim.design_checks import check_table
 from railsim.errors import InputError
 from railsim.plot import springs as plots
-from railsim.plot.style import styled
 from railsim.report.document import Drawing, Section, as_png, of_design, pictures
 from railsim.springs import tables
 from railsim.springs.datasheet import data_sheets
@@ -111,7 +110,6 @@ def files(
     return content | {REPORT: page(results, drawn).encode()}
 
 
-@styled()
 def figures(results: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
     suspension = results.suspension
