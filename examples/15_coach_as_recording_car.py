@@ -66,5 +66,5 @@ with styled():
     axes[2].plot(run["distance"], Q, "k--", lw=0.8, label="run")
     axes[2].set(xlabel="s (m)", ylabel="Q of wheel 1 left (kN)", xlim=(400.0, 700.0))
     for at in axes:
-        at.legend(loc="upper right", ncols=2)
+        at.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     figure.savefig("15_coach_as_recording_car.png")

@@ -122,7 +122,7 @@ with styled():
     for w, name in enumerate(result.wheelsets):
         left.plot(GAINS, wear[:, w], "o-", label=name.removesuffix(".wheelset"))
         right.plot(GAINS, -Y[:, w, 0], "o-")
-    left.set(xlabel="gain", ylabel="T_gamma of the wheelset (N)", title="R 300 m, 15 m/s")
+    left.set(xlabel="gain", ylabel=r"$T_\gamma$ of the wheelset (N)", title="R 300 m, 15 m/s")
     right.set(xlabel="gain", ylabel="Y of the outer wheel (kN)")
     left.legend()
     figure.savefig("21_active_steering.png")
