@@ -195,7 +195,8 @@ def _assessed(assessment: Assessment) -> Section:
     figure = assessment_figure([assessment])
     if figure is not None:
         code = b64encode(as_png(figure)).decode()
-        image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format("assessment", code)
+        words = f"{assessment.vehicle}: values of {assessment.standard}"
+        image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(words, code)
         section.drawings.append(Drawing(assessment.vehicle, "", image))
     section.details = [of_values(one, str(one.columns[0].heading)) for one in tables(assessment)]
     if assessment.remarks:

@@ -33,6 +33,12 @@ const found = [];
 for (const frame of document.querySelectorAll("iframe")) {
   const w = frame.contentWindow, d = w.document, body = d.body;
   const resources = w.performance.getEntriesByType("resource").length;
+  const named = "[aria-label]:not([aria-label='']), [alt]:not([alt=''])";
+  const unnamed = Array.from(body.querySelectorAll("img, svg, canvas")).filter(
+    e => !e.closest(named)).map(e => e.outerHTML.slice(0, 120));
+  const lost = Array.from(d.querySelectorAll("[href], [src]"), e =>
+    e.getAttribute("href") || e.getAttribute("src")).filter(to =>
+    to[0] === "#" ? !d.getElementById(to.slice(1)) : !to.startsWith("data:"));
   const script = d.createElement("script");
   script.textContent = "window.injected = 1";
   body.append(script);
@@ -47,7 +53,7 @@ for (const frame of document.querySelectorAll("iframe")) {
     state: ["state", "told"].map(id => (d.getElementById(id) || {}).textContent || "").join(""),
     plots: d.querySelectorAll(".u-wrap canvas").length,
     styled: w.getComputedStyle(body).fontSize,
-    resources,
+    resources, unnamed, lost,
   });
 }
 document.getElementById("found").textContent = JSON.stringify(found);
@@ -125,6 +131,15 @@ def test_names_of_files_are_texts_in_every_page(found):
         assert page["elements"] == 0, number
         assert "<img src=x onerror='top.ran=" in page["text"], number
         assert "{{ 7 * 7 }}" in page["text"] or number < 2, number
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not BROWSER, reason="no chromium")
+def test_every_picture_has_a_name_and_every_link_a_target(found):
+    """For readers who do not see the pictures; pages need no file beside them."""
+    for number, page in enumerate(found):
+        assert page["unnamed"] == [], number
+        assert page["lost"] == [], number
 
 
 @pytest.mark.slow

@@ -206,6 +206,8 @@
       var title = made("h4", panel, q.words + " ");
       if (q.sign) { made("small", title, q.sign); }
       var target = made("div", panel);
+      target.setAttribute("role", "img");
+      target.setAttribute("aria-label", q.words + " over the " + (unit === "m" ? "distance" : "time") + ", " + data.track);
       var u = new uPlot({
         width: Math.max(200, target.clientWidth), height: 210, legend: { show: false },
         cursor: { sync: { key: key }, drag: { x: true, y: false }, bind: { dblclick: function () { return function () { zoom(data.low, data.high); return null; }; } } },

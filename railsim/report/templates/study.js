@@ -169,12 +169,14 @@ window.railsimStudy = function (data, tools) {
     over.value = Math.max(0, first);
     family.value = names.length > 1 ? (Number(over.value) === 0 ? 2 : 1) : 0;
     body = made("div", box, undefined, "picture");
+    body.setAttribute("role", "img");
     note = made("p", box, "", "notes");
     function draw() {
       var value = data.columns[keys[quantity.value]], kind = Number(view.value), second = Number(family.value) - 1;
       over.parentNode.hidden = family.parentNode.hidden = kind === 2;
       if (body.firstChild) { body.removeChild(body.firstChild); }
       var inner = made("div", body);
+      body.setAttribute("aria-label", words(value) + " of the runs");
       if (kind === 2) { note.textContent = parallel(inner, value); }
       else if (kind === 0) { note.textContent = families(inner, value, Number(over.value), second); }
       else if (second < 0) { note.textContent = "A map needs a second parameter."; }
