@@ -26,7 +26,7 @@ LONGEST_BAR = 250.0  # per cent; longer ones are cut and say how long they are
 @styled()
 def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw assessments of one standard, vehicles side by side; None where nothing is to draw."""
-    if any(a.zones for a in assessments):
+    if any(zone.rows for a in assessments for zone in a.zones):
         return _limits_figure(assessments)
     if any(a.comfort for a in assessments):
         speeds = {speed for a in assessments for speed, _, _ in a.driven.values()}
@@ -40,7 +40,7 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
 def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     """Bars of each quantity's worst row, zone by zone, in per cent of the limit."""
     reports = [zone for a in assessments for zone in a.zones]
-    zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
+    zones = sorted({zone.zone for zone in reports if zone.rows})
     rules = {row.criterion.name: row.criterion for a in assessments for row in a.worst}
     height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
     figure = Picture(max(6.8, 2.4 + 2.6 * len(zones)), height)

@@ -12,6 +12,7 @@ import railsim
 from railsim.assessment import Assessment, assess
 from railsim.assessment.comfort import MeanComfort
 from railsim.assessment.comfort_report import PointComfort
+from railsim.assessment.tables import tables
 from railsim.cli import main
 from railsim.cli.assess import FILES
 from railsim.definitions.loading import load_comfort_limits
@@ -69,6 +70,14 @@ def test_straight_track_gives_both_percentiles_of_signed_quantities(hunting):
     assert body.estimate.mean == pytest.approx(0.2 / math.sqrt(2.0), rel=0.01)
     assert found.verdict == "incomplete"
     assert "zone 4: number of sections not met: none; required 25 at least" in found.reasons
+
+
+def test_runs_without_a_section_have_no_empty_picture_and_no_empty_table():
+    run = made(track({"type": "STR", "length": 200.0}), 20.0)
+    (found,) = assess({"short": run})
+    assert found.zones
+    assert assessment_figure([found]) is None
+    assert tables(found) == []
 
 
 def steady(turn):
