@@ -73,6 +73,7 @@ def meet(axes, k):
     z = wheel.r - 0.46 + level + film_z[k] - film_z[shown[0]]
     axes.plot(1e3 * (wheel.y + beside[k]), 1e3 * z, color="C0")
     axes.set(xlim=(-75, 75), ylim=(34, -8), title=f"s = {1e3 * film_s[k]:.0f} mm")
+    axes.set(xlabel="y (mm)", ylabel="z (mm)")
 
 
 with styled():
