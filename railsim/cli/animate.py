@@ -22,11 +22,12 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 @option("--mode", "Mode by name or number; default the first.", "NAME")
 @option("--between", "Section of the run to show, distance in m.", "S1 S2", float, nargs=2)
 @option("--frames", "Maximum number of frames.", "N", click.IntRange(2, 20_000))
-@option("--fps", "Frames per second of a film.", kind=click.IntRange(1, 100), default=20)
+@option("--fps", "Frames per second of a film.", "N", click.IntRange(1, 100), default=20)
 @option(
     "--gain",
     "Magnification of the motion of the bodies in a film.",
-    kind=click.FloatRange(0.0, 1000.0),
+    "G",
+    click.FloatRange(0.0, 1000.0),
     default=1.0,
 )
 @output_options()

@@ -24,7 +24,7 @@ SHOWN = 40
 @option(
     "--speeds", "Speeds in m/s, or with a unit: 160km/h.", "V [V ...]", multiple=True, required=True
 )
-@option("--share", "Share of a limit from which on a place is listed.", kind=float, default=0.8)
+@option("--share", "Share of a limit from which on a place is listed.", "X", float, default=0.8)
 @option("--out", "Folder of the runs and tables.", "DIR", required=True)
 @workers_option
 @flag("--resume", "Go on where this folder was left.")

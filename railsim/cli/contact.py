@@ -53,19 +53,20 @@ RANGES = {
     multiple=True,
     default=("60E1",),
 )
-@option("--gauge", "Track gauge (m).", default=1.435)
-@option("--inclination", "Rail inclination (1).", default=0.025)
-@option("--back-to-back", "Distance between the flange backs (m).", default=1.360)
+@option("--gauge", "Track gauge in m.", "G", default=1.435)
+@option("--inclination", "Rail inclination, 0.025 for 1:40.", "I", default=0.025)
+@option("--back-to-back", "Distance between the flange backs in m.", "D", default=1.360)
 @option(
     "--radius radii",
-    "Rolling radius (m); twice for left and right.",
-    kind=float,
+    "Rolling radius in m; twice for left and right.",
+    "R",
+    float,
     multiple=True,
     default=(0.46,),
 )
-@option("--load", "Vertical wheel load (N).", default=60e3)
-@option("--max-shift", "Largest lateral displacement (m).", default=0.010)
-@option("--gauges", "Also the conicity over N gauges from A to B (m).", "A:B:N", callback=as_values)
+@option("--load", "Vertical wheel load in N.", "Q", default=60e3)
+@option("--max-shift", "Largest lateral displacement in m.", "Y", default=0.010)
+@option("--gauges", "Also the conicity over N gauges from A to B m.", "A:B:N", callback=as_values)
 @option("--overlay", "With --out: also a wheel or rail profile drawn over the right one.", "P")
 @flag("--exact", "Check the patches by boundary elements (about ten seconds).")
 @option(
@@ -77,12 +78,12 @@ RANGES = {
 @flag(
     "--creep", "Creep forces of the centred wheel's patch by every creep law, and traction fields."
 )
-@option("--friction", "Friction coefficient, for --creep.", default=0.4)
+@option("--friction", "Friction coefficient, for --creep.", "MU", default=0.4)
 @flag(
     "--build-creep-table",
     "Only recompute the table of the creep law `table` (half an hour; can be interrupted).",
 )
-@option("--workers", "Processes, for --build-creep-table.", kind=COUNT, default=2)
+@option("--workers", "Processes, for --build-creep-table.", "N", COUNT, default=2)
 @output_options("Folder for pictures and tables; created if it does not exist.")
 def command(
     profiles: tuple[str, ...],

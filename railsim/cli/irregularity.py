@@ -25,7 +25,7 @@ FILES = ("irregularity.json", "irregularity.png")
 @option(
     "--spectrum", "Spectrum that the track is assumed to have.", "NAME", default="erri_b176_low"
 )
-@option("--scale", "Factor on it.", kind=float, default=1.0)
+@option("--scale", "Factor on it.", "X", float, default=1.0)
 @option(
     "--wavelengths",
     "Shortest and longest wavelength of the track in m.",

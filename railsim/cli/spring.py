@@ -47,10 +47,11 @@ _spring_command = together(
 @_spring_command
 @flag("--search", "Also search the nests that fit the table [search].")
 def design(file: str, search: bool, assignments: tuple[str, ...], output: Output) -> None:
-    """Find stiffnesses and numbers of coils of the springs for two required deflections.
+    """Find the springs for two required deflections.
 
-    With --search, also find the nests of standard wires that fit the space and the stresses,
-    ranked by mass or by fatigue margin (search.objective), with the active limits.
+    Prints their stiffnesses and numbers of coils. With --search, also the nests of standard wires
+    that fit the space and the stresses, ranked by mass or by fatigue margin (search.objective),
+    with the active limits.
 
     \b
     Example:
@@ -89,10 +90,11 @@ def design(file: str, search: bool, assignments: tuple[str, ...], output: Output
 
 @_spring_command
 def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
-    """Verify a suspension under all its loads: equilibrium, heights, stresses, buckling.
+    """Verify a suspension under all its loads.
 
-    A check that is not met is a result: the exit status stays 0.  A load that the nest cannot
-    carry (solid, buckled, lifted off) is a fault of the input: exit status 2.
+    Equilibrium, heights, stresses, buckling. A check that is not met is a result: the exit status
+    stays 0. A load that the nest cannot carry (solid, buckled, lifted off) is a fault of the
+    input: exit status 2.
 
     \b
     Example:
@@ -123,7 +125,7 @@ def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
 
 @_spring_command
 def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
-    """Stress range of each spring against the Goodman-Smith line of the material.
+    """Compare stress ranges with the Goodman-Smith line.
 
     \b
     Example:
@@ -155,7 +157,9 @@ def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
 def vehicle(
     file: str, load: str | None, extends: str | None, assignments: tuple[str, ...], output: Output
 ) -> None:
-    """Write the suspension as a vehicle file that replaces the primary of another one.
+    """Write a vehicle file with this primary suspension.
+
+    It extends the vehicle that the table [vehicle] or --extends names, without its primary.
 
     \b
     Example:
