@@ -134,7 +134,7 @@ def track_svg(track: Track) -> str:
         if section.type == "CIR" and end - begin > 60.0:
             radius = f"R {1.0 / section.start_value:.6g} m"
             shapes.append(
-                f'<text x="{0.5 * (begin + end):.1f}" y="{height + 4:.0f}" '
+                f'<text x="{0.5 * (begin + end):.1f}" y="{height + 8:.0f}" '
                 f'text-anchor="middle">{radius}</text>'
             )
     rows = (
@@ -151,6 +151,8 @@ def track_svg(track: Track) -> str:
         shapes.append(f'<polyline class="k0" points="{text}"/>')
         shown = f"{words}: {low:.4g} to {high:.4g} {unit}"
         shapes.append(f'<text x="4" y="{top + 14:.0f}">{shown}</text>')
+    words = f"s = 0 to {track.length:.6g} m"
+    shapes.append(f'<text x="{width - 4:.0f}" y="14" text-anchor="end">{words}</text>')
     return (
         f'<svg class="strip" viewBox="0 0 {width:.0f} {2 * height:.0f}" role="img" '
         f'aria-label="curvature and cant over 0 to {track.length:.6g} m">{"".join(shapes)}</svg>'

@@ -258,7 +258,7 @@ def _published(results: Mapping[str, Result]) -> list[Section]:
         first = own[0].study
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
         header = ["run", "quantity", "evaluated at", "published", "computed", "difference", "rails"]
-        tables.append(Table(header, cells, first.name, (0, 1, 2, 6), note=note))
+        tables.append(Table(header, cells, first.name, (0, 1, 2), note=note))
     title = "Comparison with published values"
     return [Section(title, tables=tables, id="published")] if tables else []
 
