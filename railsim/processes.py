@@ -11,11 +11,16 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import BaseContext
-from types import ModuleType
+from multiprocessing.process import BaseProcess
+from types import ModuleType, TracebackType
+from typing import Any
 
 from railsim.threads import one_thread_each
 
@@ -89,10 +94,70 @@ def _that_matter() -> dict[str, str]:
     }
 
 
-def hear_requests() -> None:
-    """Let this process, a worker, end on what ends processes, except for Ctrl-C."""
+class WorkerPool(ProcessPoolExecutor):
+    """Worker processes, killed where an exception leaves the block of the pool.
+
+    `count`: How many; `begin`, `arguments`: What each calls first; it calls `begin_worker`.
+    """
+
+    def __init__(
+        self, count: int, begin: Callable[..., None] | None = None, arguments: tuple[Any, ...] = ()
+    ) -> None:
+        self._count, self._others = count, set(multiprocessing.active_children())
+        self.begun: set[BaseProcess] = set()
+        context: Any = worker_context()
+        super().__init__(count, context, begin or begin_worker, arguments)
+
+    def submit(self, *task: Any, **named: Any) -> Future[Any]:
+        """Submit a task, for which a process may begin."""
+        with signals_later(), workers_begin():  # inherited by the process
+            future = super().submit(*task, **named)
+            if len(self.begun) < self._count:
+                self.begun |= set(multiprocessing.active_children()) - self._others
+        return future
+
+    def end(self, grace: float = 0.0) -> None:
+        """Begin no further task, and kill processes that have not ended after some seconds."""
+        self.shutdown(wait=False, cancel_futures=True)
+        until = time.monotonic() + grace
+        with signals_later():
+            for process in self.begun:
+                process.join(max(0.0, until - time.monotonic()))
+            for process in self.begun:
+                if process.is_alive():
+                    process.kill()
+                process.join()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the processes."""
+        if kind is not None:
+            self.end()
+        super().__exit__(kind, error, trace)
+
+
+def begin_worker(ending: Callable[[], None] | None = None) -> None:
+    """Let this process, a worker, end on what ends processes, except for Ctrl-C.
+
+    And with the process that wanted it, which may end without a word: it would wait for its tasks
+    for ever. `ending`: What it does before that.
+    """
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS[1:])
+    threading.Thread(target=_end_with_parent, args=(ending,), daemon=True).start()
+
+
+def _end_with_parent(ending: Callable[[], None] | None) -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        if ending is not None:
+            ending()
+        os._exit(1)
 
 
 @contextmanager

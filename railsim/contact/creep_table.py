@@ -23,9 +23,8 @@ Begin with `creep_table` (use) or `build_nodes` (generator: half an hour, restar
 """
 
 import math
-import multiprocessing
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -37,7 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from railsim.arrays import Floats
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, RATIO_MAX, T_HALF
-from railsim.processes import workers_begin
+from railsim.processes import WorkerPool
 
 # the generator's solver; a run reads the finished table only
 if TYPE_CHECKING:
@@ -221,11 +220,7 @@ def build_nodes(folder: Path, workers: int = 2) -> Iterator[tuple[int, int]]:
             done += 1
             yield done, len(rows)
         return
-    # "spawn": a fork of a process that has run compiled code with threads may hang
-    with (
-        workers_begin(),
-        ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool,
-    ):
+    with WorkerPool(workers) as pool:
         for future in as_completed(pool.submit(_stored_row, folder, i, j) for i, j in missing):
             future.result()
             done += 1

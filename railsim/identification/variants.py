@@ -1,11 +1,11 @@
 """Variants of a model over the cores: each a run of its own, of which only series come back."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from types import TracebackType
 from typing import Any, Self
 
-from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
+from railsim.processes import WorkerPool
 
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
 
@@ -18,22 +18,26 @@ class Workers:
     """
 
     count: int
-    _pool: ProcessPoolExecutor | None = field(default=None, init=False, repr=False)
+    _pool: WorkerPool | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if self._pool is not None:
-            self._pool.shutdown(wait=kind is None, cancel_futures=True)
+            self._pool.__exit__(kind, error, trace)
             self._pool = None
 
     def run(self, tasks: Sequence[Task]) -> list[Any]:
         """Return what the tasks return, in their order; raise the first error of a task."""
         if self.count <= 1 or len(tasks) <= 1:
             return [function(*arguments) for function, arguments in tasks]
-        with signals_later(), workers_begin():  # inherited by the processes
-            if self._pool is None:
-                self._pool = ProcessPoolExecutor(self.count, worker_context(), hear_requests)
-            futures = [self._pool.submit(function, *arguments) for function, arguments in tasks]
+        if self._pool is None:
+            self._pool = WorkerPool(self.count)
+        futures = [self._pool.submit(function, *arguments) for function, arguments in tasks]
         return [future.result() for future in futures]

@@ -7,12 +7,10 @@ updates then begin with the right curvature.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,7 @@ from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of
-from railsim.processes import FORKSERVER, workers_begin
+from railsim.processes import WorkerPool
 from railsim.units import duration_in_words
 
 
@@ -130,9 +128,7 @@ def _search(judge: Judge, begins: Sequence[Any], workers: int) -> list[Start]:
     each: Any = map
     with ExitStack() as stack:
         if workers > 1 and len(jobs) >= 4:
-            context = get_context("forkserver" if FORKSERVER else "spawn")
-            stack.enter_context(workers_begin())
-            each = stack.enter_context(ProcessPoolExecutor(workers, mp_context=context)).map
+            each = stack.enter_context(WorkerPool(workers)).map
         found = list(each(partial(_run, rough, SEARCH), jobs))
         finals = list(each(partial(_run, judge, FINISH), _finals(judge, found)))
     return _finished(judge, found, finals)

@@ -2,28 +2,26 @@
 
 Jobs come in batches, whose runs share a call; most batches hold one job.  A failed job becomes a
 record with the reason; the others continue.  On Ctrl-C running jobs are requested to stop and leave
-no files behind; a process that does not respond, because it is compiling, is terminated after a
+no files behind; a process that does not respond, because it is compiling, is killed after a
 moment.  Processes whose study has ended terminate by themselves.
 """
 
 import logging
 import math
-import multiprocessing
 import os
 import secrets
 import signal
 import tempfile
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import partial
 from itertools import pairwise
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -32,7 +30,7 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.errors import ModelError, RailsimError, argument_error
 from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
-from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
+from railsim.processes import WorkerPool, begin_worker, worker_context
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import PLAIN, Storage, write
@@ -43,7 +41,7 @@ from railsim.studies.records import Record
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
-GRACE = 3.0  # seconds that running jobs have to stop, and terminated processes to end
+GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
 ALWAYS_KEPT = ("time", "distance", "Q0")
 
@@ -223,20 +221,17 @@ class _Pool:
         self._batches, self._indices = batches, indices
         self._fractions = context.Array("d", len(batches), lock=False)
         self._holders = context.Array("l", len(batches), lock=False)  # process of each batch
-        self._stop = context.Event()
-        self._others = set(multiprocessing.active_children())
-        self._processes: set[BaseProcess] = set()
+        # not an event, whose lock would be held for ever by a process that is killed as it looks
+        self._stop = context.Value("b", 0, lock=False)
         self._running: dict[Future[list[Record]], int] = {}
         shared = self._fractions, self._holders, self._stop
         begun = (*shared, bool(logging.getLogger("railsim").handlers))
-        self._pool = ProcessPoolExecutor(min(workers, len(indices)), context, _begin, begun)
+        self._pool = WorkerPool(min(workers, len(indices)), _begin, begun)
         self.lost: set[int] = set()
 
     def _submit(self, indices: Sequence[int]) -> None:
-        with signals_later(), workers_begin():  # inherited by the processes
-            for index in indices:
-                self._running[self._pool.submit(_work, index, self._batches[index])] = index
-            self._processes |= set(multiprocessing.active_children()) - self._others
+        for index in indices:
+            self._running[self._pool.submit(_work, index, self._batches[index])] = index
 
     def outcomes(self, progress: Progress) -> Iterator[tuple[int, list[Record]]]:
         """Yield index and records of every batch that ends."""
@@ -265,9 +260,8 @@ class _Pool:
         except BrokenProcessPool:  # nothing more can be submitted
             broken = True
         except BaseException:
-            self._stop.set()
-            self._pool.shutdown(wait=False, cancel_futures=True)
-            _end(self._processes)
+            self._stop.value = 1
+            self._pool.end(GRACE)
             raise
         finally:
             self._pool.shutdown(wait=True, cancel_futures=True)
@@ -278,10 +272,10 @@ class _Pool:
 
     def _lost(self) -> set[int]:
         """Return the batches of the process that died; the pool has terminated the others."""
-        for process in self._processes:
+        for process in self._pool.begun:
             process.join(GRACE)
         ended = (None, 0, -signal.SIGTERM)
-        dead = {process.pid for process in self._processes if process.exitcode not in ended}
+        dead = {process.pid for process in self._pool.begun if process.exitcode not in ended}
         begun = {i for i in self._running.values() if self._holders[i]}
         return {i for i in begun if self._holders[i] in dead} or begun or {self._indices[0]}
 
@@ -427,19 +421,14 @@ def _begin(fractions: Any, holders: Any, stop: Any, handled: bool) -> None:
     _shared = fractions, holders, stop
     if handled:  # remarks on runs are in their records; here nobody else would hold them back
         logging.getLogger("railsim").addHandler(logging.NullHandler())
-    hear_requests()
-    threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
+    begin_worker(partial(_stop, stop))
 
 
-def _end_with_parent(stop: Any) -> None:
-    """Wait until the process of the study has ended, for any reason; then stop as on Ctrl-C."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        stop.set()
-        time.sleep(GRACE)
-        remove_partial_files()
-        os._exit(1)
+def _stop(stop: Any) -> None:
+    """Stop as on Ctrl-C, once the process of the study has ended for any reason."""
+    stop.value = 1
+    time.sleep(GRACE)
+    remove_partial_files()
 
 
 def _work(index: int, batch: Batch) -> list[Record]:
@@ -448,20 +437,8 @@ def _work(index: int, batch: Batch) -> list[Record]:
 
     def progress(fraction: float) -> None:
         fractions[index] = fraction
-        if stop.is_set():
+        if stop.value:
             raise Stopped
 
+    progress(0.0)  # it may have waited in the queue
     return perform(batch, progress)
-
-
-def _end(processes: set[BaseProcess]) -> None:
-    """Wait a moment for processes to end, terminate the rest, and kill what does not hear that."""
-    with signals_later():
-        for process in processes:
-            process.join(GRACE / len(processes))
-        for process in processes:
-            process.terminate()
-        for process in processes:
-            process.join(GRACE / len(processes))
-            process.kill()
-            process.join()

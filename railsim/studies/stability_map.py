@@ -6,9 +6,8 @@ command continues an interrupted map.  A damaged point is computed again.
 
 import hashlib
 import json
-import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import InputError, RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
-from railsim.processes import available_cores, workers_begin
+from railsim.processes import WorkerPool, available_cores
 from railsim.stability.critical_speed import critical_speed
 from railsim.studies.records import Record, read_record, write_record
 from railsim.table import Column, Table
@@ -86,16 +85,10 @@ def _computed(
         for number, point in waiting.items():
             yield number, point_record(point, options)
         return
-    # "spawn": a fork of a process that has run compiled code with threads may hang
-    context = multiprocessing.get_context("spawn")
-    with workers_begin(), ProcessPoolExecutor(workers, context) as pool:
+    with WorkerPool(workers) as pool:
         futures = {pool.submit(point_record, point, options): n for n, point in waiting.items()}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        for future in as_completed(futures):
+            yield futures[future], future.result()
 
 
 def point_record(point: MapPoint, options: dict[str, Any]) -> Record:

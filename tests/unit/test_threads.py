@@ -1,14 +1,17 @@
 """Processes that share the cores: no threads of linear algebra, no code but railsim's own."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 import railsim
-from railsim.processes import workers_begin
+from railsim.processes import WorkerPool, workers_begin
 from railsim.threads import VARIABLES, one_thread_each
 
 OWN = {"processes.py"}
@@ -51,5 +54,26 @@ def test_workers_import_no_modules_of_the_folder_they_begin_in(tmp_path, monkeyp
 def test_all_pools_of_processes_begin_so():
     paths = Path(railsim.__file__).parent.rglob("*.py")
     texts = {path.name: path.read_text(encoding="utf-8") for path in paths}
-    pools = {name for name, text in texts.items() if "ProcessPoolExecutor(" in text}
-    assert pools == {name for name, text in texts.items() if "workers_begin()" in text} - OWN
+    assert {name for name, text in texts.items() if "ProcessPoolExecutor" in text} == OWN
+    assert {name for name, text in texts.items() if "WorkerPool(" in text} > OWN
+
+
+def test_workers_end_with_a_process_that_ends_without_a_word():
+    """They keep the pipe open from which they read their tasks: it has no end for them."""
+    program = (
+        "import os; from railsim.processes import WorkerPool;"
+        "pool = WorkerPool(2); print(pool.submit(abs, -3).result(), flush=True); os._exit(0)"
+    )
+    # ends when nobody can write any more
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout == "3\n"
+
+
+def test_exception_in_the_block_of_a_pool_kills_its_workers():
+    pool = WorkerPool(2)
+    with suppress(KeyError), pool:
+        pool.submit(time.sleep, 600.0)
+        raise KeyError
+    assert {process.exitcode for process in pool.begun} == {-signal.SIGKILL}
