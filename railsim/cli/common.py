@@ -100,7 +100,7 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
 
 
 json_option = flag("--json as_json", "Machine-readable results on stdout.")
-quiet_option = flag("--quiet", "No progress bars and remarks.")
+quiet_option = flag("--quiet", "No progress bars; remarks only on what is damaged or left out.")
 overwrite_option = flag("--overwrite", "Replace output that exists.")
 set_option = option(
     "--set assignments",
@@ -393,7 +393,7 @@ class Output:
         return progress_bar(words, quiet=self.quiet)
 
     def remark(self, text: object) -> None:
-        """Print a remark on stderr, as during a computation: what is damaged also if quiet."""
+        """Print a remark on stderr, also if quiet: on what is damaged or left out."""
         echo(f"remark: {text}", err=True)
 
     def wrote(self, path: str | Path, **facts: Any) -> None:

@@ -275,7 +275,7 @@ def test_damaged_or_foreign_result_is_computed_again_and_kept(tmp_path, simulate
     assert main(arguments(tmp_path, 10, 20)) == 2  # nothing is replaced unasked
     assert result.read_bytes() == damaged
     assert "--resume computes it again and keeps this file beside it" in capsys.readouterr().err
-    assert main(arguments(tmp_path, 10, 20, more=["--resume"])) == 0
+    assert main(arguments(tmp_path, 10, 20, more=["--resume", "--quiet"])) == 0
     assert simulated == [10.0, 20.0, 20.0]
     remark = capsys.readouterr().err
     assert f"{result}: " in remark
