@@ -38,6 +38,7 @@ def curve_to_settle_in(
     cant: float,
     friction: tuple[float, float],
     times: tuple[float, float],
+    lengths: tuple[float, float] = (TRANSITION, SETTLING),
 ) -> Track:
     """Straight, transition and curve on smooth rails, long enough for a vehicle to settle.
 
@@ -51,10 +52,12 @@ def curve_to_settle_in(
         Of left and right rail [1].
     times : tuple of float
         Time in the transition and in the curve [s]; at low speed their lengths decide.
+    lengths : tuple of float
+        Of the transition, and of the curve behind the last wheelset, at least [m].
     """
-    transition = max(speed * times[0], TRANSITION)
+    transition = max(speed * times[0], lengths[0])
     behind = -float(np.min(model.system.frame_offset))
-    rest = max(speed * times[1], behind + SETTLING)
+    rest = max(speed * times[1], behind + lengths[1])
     radius = 1.0 / curvature if abs(curvature) >= NEGLIGIBLE else math.inf
     return track.replace(
         plan=[

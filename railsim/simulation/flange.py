@@ -2,19 +2,28 @@
 
 In a flange the contact is stiff laterally, and its damping and its friction couple the motions of a
 wheelset in another way than on the treads.
+
+What is sought is a state of rest.  A short way into the curve gives Newton's method a beginning: a
+third of the time of settling.  Friction elements hold what the way left in them; with these, and
+where Newton's method finds nothing, the vehicle settles over a long way.
 """
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
-from railsim.kernels.state import LAST_STEP
+from railsim.kernels.internal import PAD
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, N_SCALARS, SPEED
 from railsim.kernels.status import RUNNING
+from railsim.kernels.support import DOF, SUPPORT_SIZE, support_begin
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
+from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
+from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, without_loads
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
@@ -22,7 +31,9 @@ from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
 
 WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
-TIMES = 3.0, 3.0  # in transition and curve, at least [s]
+TIMES = 3.0, 3.0  # in transition and curve, at least, where the vehicle settles [s]
+# the same before Newton's method, and lengths [m]: the last wheelset has to be well in the curve
+SHORT, SHORT_LENGTHS = (0.5, 0.0), (20.0, 10.0)
 # The state sought is one of rest and does not depend on the contact damping: with more of it, it is
 # reached also where the wheelset would vibrate.
 MORE_DAMPING = 4.0
@@ -68,17 +79,34 @@ def in_flange_contact(
     curve = tightest_curve(track)
     if curve is None:
         return None
+    DOING.info("settling in flange contact, for judging the time step")
+    if not (model.system.internal.kind == PAD).any():
+        found = _brought(model, track, curve, rolling, step, progress, SHORT, SHORT_LENGTHS)
+        with suppress(NotConverged):
+            if found is not None:
+                return found[0], _at_rest(model, *found, rolling)
+    return _brought(model, track, curve, rolling, 0.5 * step, progress, TIMES)
+
+
+def _brought(
+    model: Model,
+    track: Track,
+    curve: tuple[float, float],
+    rolling: Floats,
+    step: float,
+    progress: Progress | None,
+    times: tuple[float, float],
+    *lengths: tuple[float, float],
+) -> tuple[System, Floats] | None:
+    """System on the curve, and the vehicle at the end of its way; None where it leaves the rails.
+
+    `times`, `lengths`: of `curve_to_settle_in`.
+    """
     system = model.system
-    speed = float(rolling[-1])
+    speed = float(rolling[SPEED])
     rail = system.track.rail
-    auxiliary = curve_to_settle_in(
-        model,
-        track,
-        speed,
-        *curve,
-        (float(np.max(rail[:, 4, 0])), float(np.max(rail[:, 5, 0]))),
-        TIMES,
-    )
+    friction = float(np.max(rail[:, MU_LEFT, 0])), float(np.max(rail[:, MU_RIGHT, 0]))
+    auxiliary = curve_to_settle_in(model, track, speed, *curve, friction, times, *lengths)
     smooth = without_loads(system)._replace(
         track=track_tables(auxiliary),
         drive=CONSTANT_SPEED,
@@ -87,9 +115,23 @@ def in_flange_contact(
     contact = smooth.contact
     damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))
     state = rolling.copy()
-    short = 0.5 * step
-    steps = math.floor(auxiliary.length / speed / short)
-    DOING.info("settling in flange contact, for judging the time step")
-    status = advance(model, damped, state, short, steps, FAST, progress)
+    steps = math.floor(auxiliary.length / speed / step)
+    status = advance(model, damped, state, step, steps, FAST, progress)
     state[LAST_STEP] = 0.0  # of the last step's length: steps of any length are judged from here
     return (smooth, state) if status == RUNNING else None
+
+
+def _at_rest(model: Model, system: System, state: Floats, rolling: Floats) -> Floats:
+    """State of rest near one of a run: Newton's method begins with the positions alone.
+
+    Dampers do not pull at rest; and slopes of contact forces that were learnt in vibrations would
+    decide on the stability of a step.
+    """
+    guess = rolling.copy()
+    positions = 6 * model.index.n_bodies
+    guess[:positions], guess[ARC_LENGTH] = state[:positions], state[ARC_LENGTH]
+    if system.support.elastic:
+        tracks = slice(support_begin(system), len(state) - N_SCALARS)
+        of_run = state[tracks].reshape(-1, SUPPORT_SIZE)
+        guess[tracks].reshape(-1, SUPPORT_SIZE)[:, :DOF] = of_run[:, :DOF]
+    return SteadyRolling(model, system).solve(guess, float(rolling[SPEED]))
