@@ -18,6 +18,8 @@ Source: Kalker, J.J. (1990), Three-Dimensional Elastic Bodies in Rolling Contact
 appendix E, table E.3 (C11, C22, C23 also stored in the public program CONTACT).
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -103,6 +105,7 @@ def kalker_coefficients(
     return coefficient(0), coefficient(1), coefficient(2), coefficient(3)
 
 
+@lru_cache(10)  # a study asks for it once for every run
 def creep_tables(nu: float = 0.28) -> Floats:
     """Kalker's coefficients on a grid for the look-up inside the time loop.
 

@@ -116,10 +116,13 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
     def band(values: Floats) -> Floats:
         return band_passed(values, rate, LOW, min(HIGH, 0.4 * rate))
 
-    lateral, force = band(seen("wheelset_lateral")), band(seen("sum_Y"))
+    lateral = band(seen("wheelset_lateral"))
+    cycles_of = [_Cycles(swing) for swing in lateral.T]
+    if not any(np.any(cycles.regular()) for cycles in cycles_of):  # most runs
+        return None
+    force = band(seen("sum_Y"))
     found: list[tuple[float, float, int, int]] = []  # amplitude, cycles per sample, begin, end
-    for w in range(lateral.shape[1]):
-        cycles = _Cycles(lateral[:, w])
+    for w, cycles in enumerate(cycles_of):
         swing = cycles.amplitudes(lateral[:, w])
         hunts = cycles.regular() & _regular(swing) & _regular(cycles.amplitudes(force[:, w]))
         hunts &= _lasting(swing)
