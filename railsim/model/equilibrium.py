@@ -229,14 +229,14 @@ def _sink(level: System, state: Floats, weight: float) -> None:
         return
     sleeper = weight / support.row[K_BALLAST_Z] if support.sleeper else 0.0
     rail = sleeper + 0.5 * weight / support.row[K_PAD_Z]
-    track = _tracks(level, state)
+    track = tracks_under(level, state)
     track[:, 1:RAIL_DOF:2] = rail
     track[:, RAIL_DOF + 1] = sleeper
     for body in level.bodies.whole:
         state[6 * body + Z] += rail
 
 
-def _tracks(system: System, state: Floats) -> Floats:
+def tracks_under(system: System, state: Floats) -> Floats:
     """View of the states of the track under each wheelset."""
     end = len(state) - N_SCALARS
     wheelsets = len(system.contact.body)

@@ -17,14 +17,15 @@ from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.kernels.internal import PAD
-from railsim.kernels.state import ARC_LENGTH, LAST_STEP, N_SCALARS, SPEED
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import DOF, SUPPORT_SIZE, support_begin
+from railsim.kernels.support import DOF
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
+from railsim.model.equilibrium import tracks_under
 from railsim.model.work import CONSTANT_SPEED, without_loads
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
@@ -131,7 +132,5 @@ def _at_rest(model: Model, system: System, state: Floats, rolling: Floats) -> Fl
     positions = 6 * model.index.n_bodies
     guess[:positions], guess[ARC_LENGTH] = state[:positions], state[ARC_LENGTH]
     if system.support.elastic:
-        tracks = slice(support_begin(system), len(state) - N_SCALARS)
-        of_run = state[tracks].reshape(-1, SUPPORT_SIZE)
-        guess[tracks].reshape(-1, SUPPORT_SIZE)[:, :DOF] = of_run[:, :DOF]
+        tracks_under(system, guess)[:, :DOF] = tracks_under(system, state)[:, :DOF]
     return SteadyRolling(model, system).solve(guess, float(rolling[SPEED]))

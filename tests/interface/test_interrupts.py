@@ -139,7 +139,7 @@ def test_bar_says_what_comes_before_a_run(monkeypatch):
 
     monkeypatch.setattr(step_choice, "_JUDGED", {})  # by another test, perhaps
     monkeypatch.setattr("tqdm.tqdm", Bar)
-    monkeypatch.setattr(railsim.simulation.auxiliary_track, "WHEELSET_STEPS", 4000)
+    monkeypatch.setattr(railsim.simulation.auxiliary_track, "WHEELSET_STEPS", 800)
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     with progress_bar("a run", quiet=False) as progress:
         railsim.simulate(coach, track, speed=20.0, start=390.0, duration=0.1, progress=progress)

@@ -1,0 +1,115 @@
+"""The vehicle at rest in flange contact, about which a step is judged; how often it is sought."""
+
+import numpy as np
+import pytest
+from dynamics import load_vehicle
+
+import railsim
+from railsim.definitions.settings import Settings
+from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.kernels.rhs import right_hand_side
+from railsim.linear.steady import NotConverged, SteadyRolling
+from railsim.model import time_step
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
+from railsim.model.work import work_arrays
+from railsim.simulation import flange, step_choice
+
+STEP = 1.25e-3
+
+
+def rolling(name, track, speed):
+    """Model and steady rolling on straight track."""
+    balance = equilibrium(assemble(load_vehicle(name), track, Settings()), speed)
+    return balance.model, balance.state, balance.Q0.mean()
+
+
+def wheel_forces(system, state):
+    """Y and Q of all wheels [N]."""
+    work, derivative = work_arrays(system), np.zeros_like(state)
+    right_hand_side(system, work, state, derivative)
+    return work.wheel[:, :, [W_Q, W_Y]]
+
+
+@pytest.fixture
+def ways(monkeypatch):
+    """Lengths of the ways over which vehicles are brought into the curve [m]."""
+    found, plain = [], flange.advance
+
+    def advance(model, system, state, step, steps, *more):
+        found.append(steps * step * state[-1])
+        return plain(model, system, state, step, steps, *more)
+
+    monkeypatch.setattr(flange, "advance", advance)
+    return found
+
+
+@pytest.mark.parametrize("support", ["rigid", "ballasted"])
+def test_state_of_rest_is_the_end_of_a_long_run(support, monkeypatch):
+    """Wheel forces within 1e-4 of the load: the car's sway decays with 0.25 1/s at least."""
+    track = railsim.load_track("curve_r250").replace(support={"preset": support})
+    model, state, load = rolling("coach_manchester", track, 20.0)
+    found = flange.in_flange_contact(model, track, state, STEP)
+    monkeypatch.setattr(flange, "TIMES", (4.0, 40.0))
+    monkeypatch.setattr(SteadyRolling, "solve", not_converged)
+    settled = flange.in_flange_contact(model, track, state, STEP)
+    one, other = wheel_forces(*found), wheel_forces(*settled)
+    assert one / load == pytest.approx(other / load, abs=1e-4)
+
+
+def not_converged(*_):
+    """In place of Newton's method."""
+    raise NotConverged("no steady state")
+
+
+def test_growth_does_not_depend_on_the_step_of_the_way():
+    """Slopes learnt while the wheels vibrated on the way would change it by a fifth."""
+    track = railsim.load_track("curve_r500")
+    model, state, _ = rolling("power_car_china_star", track, 27.0)
+    growths = [
+        time_step._step_growth(
+            model, *flange.in_flange_contact(model, track, state, step), "fast", 1.8e-3
+        )
+        for step in (1.667e-3, 0.833e-3)
+    ]
+    assert growths[0] > 10.0
+    assert growths[0] == pytest.approx(growths[1], rel=0.02)
+
+
+def test_one_short_way_is_enough_without_friction_elements(ways):
+    """Less than the vehicle and 50 m; with friction elements it settles for 6 s."""
+    track = railsim.load_track("curve_r250")
+    for name, least, most in (("coach_manchester", 40.0, 75.0), ("wagon_y25", 120.0, 160.0)):
+        ways.clear()
+        model, state, _ = rolling(name, track, 20.0)
+        assert flange.in_flange_contact(model, track, state, STEP) is not None
+        assert len(ways) == 1
+        assert least < ways[0] < most
+
+
+def test_without_a_state_of_rest_the_vehicle_settles(ways, monkeypatch):
+    """The long way follows the short one."""
+    track = railsim.load_track("curve_r250")
+    model, state, _ = rolling("coach_manchester", track, 20.0)
+    monkeypatch.setattr(SteadyRolling, "solve", not_converged)
+    assert flange.in_flange_contact(model, track, state, STEP) is not None
+    assert len(ways) == 2
+    assert ways[1] > 120.0
+
+
+def test_runs_of_a_class_share_one_way(ways, monkeypatch, tmp_path):
+    """Two speeds within a factor of 1.2 and two coefficients of friction within 0.1."""
+    monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve: solve())
+    monkeypatch.setattr(step_choice, "_JUDGED", {})
+    found = railsim.study(
+        "coach_manchester",
+        "curve_r250",
+        [19.0, 21.0],
+        grid={"track.friction": [0.31, 0.39]},
+        duration=0.1,
+        workers=1,
+        keep="summary",
+        out=tmp_path / "study",
+    )
+    assert [record["status"] for record in found.records] == 4 * ["complete"]
+    assert len(ways) == 1
