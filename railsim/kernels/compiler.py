@@ -35,6 +35,7 @@ try:
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime.nrt import rtsys
     from numba.core.serialize import dumps
+    from numba.core.types import BaseFunction
     from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
     MISSING = ""
@@ -139,6 +140,24 @@ if PRIVATE:
             if isinstance(other, _Flags):
                 return self._values == other._values
             return super().__eq__(other)
+
+    _resolved: dict[tuple[Any, ...], Any] = {}
+    _resolve = BaseFunction.get_call_type
+
+    def _resolve_once(function, context, args, kws):
+        """Signature of a call of one of numba's own functions and operators for some types.
+
+        To find it numba tries some ten rules for each of 44 000 operators in the kernels; there are
+        a few hundred combinations of operator and types.
+        """
+        if kws:
+            return _resolve(function, context, args, kws)
+        call = context, function, args
+        if call not in _resolved:
+            _resolved[call] = _resolve(function, context, args, kws)
+        return _resolved[call]
+
+    BaseFunction.get_call_type = _resolve_once
 
     class _Compiler(Compiler):  # type: ignore[misc]
         library = _SelfContained
