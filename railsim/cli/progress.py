@@ -21,6 +21,7 @@ COMPILING = "preparing: compiling (after an installation; about a minute, kept f
 UNCACHED = "not kept: there is no folder for it, give one by RAILSIM_CACHE_DIR"
 CAUSES = {
     "numba.core.compiler_machinery": COMPILING,  # runs the passes; loading is elsewhere
+    "railsim.simulation.first_start": COMPILING,  # in another process
     "railsim.kernels.lock": "preparing: waiting for what another process compiles or builds",
     "railsim.contact.table": "preparing: the contact table of new profiles (kept for later)",
 }
@@ -37,8 +38,8 @@ def _cause() -> str:
         if module in CAUSES:
             return CAUSES[module]
         frame = frame.f_back
-    studies = sys.modules.get("railsim.studies.execute")
-    return COMPILING if studies is not None and not studies.is_compiled() else ""
+    execute = sys.modules.get("railsim.studies.execute")
+    return COMPILING if execute is not None and not execute.is_compiled() else ""
 
 
 def _report_causes(ended: Event) -> None:

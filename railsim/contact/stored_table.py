@@ -78,7 +78,7 @@ def kept_table(digest: str, build: Callable[[], ContactTable]) -> ContactTable:
     path = folder / f"{digest[:32]}.npy"
     if stored := _stored_table(path):
         return stored
-    with alone(folder):
+    with alone(folder / "tables.lock"):
         if stored := _stored_table(path):  # by the process that was waited for
             return stored
         table = build()

@@ -38,7 +38,7 @@ _MARK_TEXT = b"""Signature: 8a477f597d28d172789f06886806bc55
 # This folder was made by railsim, which may change and remove it.
 """
 _OF_SOURCES = re.compile("[0-9a-f]{16}")
-_OWN_FILES = (".nbc", ".nbi", ".part")
+_OWN_FILES = (".nbc", ".nbi", ".part", ".lock")
 HOUR, MONTH = 3600.0, 30 * 24 * 3600.0
 
 

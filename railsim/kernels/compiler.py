@@ -233,7 +233,7 @@ class KernelCache:
         path = self._path(signature, codegen)
         data = stored(path)
         if data is None:
-            self.until_stored.enter_context(alone(self._folder))
+            self.until_stored.enter_context(alone(path.with_suffix(".lock")))
             data = stored(path)  # by the process that was waited for
         if data is not None:
             rtsys.initialize(target_context)

@@ -1,4 +1,4 @@
-"""One process at a time compiles: the others wait, and load what it has stored."""
+"""One process compiles a function, or builds a table: the others wait, and load what it stored."""
 
 import os
 import time
@@ -6,39 +6,38 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from railsim.kernels.cache import MARK
-
 POLL = 0.1  # s between two tries, between which Ctrl-C is heard
 _held: set[Path] = set()
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder of the cache within the block; a process may take it again in it.
+def alone(path: Path) -> Iterator[None]:
+    """Hold a file of the cache as a lock within the block; a process may take it again in it.
 
     Without a word where there are no locks, or nothing can be stored: each process compiles then.
-    The lock ends with its process.
+    The lock ends with its process.  Where the file is removed while another process waits for it,
+    that one and a third may both go on: they find what was stored.
     """
-    handle = None if folder in _held else _locked(folder)
+    handle = None if path in _held else _locked(path)
     if handle is None:
         yield
         return
-    _held.add(folder)
+    _held.add(path)
     try:
         yield
     finally:
-        _held.discard(folder)
+        _held.discard(path)
+        with suppress(OSError):
+            path.unlink()
         os.close(handle)
 
 
-def _locked(folder: Path) -> int | None:
-    """Open and lock the mark of a folder; None where that cannot be done."""
-    if os.name == "nt":  # where a locked file cannot be read: the mark would be none
-        return None
+def _locked(path: Path) -> int | None:
+    """Open and lock a file; None where that cannot be done."""
     from filelock import lock_descriptor  # takes 20 ms, and is for those that compile
 
     try:
-        handle = os.open(folder / MARK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
     except OSError:
         return None
     try:

@@ -156,7 +156,7 @@ def assemble(
     shared = shared or SharedTables()
     if shared.track is None:
         shared.track = track_tables(track)
-    contact, tables, used = _contact(flat, track, settings, given, shared.contact)
+    contact, tables, used = _contact(flat, track, settings, given, shared)
     contact = with_own_laws(contact, settings)
     system, index = _suspension(flat, vehicle.laws or {})
     system = system._replace(
@@ -348,6 +348,14 @@ class SharedTables:
         self.track: TrackTables | None = None
         self.contact: dict[tuple[Any, ...], ContactTable] = {}
 
+    def contact_table(
+        self, key: tuple[Any, ...], wheel: Profile, rail: Profile, **how: Any
+    ) -> ContactTable:
+        """Return `cached_contact_table`, once for what it depends on."""
+        if key not in self.contact:
+            self.contact[key] = cached_contact_table(wheel, rail, **how)
+        return self.contact[key]
+
 
 def _profiles_by_name(profiles: Mapping[str, Profile] | None) -> dict[str, Profile]:
     """Return the profiles of a call; TypeError where they are no mapping of names to profiles."""
@@ -365,7 +373,7 @@ def _contact(
     track: Track,
     settings: Settings,
     profiles: dict[str, Profile],
-    known: dict[tuple[Any, ...], ContactTable],
+    shared: "SharedTables",
 ) -> tuple[Contact, tuple[ContactTable, ...], dict[str, Profile]]:
     """Contact arrays, one table for each different wheel on its rail, and the profiles used."""
     used: dict[str, Profile] = {}
@@ -393,23 +401,23 @@ def _contact(
             )
             wheel = profile(wheelset.profile[side], "wheel")
             rail = profile(track.rail[side], "rail")
-            if key not in known:
-                known[key] = cached_contact_table(
-                    wheel,
-                    rail,
-                    radius=wheelset.radius[side],
-                    gauge=track.gauge,
-                    inclination=track.inclination,
-                    back_to_back=wheelset.back_to_back,
-                    tape_circle_distance=wheelset.tape_circle_distance,
-                    G=settings.shear_modulus,
-                    nu=settings.poisson,
-                    centre_height=-body.position[2],
-                    normal=settings.normal_contact,
-                )
+            table = shared.contact_table(
+                key,
+                wheel,
+                rail,
+                radius=wheelset.radius[side],
+                gauge=track.gauge,
+                inclination=track.inclination,
+                back_to_back=wheelset.back_to_back,
+                tape_circle_distance=wheelset.tape_circle_distance,
+                G=settings.shear_modulus,
+                nu=settings.poisson,
+                centre_height=-body.position[2],
+                normal=settings.normal_contact,
+            )
             if key not in keys:
                 keys[key] = len(tables)
-                tables.append(known[key])
+                tables.append(table)
             which[w, side] = keys[key]
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")

@@ -25,6 +25,7 @@ from railsim.simulation.advance import Preparation, Run
 from railsim.simulation.auxiliary_track import Progress as SettlingProgress
 from railsim.simulation.conditions import Inputs, TakenUp
 from railsim.simulation.disturbance import disturb
+from railsim.simulation.first_start import compiled_beside
 from railsim.simulation.outputs import OutputPlan, run_extremes
 from railsim.simulation.run_in import start_state
 from railsim.simulation.run_progress import RunProgress
@@ -53,7 +54,8 @@ def prepare(
     on_run_in: SettlingProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
-    model = assemble(vehicle, track, settings, profiles, shared)
+    with compiled_beside():
+        model = assemble(vehicle, track, settings, profiles, shared)
     inputs = inputs_hash(vehicle, track, settings, model)
     balance = stored_equilibrium(model, speed, inputs)
     model = balance.model

@@ -29,12 +29,12 @@ from urllib.parse import urlsplit
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.errors import ModelError, RailsimError, argument_error
 from railsim.files.access import remove_partial_files, sweep, whole_file
-from railsim.kernels.time_loop import time_loop
 from railsim.processes import WorkerPool, begin_worker, worker_context
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import PLAIN, Storage, write
 from railsim.simulation import simulate
+from railsim.simulation.first_start import compile_time_loop, is_compiled
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.records import Record
@@ -241,6 +241,8 @@ class _Pool:
         try:
             self._submit([first])
             compiled = is_compiled()
+            if not compiled and rest:
+                self._pool.submit(compile_time_loop)  # while the first one builds contact tables
             while (rest or self._running) and not broken:
                 if rest and compiled:
                     self._submit(rest)
@@ -284,13 +286,6 @@ def _shares(batches: Sequence[Batch]) -> list[float]:
     """Share of each batch in all jobs."""
     total = sum(len(batch) for batch in batches)
     return [len(batch) / total for batch in batches]
-
-
-def is_compiled() -> bool:
-    """Whether the compiled time loop is available; true also if none is stored."""
-    statistics = getattr(time_loop, "stats", None)  # None: the compiler is switched off
-    folder = statistics.cache_path if statistics else None
-    return folder is None or any(Path(folder).glob("time_loop.time_loop-*.nbc"))
 
 
 def cluster(address: str) -> Any:

@@ -6,7 +6,8 @@ The code is loaded at the first call of each kernel, by a run of two steps.
 import sys
 from types import TracebackType
 
-from railsim.studies.execute import is_compiled, run_briefly
+from railsim.simulation.first_start import is_compiled
+from railsim.studies.execute import run_briefly
 
 # what a worker meets whose study has ended while it began: no semaphores, no inputs
 STUDY_HAS_ENDED = (FileNotFoundError, EOFError, ConnectionError)

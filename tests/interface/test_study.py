@@ -510,12 +510,12 @@ def test_script_without_a_guard_runs_once_and_nothing_of_the_folder_it_is_starte
 def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
     events = []
 
-    class Pool(execute.ProcessPoolExecutor):
-        def submit(self, work, index, job):
-            events.append(f"begin {index}")
-            return super().submit(work, index, job)
+    class Pool(execute.WorkerPool):
+        def submit(self, work, *task):
+            events.append(f"begin {task[0]}" if task else "compile")
+            return super().submit(work, *task)
 
-    monkeypatch.setattr(execute, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(execute, "WorkerPool", Pool)
     monkeypatch.setattr(execute, "is_compiled", lambda: compiled)
     show = lambda fraction: events.append("progress" if fraction > 0.0 else "nothing yet")  # noqa: E731
     outcome = railsim.study(
@@ -525,13 +525,14 @@ def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
     begins = [index for index, event in enumerate(events) if event.startswith("begin")]
     assert [events[index] for index in begins] == ["begin 0", "begin 1", "begin 2"]
     between = events[begins[0] + 1 : begins[1]]
+    assert between[:1] == ([] if compiled else ["compile"])
     assert between[-1:] == ([] if compiled else ["progress"])
 
 
 @pytest.mark.slow
 def test_compiled_code_is_seen(tmp_path):
     """An empty cache folder and a full one, each in a process of its own."""
-    look = "from railsim.studies.execute import is_compiled; print(is_compiled())"
+    look = "from railsim.simulation.first_start import is_compiled; print(is_compiled())"
     compile_it = (
         "import railsim; railsim.simulate(railsim.load_vehicle('coach_manchester'),"
         "railsim.load_track('straight'), speed=20.0, until=1.0);"
