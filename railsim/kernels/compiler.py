@@ -69,8 +69,11 @@ if PRIVATE:
             # Once: numba's first pass prepares the removal of reference counts.  What nobody else
             # sees may be put into its only caller.
             self._hide_callees()
-            passes, builder = self._codegen._module_pass_manager()
-            passes.run(self._final_module, builder)
+            passes = self._codegen._module_pass_manager()
+            if isinstance(passes, tuple):
+                passes[0].run(self._final_module, passes[1])
+            else:  # before numba 0.62
+                passes.run(self._final_module)
 
         def _finalize_final_module(self):
             self._finalized = True  # no more is added: what callers link is taken before

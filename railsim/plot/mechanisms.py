@@ -35,12 +35,10 @@ DASHES: tuple[Any, ...] = (
     (0, (1, 3)), (0, (9, 2, 3, 2)),
 )  # fmt: skip
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
-
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
 WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8}
 WIDTHS |= {"actuator": 3.2, "spring": 1.0, "damper": 1.6}
 CENTRE: dict[str, Any] = {"marker": "$\\oplus$", "color": "k", "ms": 8, "ls": "", "zorder": 5}
-"""Centre of gravity."""
 STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
 
 
