@@ -6,12 +6,13 @@ and the tables of the first pair of profiles.
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from railsim.contact.creep import creep_force
 from railsim.contact.table import ContactTable
 from railsim.definitions import Settings
 from railsim.definitions.loading import load_track, load_vehicle
@@ -22,6 +23,9 @@ from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.model.assembly import SharedTables, assemble
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 
 def is_compiled() -> bool:
@@ -40,24 +44,34 @@ def compiled_beside() -> Iterator[None]:
     """Compile the time loop in another process during the block, where nobody has compiled it.
 
     With one core, or where nothing can be stored, this process compiles when it calls the time
-    loop; so does a worker process, whose pool knows better how many there are.
+    loop; so does a worker process, whose pool knows better how many there are.  The creep laws are
+    a tenth of the loop, which this process compiles after the block: the other one then needs
+    not.
     """
-    folder = _folder()
-    if not PRIVATE or folder is None or is_compiled() or not os.access(folder, os.W_OK):
+    if is_compiled():
         yield
         return
+    with ExitStack() as stack:
+        compiling = _begun(stack)
+        yield
+        creep_force(3e-3, 4e-3, 50e3, 0.3, 1e-3, 0.0, 0.0)
+        if compiling is not None:
+            compiling.exception()  # then this process meets it too
+
+
+def _begun(stack: ExitStack) -> "Future[None] | None":
+    """Begin to compile in a process of its own, if there may be one."""
+    folder = _folder()
+    if not PRIVATE or folder is None or not os.access(folder, os.W_OK):
+        return None
     # no part of other starts
     from multiprocessing import parent_process
 
     from railsim.processes import WorkerPool, available_cores
 
     if available_cores() < 2 or parent_process() is not None:
-        yield
-        return
-    with WorkerPool(1) as pool:
-        compiling = pool.submit(compile_time_loop)
-        yield
-        compiling.exception()  # then this process meets it too
+        return None
+    return stack.enter_context(WorkerPool(1)).submit(compile_time_loop)
 
 
 class _NoTables(SharedTables):
