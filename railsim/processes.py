@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
-from types import ModuleType, TracebackType
+from types import ModuleType
 from typing import Any
 
 from railsim.threads import one_thread_each
@@ -128,16 +128,11 @@ class WorkerPool(ProcessPoolExecutor):
                     process.kill()
                 process.join()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: Any) -> None:
         """End the processes."""
-        if kind is not None:
+        if error[0] is not None:
             self.end()
-        super().__exit__(kind, error, trace)
+        super().__exit__(*error)
 
 
 def begin_worker(ending: Callable[[], None] | None = None) -> None:
