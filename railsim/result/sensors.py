@@ -157,11 +157,14 @@ def _of_bodies(
     offset = np.array([sensor.offset for sensor in sensors])
     s = motion["distance"][:, None] + offset + position[..., 0]
     cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
-    kappa = alignment.curvature(s)
+    cant_rate, grade_rate = alignment.cant_angle_rate(s), alignment.grade_angle_rate(s)
+    kappa, climb, level = alignment.curvature(s), np.sin(grade), np.cos(grade)
     c, sine = np.cos(cant), np.sin(cant)
-    down = np.stack([-np.sin(grade), sine * np.cos(grade), c * np.cos(grade)], axis=-1)
-    pitch_rate = alignment.grade_angle_rate(s) + kappa * sine
-    turned = np.stack([alignment.cant_angle_rate(s), pitch_rate, kappa * c], axis=-1)
+    down = np.stack([-climb, sine * level, c * level], axis=-1)
+    roll_rate = cant_rate - kappa * climb
+    pitch_rate = grade_rate * c + kappa * level * sine
+    yaw_rate = kappa * level * c - grade_rate * sine
+    turned = np.stack([roll_rate, pitch_rate, yaw_rate], axis=-1)
     turning = speed[:, None, None] * turned
     attitude, own, angular = _of_axes(sensors, position, rates, absolute)
     linear = absolute[..., :3] - GRAVITY * _into_body(down, *attitude)

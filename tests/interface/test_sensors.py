@@ -82,6 +82,31 @@ def test_roll_rate_is_the_rate_of_the_roll():
     assert of("seat", "roll_rate")[50:-3] == pytest.approx(rates[:, 0], abs=1e-3 * largest[0])
 
 
+def test_roll_rate_in_a_curve_on_a_gradient_is_that_about_the_inclined_axis():
+    """It turns with V/R about the vertical, about its own x axis with -V/R sin(grade).
+
+    Cant and roll do not matter for it; the pitch of the body adds to the grade.
+    """
+    speed, radius, gradient = 15.0, -250.0, 0.03
+    track = load_track(
+        "straight",
+        [
+            f"plan=[{{type='CIR', length=500.0, radius={radius}}}]",
+            "cant=[{type='CST', length=500.0, cant=-0.1}]",
+            f"vertical=[{{type='CST', length=500.0, gradient={gradient}}}]",
+        ],
+    )
+    settings = railsim.Settings.model_validate(
+        {"start_state": "steady", "outputs": {"sensors": True}}
+    )
+    coach = load_vehicle("coach_manchester")
+    result = railsim.simulate(coach, track, speed=speed, duration=20.0, settings=settings)
+    at = result.coordinates["sensor"].index("floor_middle")
+    pitch = result["body_position"][-1, result.bodies.index("carbody"), 4]
+    expected = -speed / radius * np.sin(np.arctan(gradient) + pitch)
+    assert result["sensor_roll_rate"][-1, at] == pytest.approx(expected, rel=0.01)
+
+
 def test_an_accelerometer_feels_gravity_and_the_absolute_acceleration_does_not():
     """At rest on 50 mm of cant it reads g sin(cant angle) to the left, towards the lower side.
 
