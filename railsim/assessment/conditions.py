@@ -157,11 +157,12 @@ def vehicle_conditions(
     if values:
         found += _conicity(np.array(values), limits.conicity, service)
     found.append(_loads(reports))
-    frictions = [mu for run in runs for mu in run.track().friction]
+    frictions = [run.track().friction_at(run["distance"]) for run in runs]
+    lowest, highest = min(map(np.min, frictions)), max(map(np.max, frictions))
     least = limits.friction
-    words = " to ".join(dict.fromkeys(f"{mu:.3g}" for mu in (min(frictions), max(frictions))))
+    words = " to ".join(dict.fromkeys(f"{mu:.3g}" for mu in (lowest, highest)))
     required = f"{least.value:g} at least" if least else ""
-    met = bool(least and min(frictions) >= least.value)
+    met = bool(least and lowest >= least.value)
     found.append(_compared("friction", words, least, required, met=met))
     return found
 

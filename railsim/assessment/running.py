@@ -66,7 +66,7 @@ def _kind(result: Result) -> tuple[str, ...]:
     vehicle, track = result.vehicle(), result.track()
     service = vehicle.service
     spectra = [str(getattr(part, "spectrum", part.type)) for part in track.irregularities]
-    friction = " / ".join(f"{mu:g}" for mu in dict.fromkeys(track.friction))
+    friction = " / ".join(f"{mu:g}" for mu in track.frictions)
     rails = " / ".join(dict.fromkeys(track.rail))
     return (
         (service.condition if service else None) or "", vehicle.load or "",

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from railsim.arrays import Floats, stretches
 from railsim.assessment.record import Record
@@ -19,18 +20,18 @@ from railsim.profiles import Profile
 HALF_BASE = 0.75  # m, from the middle of the axle to the nominal rolling circle
 
 
-def nadal(flange_angle: float, mu: float) -> float:
+def nadal(flange_angle: float, mu: ArrayLike) -> Floats:
     """Limit of Y/Q (Nadal 1896, Annales des Mines).
 
     `flange_angle`: Largest contact angle of the flange [rad]. `mu`: Coefficient of friction [1].
 
     Examples
     --------
-    >>> round(nadal(math.radians(70.0), 0.36), 3)
+    >>> round(float(nadal(math.radians(70.0), 0.36)), 3)
     1.2
     """
-    slope = math.tan(flange_angle)
-    return (slope - mu) / (1.0 + mu * slope)
+    slope, friction = math.tan(flange_angle), np.asarray(mu)
+    return np.asarray((slope - friction) / (1.0 + friction * slope))
 
 
 def flange_angle(profile: Profile) -> float:
@@ -63,14 +64,15 @@ class Climb:
     rise: float  # largest rise of the wheel above its rail since this position [m]
 
 
-def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) -> Climb:
+def climb_distance(s: Floats, Y_over_Q: Floats, limit: float | Floats, height: Floats) -> Climb:
     """Longest distance with Y/Q of one wheel above a limit, unfiltered.
 
     A wheel without load (nan) counts as above the limit.
 
     `s` (float64[time]): Position of the wheel, increasing [m]. `Y_over_Q` (float64[time]):
-    Derailment quotient of one wheel [1]. `limit`: For example Nadal's limit [1]. `height`
-    (float64[time]): Height of the wheel above its rail [m].
+    Derailment quotient of one wheel [1]. `limit`: For example Nadal's limit, over time where the
+    friction varies along the track [1]. `height` (float64[time]): Height of the wheel above its
+    rail [m].
 
     Examples
     --------
@@ -100,10 +102,11 @@ def overturning(Q: Floats) -> Floats:
 class WheelSafety:
     """Nadal's limit and climb distance of one wheel.
 
-    `limit`: Nadal's limit of Y/Q for the flange angle of the profile and the friction of the track
-    [1]. `Y_over_Q`: Largest derailment quotient, unfiltered [1]; nan where the wheel was without
-    load. `climb_distance`, `climb_begin`, `rise`: Longest distance above the limit, position of
-    its beginning, rise of the wheel on it [m].
+    `limit`: Nadal's limit of Y/Q for the flange angle of the profile and the friction of the rail,
+    where Y/Q comes nearest to it [1]. `Y_over_Q`: Derailment quotient there, unfiltered: the
+    largest where the friction does not vary [1]; nan where the wheel was without load.
+    `climb_distance`, `climb_begin`, `rise`: Longest distance above the limit, position of its
+    beginning, rise of the wheel on it [m].
     """
 
     place: str  # wheelset, from 1, and side
@@ -144,10 +147,11 @@ def safety_report(record: Record) -> SafetyReport:
     for w, wheelset in enumerate(wheelsets):
         for k, side in enumerate(SIDES):
             angle = flange_angle(result.profiles[wheelset.profile[k]])
-            limit = nadal(angle, track.friction[k])
+            limit = nadal(angle, track.friction_at(s[:, w])[:, k])
             climb = climb_distance(s[:, w], quotient[:, w, k], limit, _height(record, w, k))
-            # nan where the wheel was lifted
-            own = f"wheelset {w + 1} {side}", limit, float(np.max(quotient[:, w, k]))
+            nearest = int(np.argmax(quotient[:, w, k] / limit))  # nan where the wheel was lifted
+            there = float(limit[nearest]), float(quotient[nearest, w, k])
+            own = f"wheelset {w + 1} {side}", *there
             wheels.append(WheelSafety(*own, climb.length, climb.begin, climb.rise))
     Q = result["Q"]
     tilt = {name: np.abs(overturning(Q[:, own])) for name, own in record.bogies.items()}

@@ -83,7 +83,7 @@ def what_was_run(
         section.drawings.append(Drawing(name, words, Markup(vehicle_svg(vehicle)), kinds))
     for name, variants in tracks.items():
         rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
-        values = sorted({mu for track in variants for mu in track.friction})
+        values = sorted({mu for track in variants for mu in track.frictions})
         friction = ", ".join(f"{mu:g}" for mu in values)
         words = f"{variants[0].name}. Friction {friction}; rails {rails}."
         section.drawings.append(Drawing(name, words, Markup(track_svg(variants[0]))))

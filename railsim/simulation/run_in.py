@@ -158,10 +158,7 @@ def _guided(system: System, check: CheckRails) -> System:
 
 def _friction(track: Track, s: float) -> tuple[float, float]:
     """Coefficients of friction of the left and right rail at `s`."""
-    if track.friction_table is None:
-        return track.friction
-    table = np.array(track.friction_table)
-    left, right = (float(np.interp(s, table[:, 0], table[:, k])) for k in (1, -1))
+    left, right = track.friction_at(s).tolist()
     return left, right
 
 

@@ -251,7 +251,9 @@ def curving(
 
 
 def _friction(track: Track) -> float:
-    return float(sum(track.friction) / 2.0)
+    """Mean coefficient of friction of both rails at the track's beginning."""
+    rows = track.friction_table
+    return float(np.mean(track.friction if rows is None else rows[0][1:]))
 
 
 def _check(

@@ -128,11 +128,6 @@ def _rails(track: Track, moved: Displacement | None, s: Floats) -> Floats:
     if moved is not None:
         for row, (value, rate) in enumerate(zip(*moved(s), strict=True)):
             rail[:, row] = hermite(value, rate, ds)
-    if track.friction_table is None:
-        rail[:, 4, 0], rail[:, 5, 0] = track.friction
-        return rail
-    table = np.array(track.friction_table)
-    for row in (4, 5):
-        mu = np.interp(s, table[:, 0], table[:, row - 3])
-        rail[:, row, 0], rail[:, row, 1] = mu[:-1], np.diff(mu) / ds
+    mu = track.friction_at(s)
+    rail[:, 4:, 0], rail[:, 4:, 1] = mu[:-1], np.diff(mu, axis=0) / ds
     return rail

@@ -7,8 +7,10 @@ cant and gradient are piecewise linear in the arc length and rounded over `round
 
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from railsim.arrays import Floats
 from railsim.definitions.base import (
     SIDED_ROWS,
     Definition,
@@ -151,6 +153,20 @@ class Track(FileDefinition, Plottable):
     def mileage_at(self, s: "ArcLength") -> "ArcLength":
         """Mileage at an arc length, or at an array of them [m]."""
         return self.mileage - s if self.falling_mileage else self.mileage + s
+
+    def friction_at(self, s: float | Floats) -> Floats:
+        """Coefficients of friction of the left and right rail at arc lengths, float64[..., 2]."""
+        rows = np.array(self.friction_table or ((0.0, *self.friction),))
+        return np.stack([np.interp(s, rows[:, 0], rows[:, k]) for k in (1, 2)], axis=-1)
+
+    @property
+    def frictions(self) -> tuple[float, ...]:
+        """Coefficients of friction left and right, each once; of a table the least and largest."""
+        values = self.friction
+        if self.friction_table is not None:
+            occurring = [mu for row in self.friction_table for mu in row[1:]]
+            values = min(occurring), max(occurring)
+        return tuple(dict.fromkeys(values))
 
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:

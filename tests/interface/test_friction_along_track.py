@@ -1,0 +1,69 @@
+"""Friction that a table gives along the track, wherever friction is read: limits, conditions."""
+
+import math
+
+import numpy as np
+import pytest
+from made_record import made, track
+
+import railsim
+from railsim.assessment import assess
+from railsim.assessment.safety import flange_angle
+from railsim.profiles import load_profile
+
+STRAIGHT = {"type": "STR", "length": 1000.0}
+LOW_TO_HIGH = ((0.0, 0.2, 0.2), (1000.0, 0.6, 0.6))
+
+
+def on_rails(rows):
+    """A straight whose friction is that of a table, beside a coefficient that does not hold."""
+    return track(STRAIGHT).replace(friction=(0.4, 0.4), friction_table=rows)
+
+
+def outwards_on_the_left(quotient):
+    def forces(_, s):
+        return np.stack([np.full(s.shape, -quotient * 54.545e3), np.zeros(s.shape)], axis=-1)
+
+    return forces
+
+
+def test_nadals_limit_is_that_of_the_friction_under_the_wheel():
+    """Y/Q 0.9 is above the limit from the place on where friction makes the limit 0.9."""
+    profiles = {name: load_profile(name) for name in ("S1002", "60E1")}
+    forces = outwards_on_the_left(0.9)
+    run = made(on_rails(LOW_TO_HIGH), 20.0, Y=forces, profiles=profiles)
+    slope = math.tan(flange_angle(profiles["S1002"]))
+    reached = 1000.0 * ((slope - 0.9) / (1.0 + 0.9 * slope) - 0.2) / 0.4
+    (found,) = assess(run, "safety")
+    wheel = found.safety["run"].wheels[0]
+    assert wheel.climb_begin == pytest.approx(reached, abs=0.1)
+    mu = 0.2 + 0.4 * float(run["wheelset_distance"][:, 0].clip(max=1000.0).max()) / 1000.0
+    hardest = (slope - mu) / (1.0 + mu * slope)
+    last = float(run["wheelset_distance"][-1, 0])
+    assert wheel.climb_distance == pytest.approx(last - reached, abs=0.1)
+    assert (wheel.Y_over_Q, wheel.limit) == pytest.approx((0.9, hardest), rel=1e-9)
+
+
+def test_lubricated_stretch_is_not_a_test_on_dry_rails():
+    dry, wet = ((0.0, 0.4, 0.4),), ((0.0, 0.4, 0.4), (500.0, 0.15, 0.4), (1000.0, 0.4, 0.4))
+    states = {}
+    for name, rows in (("dry", dry), ("wet", wet)):
+        (found,) = assess(made(on_rails(rows), 36.0))
+        states[name] = next(c for c in found.conditions if c.name == "friction")
+    assert states["dry"].state == "met"
+    assert (states["wet"].state, states["wet"].found) == ("not met", "0.15 to 0.4")
+
+
+def test_runs_on_rails_of_different_friction_are_not_pooled():
+    runs = {f"mu {mu}": made(on_rails(((0.0, mu, mu),)), 36.0) for mu in (0.3, 0.5)}
+    (found,) = assess(runs)
+    assert {report.population.name for report in found.zones} == {"friction 0.3", "friction 0.5"}
+
+
+def test_curving_is_on_the_friction_that_the_track_begins_with():
+    coach = railsim.load_vehicle("coach_manchester")
+    by_table = on_rails(((0.0, 0.25, 0.25), (1000.0, 0.5, 0.5)))
+    found = railsim.curving(coach, by_table, radius=[400.0])
+    expected = railsim.curving(coach, track(STRAIGHT), radius=[400.0], friction=[0.25])
+    assert found.friction.tolist() == [0.25]
+    np.testing.assert_allclose(found.Y, expected.Y, rtol=1e-6)
