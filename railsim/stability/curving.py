@@ -210,7 +210,8 @@ def curving(
     cant_deficiency : sequence of float
         What is missing to the balanced cant, negative for too much [m].
     friction : sequence of float, optional
-        Coefficients of friction of both rails; by default that of the track.
+        Coefficients of friction of both rails; by default those of the track's rails at its
+        beginning, of which the result holds the mean.
     settings : Settings, optional
         Creep law and contact.
     profiles : mapping of str to Profile, optional
@@ -234,9 +235,12 @@ def curving(
     [[[1]], [[1]]]
     """
     track = track or load_track("straight")
-    mus = list(friction) if friction is not None else [_friction(track)]
+    both = _friction(track)
+    mus = list(friction) if friction is not None else [float(np.mean(both))]
     _check(radius, cant, cant_deficiency, mus)
     search = _Search(vehicle, track, cant, settings or Settings(), profiles)
+    if friction is None and mus[0] > 0.0:
+        search.shares = both / mus[0]
     found = search.empty(radius, cant_deficiency, mus)
     # from wide to narrow, each point from its neighbour
     order = sorted(range(len(radius)), key=lambda k: -abs(radius[k]))
@@ -250,10 +254,10 @@ def curving(
     return found
 
 
-def _friction(track: Track) -> float:
-    """Mean coefficient of friction of both rails at the track's beginning."""
+def _friction(track: Track) -> Floats:
+    """Coefficients of friction of the left and right rail at the track's beginning."""
     rows = track.friction_table
-    return float(np.mean(track.friction if rows is None else rows[0][1:]))
+    return np.array(track.friction if rows is None else rows[0][1:])
 
 
 def _check(
@@ -291,7 +295,10 @@ Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
 
 
 class _Search:
-    """Steady states of one vehicle, each sought from the nearest known one."""
+    """Steady states of one vehicle, each sought from the nearest known one.
+
+    `shares` (float64[side]): Friction of the left and right rail over that of the point.
+    """
 
     def __init__(
         self,
@@ -315,11 +322,13 @@ class _Search:
             )
         self.remarks += left_out(track, settings, assembled.wheels)
         self.parts = parts_of(self.model, coordinates(self.model))
-        values = np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)])
+        self.shares = np.ones(2)
+        values = np.array([0.0, 0.0, WALKING_PACE**2, np.mean(_friction(track))])
         self._rest = self._last = values, placed(balance.state)
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:
-        there = circle(self.track, curvature=curvature, cant=cant, friction=friction)
+        left, right = (friction * self.shares).tolist()
+        there = circle(self.track, curvature=curvature, cant=cant, friction=(left, right))
         return self.model.system._replace(track=track_tables(there))
 
     def point(self, radius: float, deficiency: float, friction: float) -> Point:

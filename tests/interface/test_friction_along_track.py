@@ -67,3 +67,20 @@ def test_curving_is_on_the_friction_that_the_track_begins_with():
     expected = railsim.curving(coach, track(STRAIGHT), radius=[400.0], friction=[0.25])
     assert found.friction.tolist() == [0.25]
     np.testing.assert_allclose(found.Y, expected.Y, rtol=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_curving_takes_the_friction_of_each_rail_as_a_run_does(side):
+    """One rail lubricated, curves to either hand: guiding forces of a run in its steady state."""
+    length, radius, height = 2000.0, 300.0, 0.1
+    on = track({"type": "CIR", "length": length, "radius": side * radius}, cant=side * height)
+    on = on.replace(
+        friction=(0.45, 0.12), cant=[{"type": "CST", "length": length, "cant": side * height}]
+    )
+    coach = railsim.load_vehicle("coach_manchester")
+    found = railsim.curving(coach, on, radius=[side * radius], cant=height, cant_deficiency=[0.05])
+    settings = railsim.Settings(start_state="steady")
+    run = railsim.simulate(
+        coach, on, speed=float(found.speed[0, 0]), duration=2.0, settings=settings
+    )
+    assert found.Y[0, 0, 0] == pytest.approx(run.Y[-1], rel=1e-3, abs=50.0)
