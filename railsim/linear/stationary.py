@@ -63,7 +63,7 @@ def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = Fal
     solver = SteadyRolling(model, system, held=held)
     state = solver.solve(start, WALKING_PACE)
     solver.evaluate(state)
-    return Standing(state, _loads(solver, held), balance.Q0)
+    return Standing(state, _loads(solver, held, on_cant=True), balance.Q0)
 
 
 def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -> float:
@@ -231,8 +231,12 @@ def _twisted(system: System, heights: Floats) -> System:
     return system._replace(track=system.track._replace(coefficients=aligned(coefficients)))
 
 
-def _loads(solver: SteadyRolling, held: bool) -> Floats:
-    """Wheel loads: of the contacts, or of held wheelsets from weight, forces and roll moments."""
+def _loads(solver: SteadyRolling, held: bool, *, on_cant: bool = False) -> Floats:
+    """Wheel loads: of the contacts, or of held wheelsets from weight, forces and roll moments.
+
+    On cant the rails hold a wheelset across, at their tops: a lateral force has the wheel radius as
+    lever.  On twist the closed formulas neglect the lateral forces.
+    """
     system, work = solver.system, solver.work
     if not held:
         return np.asarray(work.wheel[:, :, W_Q].copy())
@@ -240,7 +244,9 @@ def _loads(solver: SteadyRolling, held: bool) -> Floats:
     frames = work.frames[system.bodies.frame[bodies], 3:12].reshape(-1, 3, 3)
     force = np.einsum("wij,wi->wj", frames, work.pose[bodies, FORCE : FORCE + 3])
     moment = np.einsum("wij,wi->wj", frames, work.pose[bodies, MOMENT : MOMENT + 3])
-    weight = system.bodies.mass[bodies] * system.gravity * frames[:, 2, 2]
-    half = 0.5 * (force[:, 2] + weight)
+    force += (system.bodies.mass[bodies] * system.gravity)[:, None] * frames[:, 2]
+    half = 0.5 * force[:, 2]
     change = moment[:, 0] / CANT_BASE
+    if on_cant:
+        change += system.bodies.radius[bodies] * force[:, 1] / CANT_BASE
     return np.stack([half - change, half + change], axis=1)

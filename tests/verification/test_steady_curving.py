@@ -148,6 +148,19 @@ def test_standing_on_cant(coach, millimetres, coefficient, lateral):
         assert y == pytest.approx(lateral, rel=tolerance)
 
 
+def test_wheel_loads_on_cant_balance_the_weights_about_the_rails(coach):
+    """Every weight has its own height and displacement as levers; the rails hold across, too."""
+    cant = 0.1
+    standing = on_cant(coach, load_track("straight"), cant, held=True)
+    bodies, phi = coach.model.system.bodies, np.arcsin(cant / 1.5)
+    moment = 0.0
+    for b, mass in enumerate(bodies.mass):
+        y, z = bodies.nominal[b] + standing.state[6 * b + 1 : 6 * b + 3]
+        moment += mass * GRAVITY * (y * np.cos(phi) - z * np.sin(phi))
+    right_less_left = standing.Q[:, 1].sum() - standing.Q[:, 0].sum()
+    assert 0.75 * right_less_left == pytest.approx(moment, rel=5e-4)
+
+
 BOGIE = 7e-3 * 2.56 * np.array([0.5, -0.5, 0.5, -0.5])
 BODY = 0.053 * np.array([0.5, 0.5, -0.5, -0.5])
 
