@@ -1,4 +1,5 @@
 """Constants of railway engineering that more than one part of railsim takes."""
 
 GRAVITY = 9.81  # m/s2, as in the reference study
+NORMAL_GAUGE = 1.435  # m
 CANT_BASE = 1.5  # m, 2 b_0: distance of the nominal rolling circles, over which cant is measured

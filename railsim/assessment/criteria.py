@@ -20,7 +20,6 @@ from railsim.arrays import Floats
 from railsim.assessment import signals as of
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Band, Signal, Signals, between
-from railsim.constants import CANT_BASE
 from railsim.contact.geometry import ContactGeometry
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.result.filters import band_passed, distance_means, window_centres
@@ -182,7 +181,8 @@ def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: flo
     touching = ahead[np.abs(geometry.contact_angle[ahead]).max(axis=1) > FLANGE]
     if not len(touching) or touching[0] == 0 or difference[touching[0] - 1] <= 0.0:
         return math.nan
-    return float(CANT_BASE * rolling_radius / radius / difference[touching[0] - 1])
+    apart = float(np.ptp(geometry.contact_y[ahead[0]]))
+    return float(apart * rolling_radius / radius / difference[touching[0] - 1])
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,6 @@ from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 from railsim.profiles import Profile
 
-HALF_BASE = 0.75  # m, from the middle of the axle to the nominal rolling circle
-
 
 def nadal(flange_angle: float, mu: ArrayLike) -> Floats:
     """Limit of Y/Q (Nadal 1896, Annales des Mines).
@@ -168,7 +166,7 @@ def _height(record: Record, w: int, side: int) -> np.ndarray:
         return np.zeros(len(record.time))
     position = result["body_position"][:, result.bodies.index(result.wheelsets[w])]
     outwards = (-1.0, 1.0)[side]
-    height = -(position[:, 2] + outwards * HALF_BASE * position[:, 3])
+    height = -(position[:, 2] + 0.5 * outwards * record.result.track().rail_base * position[:, 3])
     if "rail_vertical" in result:
         height = height + result["rail_vertical"][:, w, side]
     return np.asarray(height)

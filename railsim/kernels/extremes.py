@@ -72,7 +72,7 @@ def note_extremes(system, work, state):
         height = system.bodies.row[body[w], Z_0]
         y, z, roll = state[b + 1], state[b + 2] + height, state[b + 3]
         present[X_LATERAL], present[X_ROLL] = against_rails(
-            plane, w, y, z, roll, left_y, left_z, right_y, right_z
+            plane, system.track.rail_base, w, y, z, roll, left_y, left_z, right_y, right_z
         )
         present[X_YAW] = state[b + 5]
         high, low = EXTREMES * (MAX * body.shape[0] + w), EXTREMES * (MIN * body.shape[0] + w)

@@ -4,8 +4,8 @@ Irregularities displace the rails in the axes of the track frame, (y_l, z_l) and
 the arc length.  Under a wheelset they make a track of their own, with
 
 - its middle y_m, z_m, the mean of both rails: alignment and longitudinal level;
-- its roll rho = asin((z_r - z_l)/2 b_0), 2 b_0 = 1.5 m: the cross level.  It turns the rail heads
-  and the axes of Y and Q as cant does;
+- its roll rho = asin((z_r - z_l)/2 b_0), 2 b_0 the distance of the rails (1.5 m at 1435 mm): the
+  cross level.  It turns the rail heads and the axes of Y and Q as cant does;
 - the rails' distances from the middle in that plane, +-(y_r - y_l)/2: the gauge.
 
 So rails are the same whether written as plan, vertical profile and cant or as irregularities.
@@ -45,8 +45,6 @@ from railsim.kernels.track_frame import (
     cell_of,
     polynomial,
 )
-
-CANT_BASE = 1.5  # m, 2 b_0
 
 PAIRS = 4  # wheelsets in eight lanes, one a rail: left, right, left, ...
 SIDES = np.array([-1.0, 1.0] * PAIRS)
@@ -111,7 +109,7 @@ def locate_in_cells(track, cell, cell_u, plane, rail):
         y, y_slope, y_bend = polynomial(y0, y1, y2, y3, u)
         z, z_slope, z_bend = polynomial(z0, z1, z2, z3, u)
         side = load_lanes(SIDES, 0)
-        sine = side * (z - beside(z)) / CANT_BASE
+        sine = side * (z - beside(z)) / track.rail_base
         cosine = square_root(1.0 - sine * sine)
         planes = pair_starts(wheels, 0, PLANE_SIZE, 0)
         store_rows(
@@ -126,7 +124,7 @@ def locate_in_cells(track, cell, cell_u, plane, rail):
                 arc_sine_lanes(sine),
                 sine,
                 cosine,
-                side * (z_slope - beside(z_slope)) / (CANT_BASE * cosine),
+                side * (z_slope - beside(z_slope)) / (track.rail_base * cosine),
             ),
         )
         store_rows(plane, planes, BEND_Z, (0.5 * (z_bend + beside(z_bend)),))
@@ -156,7 +154,7 @@ def predict_rate_changes(system, work, w, state):
             c = system.track.rail
             _, y_slope, _ = polynomial(c[i, y, 0], c[i, y, 1], c[i, y, 2], c[i, y, 3], u)
             _, z_slope, _ = polynomial(c[i, z, 0], c[i, z, 1], c[i, z, 2], c[i, z, 3], u)
-        arm = (side - 0.5) * CANT_BASE * plane[w, COSINE]
+        arm = (side - 0.5) * system.track.rail_base * plane[w, COSINE]
         now = plane[w, SLOPE_Z] + arm * plane[w, ROLL_SLOPE]
         rate_change[side, CHANGE_Y] = (
             change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[own + 1]
@@ -166,7 +164,7 @@ def predict_rate_changes(system, work, w, state):
 
 
 @compiled(inline=True)
-def against_rails(plane, w, y, z, roll, left_y, left_z, right_y, right_z):
+def against_rails(plane, rail_base, w, y, z, roll, left_y, left_z, right_y, right_z):
     """Lateral displacement and roll of wheelset `w` against its irregular, deflected rails.
 
     The displacement is that of the wheelset's centre from the middle of the rails, along the line
@@ -175,6 +173,8 @@ def against_rails(plane, w, y, z, roll, left_y, left_z, right_y, right_z):
     Parameters
     ----------
     plane : float64[w, PLANE_SIZE]
+    rail_base : float
+        See `TrackTables` [m].
     y, z, roll : float
         Centre of the wheelset in the track frame, z from the rail tops [m], and its roll [rad].
     left_y, left_z, right_y, right_z : float
@@ -183,7 +183,7 @@ def against_rails(plane, w, y, z, roll, left_y, left_z, right_y, right_z):
     sine, cosine = plane[w, SINE], plane[w, COSINE]
     y -= plane[w, MIDDLE_Y]
     z -= plane[w, MIDDLE_Z]
-    lean = (right_z - left_z) / CANT_BASE
+    lean = (right_z - left_z) / rail_base
     across = cosine * y + sine * z - 0.5 * (left_y + right_y)
     up = cosine * z - sine * y - 0.5 * (left_z + right_z)
     return across + lean * up, roll - plane[w, ROLL] - lean
@@ -224,6 +224,7 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
                 yielded = states[i, first + size * w : first + size * w + 4]
             b = 6 * body[w]
             y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
+            left_y, left_z, right_y, right_z = yielded[0], yielded[1], yielded[2], yielded[3]
             found[i, w, 0], found[i, w, 1] = against_rails(
-                plane, w, y, z, roll, yielded[0], yielded[1], yielded[2], yielded[3]
+                plane, track.rail_base, w, y, z, roll, left_y, left_z, right_y, right_z
             )

@@ -47,6 +47,8 @@ class TrackTables(NamedTuple):
         positive) in track axes [m]; friction coefficient left, right [1].
     has_irregularity : int
         0 where both rails are undisturbed: `rail`'s displacements are not looked up.
+    rail_base : float
+        Distance of the rails, over which their difference in height is the roll of the plane [m].
     """
 
     s_start: float
@@ -54,6 +56,7 @@ class TrackTables(NamedTuple):
     coefficients: np.ndarray
     rail: np.ndarray
     has_irregularity: int
+    rail_base: float
 
 
 @compiled(inline=True)

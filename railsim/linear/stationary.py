@@ -155,7 +155,7 @@ def on_twist(
     Dry friction follows the way from straight level track.
 
     `balance`, `track`, `held`: as in `on_cant`; `heights`: left rail over the right one under each
-    wheelset, on 1.5 m [m]; `curvature`: 1/radius, positive to the right, of a curve that wheelsets
+    wheelset [m]; `curvature`: 1/radius, positive to the right, of a curve that wheelsets
     roll through [1/m].
     """
     raised = np.asarray(heights, dtype=float)
@@ -214,7 +214,7 @@ def _placing(
 
     def standing(share: float, state: Floats) -> tuple[System, Floats]:
         held_at = state.copy()
-        held_at[rolls] = upright + share * heights / CANT_BASE
+        held_at[rolls] = upright + share * heights / level.track.rail_base
         held_at[ARC_LENGTH] = 0.0
         return level, held_at
 
@@ -227,7 +227,7 @@ def _twisted(system: System, heights: Floats) -> System:
     for body, height in zip(system.contact.body, heights, strict=True):
         s = POSITION + system.frame_offset[system.bodies.frame[body]]
         cell = int((s - system.track.s_start) / system.track.ds)
-        coefficients[cell, PHI, 0] = np.arcsin(height / CANT_BASE)
+        coefficients[cell, PHI, 0] = np.arcsin(height / system.track.rail_base)
     return system._replace(track=system.track._replace(coefficients=aligned(coefficients)))
 
 
@@ -246,7 +246,8 @@ def _loads(solver: SteadyRolling, held: bool, *, on_cant: bool = False) -> Float
     moment = np.einsum("wij,wi->wj", frames, work.pose[bodies, MOMENT : MOMENT + 3])
     force += (system.bodies.mass[bodies] * system.gravity)[:, None] * frames[:, 2]
     half = 0.5 * force[:, 2]
-    change = moment[:, 0] / CANT_BASE
+    base = system.track.rail_base
+    change = moment[:, 0] / base
     if on_cant:
-        change += system.bodies.radius[bodies] * force[:, 1] / CANT_BASE
+        change += system.bodies.radius[bodies] * force[:, 1] / base
     return np.stack([half - change, half + change], axis=1)

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.linalg import schur
 
 from railsim.arrays import Complexes, Floats, Integers
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.constants import GRAVITY
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import System
 from railsim.linear.circle import POSITION
@@ -191,11 +191,12 @@ def _forces_of(system: System, before: int) -> Floats:
     """
     bodies, count = system.contact.body, len(system.contact.body)
     own = np.zeros((before + 6 * count, count, len(COMPONENTS)))
+    base = system.track.rail_base
     for w, b in enumerate(bodies):
         mass, roll = system.bodies.mass[b], system.bodies.inertia[b, 0]
         for side, sign in enumerate((1.0, -1.0)):
             Q = before + 2 * w + side
-            turned = sign * np.array([system.bodies.radius[b] * mass, 0.0, roll, 0.0]) / CANT_BASE
+            turned = sign * np.array([system.bodies.radius[b] * mass, 0.0, roll, 0.0]) / base
             own[Q, w] = turned + np.array([0.0, -0.5 * mass, 0.0, 0.0])
             own[Q + 2 * count, w, 0] = -0.5 * mass
         own[before + 4 * count + w, w, 0] = -mass

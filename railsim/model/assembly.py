@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.constants import GRAVITY
 from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
@@ -161,7 +161,7 @@ def assemble(
     system, index = _suspension(flat, vehicle.laws or {})
     system = system._replace(
         track=shared.track,
-        support=support_arrays(track.support),
+        support=support_arrays(track.support, track.rail_base),
         contact=contact,
         drive=drive_arrays(settings.drive),
     )
@@ -233,8 +233,11 @@ def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> Non
     faults.check()
 
 
-def support_arrays(definition: SupportDefinition) -> Support:
-    """Arrays of the moving track model; the track's elastic parts as they follow from the file."""
+def support_arrays(definition: SupportDefinition, rail_base: float) -> Support:
+    """Arrays of the moving track model; the track's elastic parts as they follow from the file.
+
+    `rail_base`: distance of the rails, under which the pads stand on the sleeper [m].
+    """
     values = definition.values
     variation = np.array(definition.variation or (), dtype=float).reshape(-1, 3)
     if values is None:
@@ -257,7 +260,7 @@ def support_arrays(definition: SupportDefinition) -> Support:
             2.0 * c_side,
             2.0 * square * k_side,
             2.0 * square * c_side,
-            0.5 * CANT_BASE,
+            0.5 * rail_base,
         ]
     )
     return Support(1, int(values.has_sleeper), int(values.massless), row, variation)

@@ -134,7 +134,7 @@ def level_track(system: System) -> System:
     coefficients[:, 0, 1] = 1.0
     start = float(np.min(system.frame_offset)) - length / 2.0
     coefficients[:, 0, 0] += start + length
-    track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0)
+    track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0, system.track.rail_base)
     even = system.support._replace(variation=system.support.variation[:0])
     return without_loads(system)._replace(track=track, support=even, drive=CONSTANT_SPEED)
 

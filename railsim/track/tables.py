@@ -54,7 +54,8 @@ def track_tables(track: Track, cell_length: float | None = None) -> TrackTables:
     coefficients = make(line)
     moved = displacement(track)
     rail = _rails(track, moved, s)
-    return TrackTables(float(s[0]), float(ds), coefficients, rail, int(moved is not None))
+    irregular = int(moved is not None)
+    return TrackTables(float(s[0]), float(ds), coefficients, rail, irregular, track.rail_base)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.track_frame import FRAME_SIZE, TrackTables
-track = TrackTables(-1.0, 1.0, np.zeros((3, 6, 4)), np.zeros((3, 6, 4)), 0)
+track = TrackTables(-1.0, 1.0, np.zeros((3, 6, 4)), np.zeros((3, 6, 4)), 0, 1.5)
 frames = np.zeros((1, FRAME_SIZE))
 cells = np.zeros(1, dtype=np.int64), np.zeros(1)
 assert numba.config.CACHE_DIR == os.environ.get("NUMBA_CACHE_DIR", "")  # others' kernels

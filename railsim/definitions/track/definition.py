@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from railsim.arrays import Floats
+from railsim.constants import CANT_BASE, NORMAL_GAUGE
 from railsim.definitions.base import (
     SIDED_ROWS,
     Definition,
@@ -149,6 +150,11 @@ class Track(FileDefinition, Plottable):
     def length(self) -> float:
         """Length of the plan [m]."""
         return sum(element.length for element in self.plan)
+
+    @property
+    def rail_base(self) -> float:
+        """Distance of the rails over which their heights differ: 1.5 m at 1435 mm of gauge [m]."""
+        return CANT_BASE + (self.gauge - NORMAL_GAUGE)
 
     def mileage_at(self, s: "ArcLength") -> "ArcLength":
         """Mileage at an arc length, or at an array of them [m]."""
