@@ -25,6 +25,7 @@ from railsim.definitions.base import (
     rises,
 )
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.vehicle.bogies import bogie_mass
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
@@ -156,7 +157,9 @@ class ByBogieMass(Sourced):
 
     def at(self, place: Situation) -> float:
         """Return the limit [m/s2]."""
-        return self.constant - self.slope * bogie_mass(place.vehicle, place.wheelset or 0)
+        flat = flatten(place.vehicle)
+        wheelset = flat.of_kind("wheelset")[place.wheelset or 0]
+        return self.constant - self.slope * bogie_mass(flat, wheelset)
 
 
 class Share(Sourced):
@@ -178,20 +181,6 @@ LimitLaw = Annotated[
     Constant | ByZone | ByAxleLoad | ByWheelLoad | ByRadius | ByBogieMass | Share,
     Field(discriminator="law"),
 ]
-
-
-def bogie_mass(vehicle: Vehicle, wheelset: int) -> float:
-    """Mass of the frame above a wheelset and of the wheelsets nearest to it [kg]."""
-    flat = flatten(vehicle)
-    wheelsets = flat.of_kind("wheelset")
-    frames = [b for b in flat.of_kind("body") if b.name != flat.reference]
-
-    def frame_of(x: float) -> str:
-        return min(frames, key=lambda frame: abs(frame.position[0] - x)).name
-
-    own = frame_of(wheelsets[wheelset].position[0])
-    carried = [w.mass for w in wheelsets if frame_of(w.position[0]) == own]
-    return sum(b.mass for b in frames if b.name == own) + sum(carried)
 
 
 class HighFriction(Sourced):

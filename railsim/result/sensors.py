@@ -12,13 +12,13 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.constants import GRAVITY
+from railsim.definitions.vehicle.bogies import frame_above
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, flatten
 from railsim.track.alignment import Alignment
 
 BOX = 1.0  # distance of a sensor on an axlebox from the middle of the wheelset [m]
 MOTIONS = ("position", "velocity", "acceleration")
-NEAR = 3.0  # A frame above a wheelset lies no further from it than this along the vehicle [m]
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,10 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
         height = -(vehicle.service.floor_height if vehicle.service else 1.2)
         for name, x in (("front", np.mean(front)), ("middle", middle), ("rear", np.mean(rear))):
             found[f"floor_{name}"] = (reference.name, (float(x), 0.0, height))
-    frames = [b for b in flat.bodies if b.kind == "body" and b is not reference]
     for number, wheelset in enumerate(wheelsets, start=1):
-        x = wheelset.position[0]
-        distances = [abs(frame.position[0] - x) for frame in frames]
-        if distances and min(distances) <= NEAR:
-            frame = frames[distances.index(min(distances))]
-            found[f"frame_{number}"] = (frame.name, (x, 0.0, frame.position[2]))
+        if (frame := frame_above(flat, wheelset)) is not None:
+            above = (wheelset.position[0], 0.0, frame.position[2])
+            found[f"frame_{number}"] = (frame.name, above)
     for name, point in (vehicle.service.points if vehicle.service else {}).items():
         found[name] = (point.body, point.position)
     origin = reference.position[0]

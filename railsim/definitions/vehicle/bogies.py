@@ -1,0 +1,75 @@
+"""Which body is the bogie frame above a wheelset, and what else belongs to its bogie."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Set
+
+from railsim.definitions.elements.traction import AxleTorque
+from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle
+
+NEAR = 3.0  # a frame lies no further from its wheelset than this along the vehicle [m]
+
+
+def frame_above(flat: FlatVehicle, wheelset: FlatBody) -> FlatBody | None:
+    """Return the bogie frame above a wheelset; None where no body is near.
+
+    Of the bodies on the shortest ways over elements from the wheelset to the reference body the
+    nearest one along the vehicle: a motor that hangs on the axle is on none of them.  Where there
+    is no such body, the nearest of all.
+    """
+    between = _between(flat, wheelset.name)
+    others = [body for body in flat.of_kind("body") if body.name != flat.reference]
+    found = [body for body in others if body.name in between] or others
+
+    def distance(body: FlatBody) -> float:
+        return abs(body.position[0] - wheelset.position[0])
+
+    nearest = min(found, key=distance, default=None)
+    return nearest if nearest is not None and distance(nearest) <= NEAR else None
+
+
+def bogie_mass(flat: FlatVehicle, wheelset: FlatBody) -> float:
+    """Mass of the bogie of a wheelset [kg]: frame, bodies of its assembly, and its wheelsets.
+
+    Zero where no frame is above it.
+    """
+    frame = frame_above(flat, wheelset)
+    if frame is None:
+        return 0.0
+    assembly = frame.name.rpartition(".")[0]
+    inside = [
+        body
+        for body in flat.of_kind("body")
+        if body is frame
+        or (assembly and body.name.startswith(f"{assembly}.") and body.name != flat.reference)
+    ]
+    own = [w for w in flat.of_kind("wheelset") if frame_above(flat, w) is frame]
+    return sum(body.mass for body in (*inside, *own))
+
+
+def _between(flat: FlatVehicle, wheelset: str) -> Set[str]:
+    """Names of the bodies on the shortest ways from a wheelset to the reference body."""
+    joined: dict[str, set[str]] = defaultdict(set)
+    ends = [(e.body1, e.body2) for e in flat.elements if e.body2 and not _about_axle(e)]
+    ends += [(body.name, body.parent) for body in flat.bodies if body.parent]
+    for one, other in ends:
+        joined[one].add(other)
+        joined[other].add(one)
+    there, back = _steps(joined, wheelset), _steps(joined, flat.reference)
+    if flat.reference not in there:
+        return set()
+    return {name for name in there if there[name] + back[name] == there[flat.reference]}
+
+
+def _steps(joined: Mapping[str, Set[str]], begin: str) -> dict[str, int]:
+    """Least number of elements from a body to every other one that can be reached."""
+    found, edge = {begin: 0}, {begin}
+    while edge:
+        edge = {name for one in edge for name in joined.get(one, ())} - found.keys()
+        found |= dict.fromkeys(edge, max(found.values()) + 1)
+    return found
+
+
+def _about_axle(element: FlatElement) -> bool:
+    """Whether it is a torque of a drive or brake, which holds nothing."""
+    law = element.definition
+    return isinstance(law, AxleTorque) or getattr(law, "acts", None) == "axle"
