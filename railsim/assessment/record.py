@@ -12,6 +12,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
+from railsim.definitions.vehicle.bogies import bogie_name
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError
 from railsim.result import Result
@@ -125,12 +126,13 @@ class Record:
         """Arc length of each wheelset relative to the reference body [m]."""
         return np.asarray(self.result.part("wheelset_distance", slice(0, 1))[0] - self.distance[0])
 
-    @property
+    @cached_property
     def bogies(self) -> dict[str, list[int]]:
         """Numbers of the wheelsets of each bogie."""
         found: dict[str, list[int]] = {}
-        for w, name in enumerate(self.result.wheelsets):
-            found.setdefault(name.split(".")[0], []).append(w)
+        flat = flatten(self.result.vehicle())
+        for w, wheelset in enumerate(flat.of_kind("wheelset")):
+            found.setdefault(bogie_name(flat, wheelset), []).append(w)
         return found
 
     @cached_property

@@ -12,7 +12,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.constants import GRAVITY
-from railsim.definitions.vehicle.bogies import frame_above
+from railsim.definitions.vehicle.bogies import carrying, frame_above
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, flatten
 from railsim.track.alignment import Alignment
@@ -35,7 +35,7 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     """Sensors of a running test: on the floor and on the bogie frames, and the vehicle's own.
 
     ``floor_front``, ``floor_middle`` and ``floor_rear`` on the reference body above the bogies
-    (means of the wheelsets in the front and rear half) and in the middle between them, at the
+    (means of its wheelsets in the front and rear half) and in the middle between them, at the
     service table's height of the floor; ``frame_1``, ... above each wheelset, on the body between
     the wheelset and the reference body; and the points of the service table.
     """
@@ -45,9 +45,9 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     reference = bodies[flat.reference]
     found: dict[str, tuple[str, tuple[float, float, float]]] = {}
     if reference.kind != "wheelset":
-        middle = float(np.mean([w.position[0] for w in wheelsets]))
-        front = [w.position[0] for w in wheelsets if w.position[0] >= middle]
-        rear = [w.position[0] for w in wheelsets if w.position[0] <= middle]
+        places = [w.position[0] for w in carrying(flat)]
+        middle = float(np.mean(places))
+        front, rear = [x for x in places if x >= middle], [x for x in places if x <= middle]
         height = -(vehicle.service.floor_height if vehicle.service else 1.2)
         for name, x in (("front", np.mean(front)), ("middle", middle), ("rear", np.mean(rear))):
             found[f"floor_{name}"] = (reference.name, (float(x), 0.0, height))

@@ -3,7 +3,7 @@
 import pytest
 
 from railsim.definitions.loading import load_vehicle
-from railsim.definitions.vehicle.bogies import bogie_mass
+from railsim.definitions.vehicle.bogies import bogie_mass, bogie_name
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.result.sensors import sensors
@@ -51,3 +51,30 @@ def test_a_three_piece_bogie_weighs_bolster_side_frames_and_wheelsets():
 def test_a_wagon_without_bogies_has_no_frames():
     assert frames(load_vehicle("wagon_uic_link")) == []
     assert masses(load_vehicle("wagon_uic_link")) == [0.0, 0.0]
+
+
+def test_floor_sensors_of_a_train_are_in_the_car_whose_distance_counts():
+    """Three coupled coaches 26 m apart: the floor above the bogies of the middle one."""
+    data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    parts = {name: data[name] for name in ("bodies", "elements", "assemblies") if name in data}
+    places = [{"name": f"car{n}", "position": [-26.0 * n, 0.0, 0.0]} for n in range(3)]
+    couplers = {
+        f"coupler{n}": {
+            "kind": "spring_damper", "bodies": [f"car{n}.carbody", f"car{n + 1}.carbody"],
+            "points": [[-26.0 * n - 12.5, 0.0, -1.0], [-26.0 * n - 13.5, 0.0, -1.0]],
+            "stiffness": 2e6,
+        }
+        for n in range(2)
+    }  # fmt: skip
+    train = Vehicle.model_validate({
+        "format": "railsim-vehicle/1", "name": "train", "reference": "car1.carbody",
+        "assemblies": {"car": {"placements": places, **parts}}, "elements": couplers,
+    })  # fmt: skip
+    found = sensors(train)
+    arms = [found[f"floor_{place}"].arm[0] for place in ("front", "middle", "rear")]
+    assert arms == pytest.approx([9.5, 0.0, -9.5], abs=1e-9)
+    assert found["frame_12"].body == "car2.rear.frame"
+    flat = flatten(train)
+    bogies = [bogie_name(flat, wheelset) for wheelset in flat.of_kind("wheelset")]
+    expected = [f"car{n}.{end}" for n in range(3) for end in ("front", "rear") for _ in range(2)]
+    assert bogies == expected

@@ -1,4 +1,4 @@
-"""Which body is the bogie frame above a wheelset, and what else belongs to its bogie."""
+"""Which wheelsets carry the car, the bogie frame above each, and what belongs to its bogie."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Set
@@ -27,6 +27,17 @@ def frame_above(flat: FlatVehicle, wheelset: FlatBody) -> FlatBody | None:
     return nearest if nearest is not None and distance(nearest) <= NEAR else None
 
 
+def bogie_name(flat: FlatVehicle, wheelset: FlatBody) -> str:
+    """Name of the bogie of a wheelset: of its frame's assembly, or of the frame itself.
+
+    Without a frame above it, the first part of the wheelset's name.
+    """
+    frame = frame_above(flat, wheelset)
+    if frame is None:
+        return wheelset.name.split(".")[0]
+    return frame.name.rpartition(".")[0] or frame.name
+
+
 def bogie_mass(flat: FlatVehicle, wheelset: FlatBody) -> float:
     """Mass of the bogie of a wheelset [kg]: frame, bodies of its assembly, and its wheelsets.
 
@@ -44,6 +55,23 @@ def bogie_mass(flat: FlatVehicle, wheelset: FlatBody) -> float:
     ]
     own = [w for w in flat.of_kind("wheelset") if frame_above(flat, w) is frame]
     return sum(body.mass for body in (*inside, *own))
+
+
+def carrying(flat: FlatVehicle) -> tuple[FlatBody, ...]:
+    """Return the wheelsets that carry the reference body, of a train those of its car.
+
+    On the way from another car's wheelset there is that car: a body of half the mass of the
+    reference body or more.  All wheelsets where none is found.
+    """
+    heavy = 0.5 * flat.body(flat.reference).mass
+    wheelsets = flat.of_kind("wheelset")
+    found = []
+    for wheelset in wheelsets:
+        between = _between(flat, wheelset.name)
+        cars = [name for name in between if flat.body(name).mass >= heavy and name != wheelset.name]
+        if cars == [flat.reference]:
+            found.append(wheelset)
+    return tuple(found) or wheelsets
 
 
 def _between(flat: FlatVehicle, wheelset: str) -> Set[str]:
