@@ -22,6 +22,7 @@ def left_out(track: Track, settings: Settings, wheels: UnevenWheels) -> tuple[st
     """Remark on what a track of constant curvature and steady rolling leave out."""
     parts = {
         "check rails": track.check_rail,
+        "gauge widening": track.gauge_widening,
         "sections of rails": track.sections,
         "wheels that are not round": wheels.uneven,
         "transient creep forces": settings.transient_creep,

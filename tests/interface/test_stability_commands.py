@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+import railsim
 from railsim.cli import main
 
 
@@ -229,3 +230,10 @@ def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     error = capsys.readouterr().err
     assert words in error
     assert "Traceback" not in error
+
+
+def test_gauge_widening_is_left_out_of_steady_curving_with_a_remark():
+    """A run on it sees a greater gauge, steady curving does not."""
+    track = railsim.load_track("straight", ["gauge_widening=[[0.0, 0.01]]"])
+    found = railsim.curving(railsim.load_vehicle("coach_manchester"), track, radius=[500.0])
+    assert any("left out" in one and "gauge widening" in one for one in found.remarks)
