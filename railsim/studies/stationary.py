@@ -11,7 +11,7 @@ with both twists, to either side.  Dry friction follows the way from straight le
 it holds nothing: the mean of both directions.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -200,8 +200,8 @@ def stationary(
     worst = float(np.max(quotients))
     values.append(_judged(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
     name = f"cant {1e3 * cant:g} mm"
-    standing = found(name, lambda: on_cant(balance, track, cant, held=held))
-    values += _lean(name, balance.model, flat.reference, standing, cant, limits)
+    both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
+    values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
     return Stationary(vehicle.name, limits.edition, held, tuple(values), tuple(reasons), loops)
 
 
@@ -293,18 +293,24 @@ def _lean(
     case: str,
     model: Model,
     body: str,
-    standing: Standing | None,
+    standings: Sequence[Standing],
     cant: float,
     limits: StationaryLimits,
 ) -> list[StationaryValue]:
-    """Unloading, angle of the floor and roll coefficient on a cant [m]; nan without a state."""
-    worst, wheel, share = np.nan, "", np.nan
-    if standing is not None:
-        shares = (standing.Q0 - standing.Q) / standing.Q0
-        w, side = np.unravel_index(int(np.argmax(shares)), shares.shape)
-        worst, wheel = float(shares[w, side]), f"wheelset {w + 1} {SIDES[side]}"
-        share = roll_coefficient(model, standing, cant, body)
-    floor = float(np.arcsin(cant / CANT_BASE)) * (1.0 + share)
+    """Unloading, angle of the floor and roll coefficient on a cant [m]; nan without a state.
+
+    `standings`: leaning to the right and to the left.  The worse side counts, and for the roll
+    coefficient the mean, in which the roll of a load to one side cancels out.
+    """
+    worst, wheel, share, most = np.nan, "", np.nan, np.nan
+    if standings:
+        shares = np.array([(standing.Q0 - standing.Q) / standing.Q0 for standing in standings])
+        way, w, side = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        worst, wheel = float(shares[way, w, side]), f"wheelset {w + 1} {SIDES[side]}"
+        leaning = zip(standings, (cant, -cant), strict=True)
+        rolls = [roll_coefficient(model, standing, height, body) for standing, height in leaning]
+        share, most = float(np.mean(rolls)), max(rolls)
+    floor = float(np.arcsin(cant / CANT_BASE)) * (1.0 + most)
     return [
         _judged(case, UNLOADING, worst, limits.lean_unloading, wheel),
         _judged(case, "angle of the floor", floor, limits.lean_angle, body),

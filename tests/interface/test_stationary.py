@@ -75,6 +75,27 @@ def test_both_branches_of_a_wagon_are_told_and_drawn(tmp_path, capsys):
     assert (out / "stationary.png").stat().st_size > 5000
 
 
+def test_load_to_one_side_is_leant_to_its_own_side():
+    """The mirror image has the same worst wheel on the other side, and the same roll coefficient.
+
+    Leaning takes as much load off the far wheels as without the offset, of a smaller static load.
+    """
+    found = {}
+    for y in (0.08, 0.0, -0.08):
+        coach = railsim.load_vehicle("benchmark_vehicle1", [f"bodies.carbody.position.1={y}"])
+        on, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
+        found[y] = stationary(coach, on, limits, cant=0.1).values[-3:]
+    unloading, angle, roll = ({y: values[k].value for y, values in found.items()} for k in range(3))
+    assert unloading[-0.08] == pytest.approx(unloading[0.08], rel=1e-3)
+    assert roll[-0.08] == pytest.approx(roll[0.08], rel=1e-3)
+    assert angle[-0.08] == pytest.approx(angle[0.08], rel=1e-3)
+    assert {found[y][0].place.split()[-1] for y in (0.08, -0.08)} == {"left", "right"}
+    # the offset takes m g y/(4 1.5 m) off the static load Q0 to which unloading refers
+    Q0 = float(railsim.static_loads(coach).axle_load.mean()) / 2.0
+    lighter = Q0 - 32000.0 * 9.81 * 0.08 / (4.0 * 1.5)
+    assert unloading[0.08] == pytest.approx(unloading[0.0] * Q0 / lighter, rel=0.02)
+
+
 def test_case_without_steady_state_is_no_pass(monkeypatch):
     def never(*_, **__):
         raise NotConverged("no steady state was found")
