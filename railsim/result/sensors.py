@@ -91,20 +91,26 @@ def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
 
 
 def motions(
-    placed: Mapping[str, Sensor], motion: Mapping[str, Floats], bodies: tuple[str, ...]
+    placed: Mapping[str, Sensor],
+    motion: Mapping[str, Floats],
+    bodies: tuple[str, ...],
+    alignment: Alignment,
+    speed: Floats,
 ) -> dict[str, Floats]:
     """Displacements, velocities and absolute accelerations of sensors, float64[time, sensor, 3].
 
     Displacements and velocities are those against the moving track frame of the body, in its axes;
-    accelerations in the axes of the body.
+    accelerations in the axes of the body.  Arguments as of `readings`.
     """
     b = [bodies.index(sensor.body) for sensor in placed.values()]
     position, rates, absolute = (motion[f"body_{name}"][:, b] for name in MOTIONS)
-    attitude, spin, turning = _of_axes([*placed.values()], position, rates, absolute)
+    own = [*placed.values()]
+    attitude, spin, _ = _of_axes(own, position, rates, absolute)
+    _, omega, angular = _of_bodies(own, motion, bodies, alignment, speed)
     arm = np.array([sensor.arm for sensor in placed.values()]).reshape(-1, 3)
     turned = _out_of_body(np.broadcast_to(arm, (*position.shape[:2], 3)), *attitude)
     moved = _out_of_body(_cross(spin, arm), *attitude)
-    of_point = absolute[..., :3] + _cross(turning, arm) + _cross(spin, _cross(spin, arm))
+    of_point = absolute[..., :3] + _cross(angular, arm) + _cross(omega, _cross(omega, arm))
     return {
         "sensor_displacement": position[..., :3] + turned - arm,
         "sensor_velocity": rates[..., :3] + moved,

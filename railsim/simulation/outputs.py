@@ -344,16 +344,12 @@ class OutputPlan:
         if self.elements:
             values |= _elements(recorder.element[:rows, : len(self.elements)])
         if self._sensors:
-            read = readings(
-                self._sensors,
-                values,
-                self._model.index.bodies,
-                self._alignment,
-                recorder.state[:rows, -1],
-            )
+            track = self._alignment, recorder.state[:rows, -1]
+            of_bodies = values, self._model.index.bodies
+            read = readings(self._sensors, *of_bodies, *track)
             values |= zip(READINGS, read, strict=True)
             if not self._readings_only:
-                values |= motions(self._sensors, values, self._model.index.bodies)
+                values |= motions(self._sensors, *of_bodies, *track)
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows], recorder.state[:rows, -1])
         if self._asked.drives:

@@ -107,6 +107,24 @@ def test_roll_rate_in_a_curve_on_a_gradient_is_that_about_the_inclined_axis():
     assert result["sensor_roll_rate"][-1, at] == pytest.approx(expected, rel=0.01)
 
 
+def test_absolute_acceleration_away_from_the_middle_of_a_car_in_a_curve():
+    """The floor 9.5 m ahead has V^2/R^2 times 9.5 m towards the car's middle, 9.5 m behind also.
+
+    A reading differs from it by gravity alone, the same all along the floor.
+    """
+    speed, radius = 20.0, 250.0
+    track = load_track("straight", [f"plan=[{{type='CIR', length=500.0, radius={radius}}}]"])
+    settings = railsim.Settings(start_state="steady", outputs={"sensors": True})
+    coach = load_vehicle("coach_manchester")
+    result = railsim.simulate(coach, track, speed=speed, duration=3.0, settings=settings)
+    at = [result.coordinates["sensor"].index(f"floor_{name}") for name in ("front", "rear")]
+    absolute, reading = (
+        result[f"sensor_{name}"][-1, at] for name in ("absolute_acceleration", "acceleration")
+    )
+    assert absolute[1, 0] - absolute[0, 0] == pytest.approx(19.0 * (speed / radius) ** 2, rel=0.01)
+    np.testing.assert_allclose((reading - absolute)[0], (reading - absolute)[1], atol=1e-12)
+
+
 def test_an_accelerometer_feels_gravity_and_the_absolute_acceleration_does_not():
     """At rest on 50 mm of cant it reads g sin(cant angle) to the left, towards the lower side.
 
