@@ -7,7 +7,7 @@ margin leaves room for higher wheel loads.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -121,8 +121,9 @@ class Stability:
     """Judges steps of a model on straight track and in flange contact.
 
     `system`, `state`: the model on straight and level track; steady rolling there; `scheme`: key of
-    `SCHEMES`; `curving`: takes a step that is stable on straight track; returns system and settled
-    state in the tightest curve, or None where there is no flange contact.
+    `SCHEMES`; `curving`: takes a step that is stable on straight track; returns systems and settled
+    states in the tightest curve: none where there is no flange contact, or one that has to have the
+    margin, and perhaps a second one for which half of it (its root) is enough.
     """
 
     def __init__(
@@ -131,13 +132,12 @@ class Stability:
         system: System,
         state: Floats,
         scheme: str,
-        curving: Callable[[float], Situation | None],
+        curving: Callable[[float], Sequence[Situation]],
     ) -> None:
         self._model, self._scheme, self._curving = model, scheme, curving
         self._straight = system, state
-        self._flange: Situation | None = None
-        self._settled = False
-        self._allowed: dict[bool, float] = {}
+        self._flange: Sequence[Situation] | None = None
+        self._allowed: dict[int, float] = {}
 
     @cached_property
     def longest(self) -> float:
@@ -164,26 +164,31 @@ class Stability:
                 return interval / n
             n = max(n + 1, int(n * 1.1))
         cause = "an element is too stiff for the masses it connects"
-        if self._within(False, *self._straight, interval / n):
+        if self._within(0, *self._straight, interval / n):
             names = " on ".join(profile.name for profile in self._model.profiles.values())
             cause = f"the contact of {names} is too sharp in flange contact"
         raise ModelError(f"no stable step longer than {SHORTEST_STEP:g} s: {cause}")
 
     def holds(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable, in flange contact too."""
-        if not self._within(False, *self._straight, margin * h):
+        if not self._within(0, *self._straight, margin * h):
             return False
-        if not self._settled:
-            self._flange, self._settled = self._curving(min(h, self.longest)), True
-        return self._flange is None or self._within(True, *self._flange, margin * h)
+        if self._flange is None:
+            self._flange = self._curving(min(h, self.longest))
+        margins = margin, math.sqrt(margin)
+        return all(
+            self._within(number, *at, factor * h)
+            for number, (at, factor) in enumerate(zip(self._flange, margins, strict=False), 1)
+        )
 
-    def _within(self, flange: bool, system: System, state: Floats, h: float) -> bool:
-        more = GROWTH_IN_FLANGE if flange else GROWTH
+    def _within(self, number: int, system: System, state: Floats, h: float) -> bool:
+        """Whether a step is stable; `number`: 0 on straight track, from 1 in flange contact."""
+        more = GROWTH_IN_FLANGE if number else GROWTH
         growth = _step_growth(self._model, system, state, self._scheme, h, more)
-        if growth > more and flange not in self._allowed:  # for most the question does not arise
+        if growth > more and number not in self._allowed:  # for most the question does not arise
             vehicle_growth = _vehicle_growth(self._model, system, state)
-            self._allowed[flange] = max(0.0, vehicle_growth) + more
-        if growth <= self._allowed.get(flange, more):
+            self._allowed[number] = max(0.0, vehicle_growth) + more
+        if growth <= self._allowed.get(number, more):
             return True
         return growth * h < SLIGHT and not self._helped_by_halving(system, state, h, growth)
 

@@ -89,6 +89,22 @@ def in_flange_contact(
     return _brought(model, track, curve, rolling, 0.5 * step, progress, TIMES)
 
 
+def led(
+    model: Model, at: tuple[System, Floats], speed: float, less: float
+) -> tuple[System, Floats]:
+    """System and state of rest at another speed and with less friction, by Newton's method.
+
+    `at`: system and vehicle at rest on a curve; `speed`: [m/s]; `less`: taken from the coefficients
+    of friction.  Raises NotConverged: there is no state of rest near the known one.
+    """
+    system, state = at
+    rail = system.track.rail.copy()
+    friction = rail[:, MU_LEFT : MU_RIGHT + 1, 0]
+    np.maximum(friction - less, 0.0, out=friction)
+    system = system._replace(track=system.track._replace(rail=rail))
+    return system, SteadyRolling(model, system).solve(state, speed)
+
+
 def _brought(
     model: Model,
     track: Track,

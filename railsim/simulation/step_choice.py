@@ -1,15 +1,16 @@
 """Step and output interval of a run at any speed.
 
 The longest step that a scheme allows is taken where it is stable for all of a class of runs: at the
-lowest speed and the highest friction of the class.  That is judged once and kept on disk: runs of a
-study that differ by little share it, and so do its processes.  Where it does not hold, the run's
-own speed and friction are judged.  Either way the step depends on the inputs of the run alone, not
-on other runs.
+lowest speed and the highest friction of the class, and in flange contact also at the highest speed
+and a mean friction.  That is judged once and kept on disk: runs of a study that differ by little
+share it, and so do its processes.  Where it does not hold, the run's own speed and friction are
+judged.  Either way the step depends on the inputs of the run alone, not on other runs.
 """
 
 import hashlib
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -21,13 +22,14 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
+from railsim.linear.steady import NotConverged
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
 from railsim.model.solutions import solution
-from railsim.model.time_step import MARGIN, Stability
+from railsim.model.time_step import MARGIN, Situation, Stability
 from railsim.model.work import level_track_with_friction
 from railsim.simulation.auxiliary_track import Progress
-from railsim.simulation.flange import in_flange_contact
+from railsim.simulation.flange import in_flange_contact, led
 
 CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
@@ -41,8 +43,10 @@ _JUDGED: dict[str, bool] = {}
 class StepChoice:
     """Step and output interval of a run, chosen once for each class of speeds where these vary.
 
-    Creep forces stiffen as 1/V, and in flange contact friction feeds vibrations: a class is judged
-    at its lowest speed and highest friction.
+    Creep forces stiffen as 1/V, and friction feeds vibrations: a class is judged at its lowest
+    speed and highest friction.  In flange contact forces rise with the speed, and what friction
+    feeds may stop where another patch carries: there a class is judged at its highest speed and a
+    mean friction as well.
 
     Parameters
     ----------
@@ -161,19 +165,27 @@ class StepChoice:
 
     def _judged(self, model: Model, speed: float, step: float) -> bool:
         try:
-            return self._stability(model, speed, None).holds(step, MARGIN)
+            return self._stability(model, speed, None, of_class=True).holds(step, MARGIN)
         except ModelError:  # no steady rolling there: the run's own speed is judged
             return False
 
-    def _stability(self, model: Model, speed: float, state: Floats | None) -> Stability:
+    def _stability(
+        self, model: Model, speed: float, state: Floats | None, *, of_class: bool = False
+    ) -> Stability:
         rolling = equilibrium(model, speed, self._inputs).state if state is None else state
-        return Stability(
-            model,
-            level_track_with_friction(model.system),
-            rolling,
-            self._settings.scheme,
-            lambda step: in_flange_contact(model, self._track, rolling, step, self._progress),
-        )
+
+        def curving(step: float) -> list[Situation]:
+            at = in_flange_contact(model, self._track, rolling, step, self._progress)
+            if at is None:
+                return []
+            found = [at]
+            if of_class:
+                with suppress(NotConverged):  # then the first decides alone
+                    found.append(led(model, at, CLASS * speed, 0.5 * FRICTION_CLASS))
+            return found
+
+        level = level_track_with_friction(model.system)
+        return Stability(model, level, rolling, self._settings.scheme, curving)
 
 
 def class_speed(speed: float) -> float:

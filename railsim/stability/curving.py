@@ -360,7 +360,7 @@ class _Search:
             rolling = solver.prepared(self._rest[1], speed)
             # the curve itself is where the run settles: judged with the state that Newton left
             step = Stability(
-                self.model, straight, rolling, "fast", lambda _: (system, state)
+                self.model, straight, rolling, "fast", lambda _: [(system, state)]
             ).choose(5e-3)
         except ModelError:
             return solver, state, FAILED

@@ -117,7 +117,7 @@ class VehicleMotion:
         if number not in self._steps:
             states = [self.prepared.steady(SPEED_CLASS**end) for end in (number, number + 1)]
             self._steps[number] = min(
-                Stability(self.model, self.system, state, self._scheme, lambda _: None).choose(
+                Stability(self.model, self.system, state, self._scheme, lambda _: ()).choose(
                     1.0 / OUTPUT_RATE
                 )
                 for state in states

@@ -1,5 +1,7 @@
 """The vehicle at rest in flange contact, about which a step is judged; how often it is sought."""
 
+import math
+
 import numpy as np
 import pytest
 from dynamics import load_vehicle
@@ -14,6 +16,7 @@ from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import work_arrays
 from railsim.simulation import flange, step_choice
+from railsim.simulation.preparation import prepare
 
 STEP = 1.25e-3
 
@@ -113,3 +116,74 @@ def test_runs_of_a_class_share_one_way(ways, monkeypatch, tmp_path):
     )
     assert [record["status"] for record in found.records] == 4 * ["complete"]
     assert len(ways) == 1
+
+
+def with_friction(track, friction):
+    """A track with the same friction on both rails."""
+    return track.replace(friction=(friction, friction))
+
+
+@pytest.mark.parametrize(
+    ("name", "radius_track", "speed", "friction"),
+    [("coach_manchester", "curve_r250", 18.5, 0.3), ("locomotive_coco_a", "curve_r500", 22.2, 0.4)],
+)
+def test_state_led_to_another_speed_and_friction_is_the_one_found_there(
+    name, radius_track, speed, friction
+):
+    """Wheel forces within 1e-4 of the load, and the growth of a step."""
+    track = railsim.load_track(radius_track)
+    model, state, load = rolling(name, with_friction(track, friction), speed)
+    led = flange.led(model, flange.in_flange_contact(model, track, state, STEP), 1.2 * speed, 0.05)
+    other = with_friction(track, friction - 0.05)
+    model, state, _ = rolling(name, other, 1.2 * speed)
+    found = flange.in_flange_contact(model, other, state, STEP)
+    assert led[1][-1] == found[1][-1]
+    forces = [wheel_forces(*at) / load for at in (led, found)]
+    assert forces[0] == pytest.approx(forces[1], abs=1e-4)
+
+
+def growth_beyond_the_vehicle(model, at, step):
+    """Of one step about a state of rest in a curve [1/s]."""
+    vehicle = max(0.0, time_step._vehicle_growth(model, *at))
+    return time_step._step_growth(model, *at, "fast", step) - vehicle
+
+
+@pytest.mark.parametrize(
+    ("name", "radius", "speed", "friction", "growth"),
+    [
+        ("coach_manchester", 400.0, 26.4, 0.5, 10.0),
+        ("locomotive_coco_a", 400.0, 24.4, 0.33, 80.0),
+        ("power_car_china_star", 250.0, 16.5, 0.22, 3.0),
+    ],
+)
+def test_runs_are_stable_where_one_end_of_their_class_does_not_tell(
+    name, radius, speed, friction, growth, monkeypatch
+):
+    """1/600 s has the margin at the lowest speed and highest friction of their classes."""
+    monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve: solve())
+    monkeypatch.setattr(step_choice, "_JUDGED", {})
+    longest = time_step.MARGIN / 600.0
+    track = curve_of(radius)
+    of_class = 0.1 * math.ceil(friction / 0.1)
+    run, end = with_friction(track, friction), with_friction(track, of_class)
+    model, state, _ = rolling(name, end, step_choice.class_speed(speed))
+    at = flange.in_flange_contact(model, end, state, STEP)
+    assert growth_beyond_the_vehicle(model, at, longest) < 1.0
+
+    model, state, _ = rolling(name, run, speed)
+    at = flange.in_flange_contact(model, run, state, STEP)
+    assert growth_beyond_the_vehicle(model, at, longest) > growth
+    step, _ = prepare(load_vehicle(name), run, Settings(), speed, duration=1.0).steps.at(speed)
+    assert growth_beyond_the_vehicle(model, at, time_step.MARGIN * step) < 1.0
+
+
+def curve_of(radius):
+    """The curve of R 250 m with another radius."""
+    plan = (
+        {"type": "STR", "length": 300.0},
+        {"type": "CLO", "length": 60.0},
+        {"type": "CIR", "length": 60.0, "radius": radius},
+        {"type": "CLO", "length": 60.0},
+        {"type": "STR", "length": 500.0},
+    )
+    return railsim.load_track("curve_r250").replace(plan=plan)

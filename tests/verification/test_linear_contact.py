@@ -169,7 +169,7 @@ def run_from(prepared, mode, speed, scheme):
     state[indices] += AMPLITUDE * (mode.shapes[0] / max(lateral)).real
     system = prepared.system._replace(drive=CONSTANT_SPEED)
     level = level_track_with_friction(system)
-    h = Stability(model, level, rest, scheme, lambda _: None).choose(1.0 / 200.0)
+    h = Stability(model, level, rest, scheme, lambda _: ()).choose(1.0 / 200.0)
     steps = round(1.0 / mode.frequencies[0] / 16.0 / h)
     work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
     time, seen = [], []
