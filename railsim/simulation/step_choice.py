@@ -1,10 +1,10 @@
 """Step and output interval of a run at any speed.
 
-The longest step that a scheme allows is taken where it is stable for all of a class of runs: at the
-lowest speed and the highest friction of the class, and in flange contact also at the highest speed
-and a mean friction.  That is judged once and kept on disk: runs of a study that differ by little
-share it, and so do its processes.  Where it does not hold, the run's own speed and friction are
-judged.  Either way the step depends on the inputs of the run alone, not on other runs.
+The longest step that a scheme allows is taken where it is stable for a class of runs: at the lowest
+speed and the highest friction of the class, and in flange contact also at the highest speed and the
+middle friction.  That is judged once and kept on disk: runs of a study that differ by little share
+it, and so do its processes.  Where it does not hold, the run's own speed and friction are judged.
+Either way the step depends on the inputs of the run alone, not on other runs.
 """
 
 import hashlib
@@ -44,9 +44,9 @@ class StepChoice:
     """Step and output interval of a run, chosen once for each class of speeds where these vary.
 
     Creep forces stiffen as 1/V, and friction feeds vibrations: a class is judged at its lowest
-    speed and highest friction.  In flange contact forces rise with the speed, and what friction
-    feeds may stop where another patch carries: there a class is judged at its highest speed and a
-    mean friction as well.
+    speed and highest friction.  In flange contact growth often rises with the speed and is largest
+    at some friction in between: there a class is judged at its highest speed and middle friction
+    as well, with half of the margin.
 
     Parameters
     ----------
