@@ -51,7 +51,7 @@ class Wheelset(Definition):
     back_to_back: Positive = 1.360
     """Distance between the wheels' backs [m]"""
     tape_circle_distance: Positive = 1.5
-    """Distance between the nominal rolling circles [m]"""
+    """Distance between the nominal rolling circles, in drawings: `back_to_back` places them [m]"""
     out_of_round: dict[Name, OutOfRound] = EMPTY_TABLE
     """How its wheels deviate from circles, by names"""
 
