@@ -5,10 +5,10 @@ vehicles with dry friction from both directions.  A case without a steady state 
 verdict is then not a pass.
 
 Guiding (EN 14363, 6.1, the method with two separate tests): the guiding force Y_a of the leading
-outer wheel at walking pace in level curves of R 150 m to either hand, over the smallest wheel load
-of that wheelset on the twists, Y_a/Q_a <= 1.2; and Y/Q of this wheel rolling through the curves of
-R 150 m with both twists, to either side.  Dry friction follows the way from straight level track.
-On cant it holds nothing: the mean of both directions.
+outer wheel at walking pace in a level curve of R 150 m, over the smallest wheel load of that
+wheelset on the twists, Y_a/Q_a <= 1.2; and Y/Q of this wheel rolling through the curve of R 150 m
+with both twists, to either side.  Dry friction follows the way from straight level track.  On cant
+it holds nothing: the mean of both directions.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 
 S = TypeVar("S")
 UNLOADING = "unloading (Q0 - Q)/Q0"
-HANDS = 1.0, -1.0  # of a curve, to the right and to the left; sides of a twist
 
 
 @dataclass(frozen=True)
@@ -178,10 +177,9 @@ def stationary(
             reasons.append(f"{case}: {error}")
             return None
 
-    def quotient(hand: float, heights: Floats) -> float:
-        bend = hand / limits.guiding.radius
-        state = found(f"{curve}, {name}", lambda: on_twist(balance, track, heights, curvature=bend))
-        return np.nan if state is None else float(_outwards(state.Y, hand) / _outer(state.Q, hand))
+    def rolling(case: str, heights: Floats) -> Standing | None:
+        bend = 1.0 / limits.guiding.radius
+        return found(case, lambda: on_twist(balance, track, heights, curvature=bend))
 
     loops: dict[str, TwistLoop] = {}
     for name, heights in twists.items():
@@ -192,13 +190,14 @@ def stationary(
     whole = len(loops) == len(twists)
     load = min(float(loop.Q[:, 0].min()) for loop in loops.values()) if whole else np.nan
     curve = f"R {limits.guiding.radius:g} m"
-    forces = [
-        found(f"{curve}, level", partial(_force, vehicle, balance, track, settings, limits, hand))
-        for hand in HANDS
+    force = found(f"{curve}, level", lambda: _force(vehicle, balance, track, settings, limits))
+    force = np.nan if force is None else force
+    values.append(_judged(f"{curve}, level", "guiding Y/Q", float(force / load), limits.guiding))
+    quotients = [
+        np.nan if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
+        for state in (rolling(f"{curve}, {name}", sign * heights) for sign in (1.0, -1.0))
     ]
-    force = float(np.max([np.nan if value is None else value for value in forces]))
-    values.append(_judged(f"{curve}, level", "guiding Y/Q", force / load, limits.guiding))
-    worst = float(np.max([quotient(hand, way * heights) for hand in HANDS for way in HANDS]))
+    worst = float(np.max(quotients))
     values.append(_judged(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
     name = f"cant {1e3 * cant:g} mm"
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
@@ -264,35 +263,24 @@ def _force(
     track: Track,
     settings: Settings | None,
     limits: StationaryLimits,
-    hand: float,
 ) -> float:
-    """Guiding force of the leading outer wheel in the level curve to one hand [N].
+    """Guiding force of the leading outer wheel in the level curve [N].
 
     Where Newton's method fails, a run on the circle finds it (`railsim.stability.curving`).
     """
-    radius, level = hand * limits.guiding.radius, np.zeros(len(balance.Q0))
+    curvature, level = 1.0 / limits.guiding.radius, np.zeros(len(balance.Q0))
     try:
-        Y = on_twist(balance, track, level, curvature=1.0 / radius).Y
+        Y = on_twist(balance, track, level, curvature=curvature).Y
     except NotConverged:
         found = curving(
-            vehicle, radius=[radius], cant=0.0,
-            cant_deficiency=[cant_deficiency(WALKING_PACE, abs(1.0 / radius), 0.0)], track=track,
+            vehicle, radius=[limits.guiding.radius], cant=0.0,
+            cant_deficiency=[cant_deficiency(WALKING_PACE, curvature, 0.0)], track=track,
             settings=settings,
         )  # fmt: skip
         if found.converged.item() == FAILED:
             raise
         Y = found.Y.reshape(-1, 2)
-    return _outwards(Y, hand)
-
-
-def _outer(values: Floats, hand: float) -> float:
-    """Value of the leading outer wheel in a curve to the right (1) or left (-1)."""
-    return float(values[0, 0 if hand > 0.0 else 1])
-
-
-def _outwards(Y: Floats | None, hand: float) -> float:
-    """Guiding force of the leading outer wheel on its rail, positive outwards [N]."""
-    return np.nan if Y is None else -hand * _outer(Y, hand)
+    return float("nan") if Y is None else -float(Y[0, 0])
 
 
 def _judged(

@@ -75,18 +75,6 @@ def test_both_branches_of_a_wagon_are_told_and_drawn(tmp_path, capsys):
     assert (out / "stationary.png").stat().st_size > 5000
 
 
-def test_load_to_one_side_is_guided_in_curves_to_either_hand():
-    """Its mirror image has the same worst quotients, in the curve to the other hand."""
-    found = []
-    for y in (0.15, -0.15):
-        coach = railsim.load_vehicle("benchmark_vehicle1", [f"bodies.carbody.position.1={y}"])
-        on, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
-        tested = stationary(coach, on, limits, cant=0.1)
-        found.append([v.value for v in tested.values if v.quantity.startswith("guiding")])
-    assert len(found[0]) == 2
-    assert found[0] == pytest.approx(found[1], rel=1e-3)
-
-
 def test_load_to_one_side_is_leant_to_its_own_side():
     """The mirror image has the same worst wheel on the other side, and the same roll coefficient.
 
