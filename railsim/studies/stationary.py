@@ -7,8 +7,9 @@ verdict is then not a pass.
 Guiding (EN 14363, 6.1, the method with two separate tests): the guiding force Y_a of the leading
 outer wheel at walking pace in a level curve of R 150 m, over the smallest wheel load of that
 wheelset on the twists, Y_a/Q_a <= 1.2; and Y/Q of this wheel rolling through the curve of R 150 m
-with both twists, to either side.  Dry friction follows the way from straight level track.  On cant
-it holds nothing: the mean of both directions.
+with both twists, to either side.  Of curves to the right and to the left the worse one counts.  Dry
+friction follows the way from straight level track.  On cant it holds nothing: the mean of both
+directions.
 """
 
 from collections.abc import Callable, Sequence
@@ -177,10 +178,6 @@ def stationary(
             reasons.append(f"{case}: {error}")
             return None
 
-    def rolling(case: str, heights: Floats) -> Standing | None:
-        bend = 1.0 / limits.guiding.radius
-        return found(case, lambda: on_twist(balance, track, heights, curvature=bend))
-
     loops: dict[str, TwistLoop] = {}
     for name, heights in twists.items():
         loop = found(name, partial(twist_loop, balance, track, heights, held=held))
@@ -190,13 +187,18 @@ def stationary(
     whole = len(loops) == len(twists)
     load = min(float(loop.Q[:, 0].min()) for loop in loops.values()) if whole else np.nan
     curve = f"R {limits.guiding.radius:g} m"
-    force = found(f"{curve}, level", lambda: _force(vehicle, balance, track, settings, limits))
-    force = np.nan if force is None else force
-    values.append(_judged(f"{curve}, level", "guiding Y/Q", float(force / load), limits.guiding))
-    quotients = [
-        np.nan if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
-        for state in (rolling(f"{curve}, {name}", sign * heights) for sign in (1.0, -1.0))
-    ]
+    forces, quotients = [], []
+    for hand, bend in (("right", 1.0), ("left", -1.0)):
+        bend /= limits.guiding.radius
+        case = f"{curve} to the {hand}"
+        force = found(f"{case}, level", partial(_force, vehicle, balance, track, settings, bend))
+        forces.append(np.nan if force is None else force)
+        for sign in (1.0, -1.0):
+            roll = partial(_quotient, balance, track, sign * heights, bend)
+            combined = found(f"{case}, {name}", roll)
+            quotients.append(np.nan if combined is None else combined)
+    level = float(np.max(forces) / load)
+    values.append(_judged(f"{curve}, level", "guiding Y/Q", level, limits.guiding))
     worst = float(np.max(quotients))
     values.append(_judged(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
     name = f"cant {1e3 * cant:g} mm"
@@ -258,29 +260,38 @@ def _unloading(
 
 
 def _force(
-    vehicle: Vehicle,
-    balance: Equilibrium,
-    track: Track,
-    settings: Settings | None,
-    limits: StationaryLimits,
+    vehicle: Vehicle, balance: Equilibrium, track: Track, settings: Settings | None, bend: float
 ) -> float:
-    """Guiding force of the leading outer wheel in the level curve [N].
+    """Guiding force of the leading outer wheel in a level curve, outwards positive [N].
 
-    Where Newton's method fails, a run on the circle finds it (`railsim.stability.curving`).
+    `bend`: 1/radius, positive to the right [1/m].  Where Newton's method fails, a run on the circle
+    finds it (`railsim.stability.curving`).
     """
-    curvature, level = 1.0 / limits.guiding.radius, np.zeros(len(balance.Q0))
     try:
-        Y = on_twist(balance, track, level, curvature=curvature).Y
+        Y = on_twist(balance, track, np.zeros(len(balance.Q0)), curvature=bend).Y
     except NotConverged:
         found = curving(
-            vehicle, radius=[limits.guiding.radius], cant=0.0,
-            cant_deficiency=[cant_deficiency(WALKING_PACE, curvature, 0.0)], track=track,
+            vehicle, radius=[1.0 / bend], cant=0.0,
+            cant_deficiency=[cant_deficiency(WALKING_PACE, abs(bend), 0.0)], track=track,
             settings=settings,
         )  # fmt: skip
         if found.converged.item() == FAILED:
             raise
         Y = found.Y.reshape(-1, 2)
-    return float("nan") if Y is None else -float(Y[0, 0])
+    outer, outwards = _outer(bend)
+    return float("nan") if Y is None else outwards * float(Y[0, outer])
+
+
+def _quotient(balance: Equilibrium, track: Track, heights: Floats, bend: float) -> float:
+    """Y/Q of the leading outer wheel in a twisted curve, outwards positive."""
+    state, (outer, outwards) = on_twist(balance, track, heights, curvature=bend), _outer(bend)
+    assert state.Y is not None  # its wheelsets roll
+    return outwards * float(state.Y[0, outer] / state.Q[0, outer])
+
+
+def _outer(bend: float) -> tuple[int, float]:
+    """Side of the outer wheels in a curve, and the sign of forces outwards."""
+    return (0, -1.0) if bend > 0.0 else (1, 1.0)
 
 
 def _judged(

@@ -96,6 +96,31 @@ def test_load_to_one_side_is_leant_to_its_own_side():
     assert unloading[0.08] == pytest.approx(unloading[0.0] * Q0 / lighter, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("vehicle", "friction"), [([], (0.5, 0.2)), (["bodies.carbody.position.1=0.08"], (0.4, 0.4))]
+)
+def test_guiding_takes_the_worse_of_both_hands(vehicle, friction):
+    """A load to one side, or unequal rails, and the mirror image give the same, the worse hand.
+
+    In the level curve that is the larger of the forces of steady curving to either hand.
+    """
+    on, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
+    mirrored = [text.replace("=0.08", "=-0.08") for text in vehicle]
+    guiding = []
+    for texts, mu in ((vehicle, friction), (mirrored, friction[::-1])):
+        coach, rails = railsim.load_vehicle("benchmark_vehicle1", texts), on.replace(friction=mu)
+        found = stationary(coach, rails, limits, cant=0.1)
+        guiding.append([v.value for v in found.values if v.quantity.startswith("guiding")])
+        load = min(float(loop.Q[:, 0].min()) for loop in found.loops.values())
+        deficiency = [1.5 / 9.81 / 150.0]
+        hands = curving(
+            coach, radius=[150.0, -150.0], cant=0.0, cant_deficiency=deficiency, track=rails
+        )
+        right, left = -hands.Y[0, 0, 0, 0, 0], hands.Y[1, 0, 0, 0, 1]
+        assert guiding[-1][0] == pytest.approx(max(right, left) / load, rel=2e-3)
+    assert guiding[0] == pytest.approx(guiding[1], rel=1e-3)
+
+
 def test_case_without_steady_state_is_no_pass(monkeypatch):
     def never(*_, **__):
         raise NotConverged("no steady state was found")
