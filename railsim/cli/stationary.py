@@ -63,8 +63,7 @@ def command(
     remarks = [f"wheelsets {'held' if found.held else 'free'} across the track"]
     if not all(v.checked for v in found.values if v.limit is not None):
         remarks.append("limits not checked against the standard")
-    if rails.check_rail or rails.sections:
-        remarks.append("check rails and sections of rails left out: the plain rails guide alone")
+    remarks += found.remarks
     head = [f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}"]
     reasons = [f"  {reason}" for reason in found.reasons]
     output.finish(FILES, found, [*head, *reasons, "", found.table()], remarks)

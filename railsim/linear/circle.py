@@ -1,6 +1,9 @@
 """Track of constant curvature and cant, on which a vehicle can roll steadily."""
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions import Settings, Track
@@ -23,12 +26,19 @@ def left_out(track: Track, settings: Settings, wheels: UnevenWheels) -> tuple[st
     parts = {
         "check rails": track.check_rail,
         "gauge widening": track.gauge_widening,
+        "friction that varies along the track": _varies(track.friction_table),
+        "support that varies along the track": _varies(track.support.variation),
         "sections of rails": track.sections,
         "wheels that are not round": wheels.uneven,
         "transient creep forces": settings.transient_creep,
     }
     found = [name for name, there in parts.items() if there]
     return (f"left out here, where rolling is steady: {', '.join(found)}",) if found else ()
+
+
+def _varies(rows: Sequence[Sequence[float]] | None) -> bool:
+    """Whether the rows of a table over arc length differ."""
+    return len({tuple(row[1:]) for row in rows or ()}) > 1
 
 
 def circle(
@@ -38,19 +48,25 @@ def circle(
     cant: float = 0.0,
     friction: float | tuple[float, float] | None = None,
 ) -> Track:
-    """Return a track of constant curvature and cant with rails, gauge and friction of another.
+    """Return a track of constant curvature and cant with rails, gauge and support of another.
+
+    Support and friction are those at its beginning, s = 0.
 
     `track`: whose rails they are; `curvature`: 1/radius, positive to the right [1/m]; `cant`: left
     rail over the right one, on 1.5 m [m]; `friction`: coefficient of friction; by default that of
-    `track` at its beginning.
+    `track`.
     """
     radius = 1.0 / curvature if curvature else math.inf
     element = {"type": "CIR", "length": LENGTH, "radius": radius}
     if not curvature:
         element = {"type": "STR", "length": LENGTH}
     if friction is None:
-        friction = track.friction if track.friction_table is None else track.friction_table[0][1:]
+        friction = tuple(track.friction_at(0.0).tolist())
     both = (friction, friction) if isinstance(friction, float | int) else tuple(friction)
+    support = track.support.model_dump(exclude_none=True)
+    if track.support.variation:
+        places, *factors = np.transpose(track.support.variation)
+        support["variation"] = [[0.0, *(float(np.interp(0.0, places, f)) for f in factors)]]
     return track.replace(
         plan=[element],
         cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
@@ -61,4 +77,5 @@ def circle(
         friction=both,
         sections=[],
         check_rail=[],
+        support=support,
     )

@@ -103,7 +103,8 @@ class Contact:
 class LinearVehicle:
     """A vehicle on straight or circular track, to be linearised at any speed.
 
-    - `vehicle`, `track`: definitions; of the track rails, gauge and friction at its beginning count
+    - `vehicle`, `track`: definitions; of the track rails, gauge, friction and support at its
+      beginning count
     - `contact`: how wheel and rail are linearised
     - `radius`, `cant`: of the track on which the vehicle rolls [m]
     - `held`: hold the wheelsets

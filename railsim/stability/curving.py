@@ -235,7 +235,7 @@ def curving(
     [[[1]], [[1]]]
     """
     track = track or load_track("straight")
-    both = _friction(track)
+    both = track.friction_at(0.0)
     mus = list(friction) if friction is not None else [float(np.mean(both))]
     _check(radius, cant, cant_deficiency, mus)
     search = _Search(vehicle, track, cant, settings or Settings(), profiles)
@@ -252,12 +252,6 @@ def curving(
                     done = (m * len(cant_deficiency) + i) * len(radius) + k + 1
                     progress(done / found.converged.size)
     return found
-
-
-def _friction(track: Track) -> Floats:
-    """Coefficients of friction of the left and right rail at the track's beginning."""
-    rows = track.friction_table
-    return np.array(track.friction if rows is None else rows[0][1:])
 
 
 def _check(
@@ -323,7 +317,7 @@ class _Search:
         self.remarks += left_out(track, settings, assembled.wheels)
         self.parts = parts_of(self.model, coordinates(self.model))
         self.shares = np.ones(2)
-        values = np.array([0.0, 0.0, WALKING_PACE**2, np.mean(_friction(track))])
+        values = np.array([0.0, 0.0, WALKING_PACE**2, np.mean(track.friction_at(0.0))])
         self._rest = self._last = values, placed(balance.state)
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:

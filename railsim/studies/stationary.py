@@ -27,6 +27,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import StationaryLimits, Value
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
 from railsim.errors import Fault, InputError, input_error
+from railsim.linear.circle import circle, left_out
 from railsim.linear.sliding import has_pads
 from railsim.linear.stationary import (
     WALKING_PACE,
@@ -81,7 +82,7 @@ class Stationary:
 
     `held`: whether the wheelsets were held across the track; `reasons`: cases without a steady
     state, a sentence each; `loops`: wheel loads on the way to each twist, to the opposite one and
-    back, by its name.
+    back, by its name; `remarks`: what is left out.
     """
 
     vehicle: str
@@ -90,6 +91,7 @@ class Stationary:
     values: tuple[StationaryValue, ...]
     reasons: tuple[str, ...]
     loops: dict[str, TwistLoop] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -138,7 +140,8 @@ class Stationary:
         }
         return {
             "vehicle": self.vehicle, "edition": self.edition, "verdict": self.verdict,
-            "reasons": list(self.reasons), "held": self.held, "values": values, "loops": loops,
+            "reasons": list(self.reasons), "remarks": list(self.remarks), "held": self.held,
+            "values": values, "loops": loops,
         }  # fmt: skip
 
 
@@ -153,10 +156,10 @@ def stationary(
 ) -> Stationary:
     """Stationary tests of a vehicle on twisted track and on cant.
 
-    `vehicle`: vehicle on two bogies, or on two axles; `track`: gives rail profiles and friction;
-    `cant`: [m]; by default the admissible cant deficiency of the service table; `held`: hold the
-    wheelsets across the track, as the closed formulas do. Raises InputError: no cant; neither two
-    bogies nor two axles; a cant above 0.5 m.
+    `vehicle`: vehicle on two bogies, or on two axles; `track`: gives rails, friction and support,
+    as they are at its beginning; `cant`: [m]; by default the admissible cant deficiency of the
+    service table; `held`: hold the wheelsets across the track, as the closed formulas do. Raises
+    InputError: no cant; neither two bogies nor two axles; a cant above 0.5 m.
     """
     flat = flatten(vehicle)
     if cant is None:
@@ -167,7 +170,9 @@ def stationary(
     if not 0.0 < cant <= 0.5:
         raise input_error("cant", f"{cant:g} m", "above 0, up to 0.5 m")
     twists = twist_heights(flat, limits)
-    balance = equilibrium(assemble(vehicle, track, settings or Settings()), WALKING_PACE)
+    settings = settings or Settings()
+    model = assemble(vehicle, circle(track), settings.in_steady_rolling())
+    balance = equilibrium(model, WALKING_PACE)
     values: list[StationaryValue] = []
     reasons: list[str] = []
 
@@ -204,7 +209,9 @@ def stationary(
     name = f"cant {1e3 * cant:g} mm"
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
-    return Stationary(vehicle.name, limits.edition, held, tuple(values), tuple(reasons), loops)
+    remarks = (*balance.remarks, *left_out(track, settings, model.wheels))
+    judged = tuple(values), tuple(reasons), loops, remarks
+    return Stationary(vehicle.name, limits.edition, held, *judged)
 
 
 def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floats]:
@@ -260,7 +267,7 @@ def _unloading(
 
 
 def _force(
-    vehicle: Vehicle, balance: Equilibrium, track: Track, settings: Settings | None, bend: float
+    vehicle: Vehicle, balance: Equilibrium, track: Track, settings: Settings, bend: float
 ) -> float:
     """Guiding force of the leading outer wheel in a level curve, outwards positive [N].
 

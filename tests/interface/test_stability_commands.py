@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import railsim
@@ -237,3 +238,24 @@ def test_gauge_widening_is_left_out_of_steady_curving_with_a_remark():
     track = railsim.load_track("straight", ["gauge_widening=[[0.0, 0.01]]"])
     found = railsim.curving(railsim.load_vehicle("coach_manchester"), track, radius=[500.0])
     assert any("left out" in one and "gauge widening" in one for one in found.remarks)
+
+
+def test_friction_and_support_are_those_at_the_beginning_of_the_track():
+    """What they are further on counts for nothing, and is said."""
+    coach, plain = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    soft = [[-50.0, 2.0, 2.0], [50.0, 0.4, 0.4], [51.0, 5.0, 5.0]]
+    tables = {"friction_table": [[-10.0, 0.5], [10.0, 0.1]]}
+    varied = plain.replace(support={"preset": "ballasted", "variation": soft}, **tables)
+    same = plain.replace(
+        support={"preset": "ballasted", "variation": [[0.0, 1.2, 1.2]]}, friction=0.3
+    )
+    found, wanted = (railsim.modes(coach, track, speed=35.0) for track in (varied, same))
+    values, expected = ([mode.eigenvalue for mode in one.modes] for one in (found, wanted))
+    assert values == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    curves, expected = (railsim.curving(coach, track, radius=[500.0]) for track in (varied, same))
+    np.testing.assert_allclose(curves.Y, expected.Y, rtol=1e-6)
+    for remarks in (found.remarks, curves.remarks):
+        (said,) = [one for one in remarks if "left out" in one]
+        assert "friction that varies" in said
+        assert "support that varies" in said
+    assert not any("left out" in one for one in wanted.remarks)

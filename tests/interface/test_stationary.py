@@ -158,4 +158,14 @@ def test_without_service_table_a_cant_is_asked_for():
 
 def test_check_rails_are_left_out_with_a_remark(capsys):
     assert main([*COACH, "--track", "depot_r150_check_rail"]) == 0
-    assert "check rails and sections of rails left out" in capsys.readouterr().out
+    assert "left out here, where rolling is steady: check rails" in capsys.readouterr().out
+
+
+def test_support_is_that_at_the_beginning_of_the_track():
+    coach, plain = railsim.load_vehicle("benchmark_vehicle1"), railsim.load_track("straight")
+    rows = [[0.0, 1.0, 1.0], [20.0, 0.3, 0.3], [40.0, 0.3, 0.3]]
+    varied = plain.replace(support={"preset": "ballasted", "variation": rows})
+    limits, how = load_stationary_limits("stationary"), {"cant": 0.1, "held": False}
+    found, wanted = (stationary(coach, track, limits, **how) for track in (varied, plain))
+    assert [v.value for v in found.values] == pytest.approx([v.value for v in wanted.values])
+    assert any("support that varies" in one for one in found.remarks)
