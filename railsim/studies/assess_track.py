@@ -20,18 +20,20 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from railsim.arrays import Floats, Integers
-from railsim.definitions import Settings, Track
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
 from railsim.definitions.track.layout import is_uniform
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.files.access import check_folder, write_folder
 from railsim.notation import SIDES
 from railsim.result import Result, open_result
 from railsim.result.hunting import HUNTS
+from railsim.result.sensors import sensors
 from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, RecordedGeometry
@@ -185,14 +187,15 @@ def assess_track(
     }
     settings = Settings(output_rate=RATE, outputs=outputs)
     runs: list[_Run] = []
+    behind = {name: _behind(vehicle) for name, vehicle in tested.items()}
     for number, (a, b) in enumerate(pairwise(edges.tolist())):
-        part, moved = _part(track, a, b)
+        part, moved = _part(track, a, b + max(behind.values()))
         for name, vehicle in tested.items():
             for speed in speeds:
                 label = f"{name}_{speed:g}_{number:04d}"
                 case = Case(
                     label, vehicle, part, settings, float(speed), max(0.0, a - moved - RUN_IN),
-                    until=min(b - moved, part.length),
+                    until=min(b + behind[name] - moved, part.length),
                     labels={"vehicle": name, "track": part.name, "speed": float(speed)},
                 )  # fmt: skip
                 runs.append(_Run(case, a, b, moved))
@@ -256,6 +259,13 @@ def _extent(track: Track) -> tuple[float, float]:
         found_words, allowed = f"{end - begin:.0f} m", f"{2.0 * SECTION:g} m at least"
         raise input_error(track.name, found_words, allowed, key="irregularities")
     return begin, end
+
+
+def _behind(vehicle: Vehicle) -> float:
+    """How far the last wheelset is behind the reference body: it covers a piece, too [m]."""
+    flat = flatten(vehicle)
+    (origin,) = [body.position[0] for body in flat.bodies if body.name == flat.reference]
+    return max(0.0, origin - min(w.position[0] for w in flat.of_kind("wheelset")))
 
 
 def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
@@ -355,10 +365,11 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
             values.append(("Y_over_Q", place, mean(result["Y_over_Q"][:, w, side])))
         values.append(("sum_Y", number, np.abs(mean(result["sum_Y"][:, w]))))
         found += [(n, place, at[:, w], x, limit(n, w, float(load[w]))) for n, place, x in values]
+    points = sensors(case.vehicle)
     for point, axis in product(("floor_front", "floor_rear"), "yz"):
         x = result.series("sensor_acceleration", sensor=point, axis=axis)
-        name = f"body_{axis}"
-        found.append((name, point, result["distance"], np.abs(x), limit(name)))
+        name, ahead = f"body_{axis}", points[point].offset + points[point].arm[0]
+        found.append((name, point, result["distance"] + ahead, np.abs(x), limit(name)))
     return [(n, p, np.asarray(s, float), np.asarray(v, float), m) for n, p, s, v, m in found]
 
 

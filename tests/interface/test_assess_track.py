@@ -130,6 +130,7 @@ def test_wrong_input(recording, tmp_path, capsys):
     [
         {"cant": [{"type": "CST", "length": LENGTH, "cant": 0.05}]},
         {"friction_table": [[0.0, 0.2], [900.0, 0.4]]},
+        {"support": {"preset": "ballasted", "variation": [[0.0, 1.0], [900.0, 0.5]]}},
     ],
 )
 def test_pieces_keep_what_a_straight_track_has_at_its_places(recording, changes):
@@ -140,6 +141,25 @@ def test_pieces_keep_what_a_straight_track_has_at_its_places(recording, changes)
     assert moved == 0.0
     for name in changes:
         assert getattr(part, name) == getattr(track.replace(**changes), name)
+
+
+def test_all_wheelsets_run_over_every_piece(judged):
+    """The last one, too, stands at the end of a piece of 500 m when its run ends."""
+    run = railsim.open_result(judged[2] / "coach_manchester_40_0000.h5")
+    assert run["wheelset_distance"][-1].min() == pytest.approx(0.5 * (LENGTH - 0.25), abs=0.5)
+
+
+def test_places_on_the_floor_are_those_of_their_points(judged):
+    """The floor above the bogies is 9.5 m ahead of the middle and behind."""
+    run = railsim.open_result(judged[2] / "coach_manchester_40_0000.h5")
+    name = "coach_manchester"
+    case = module.Case(name, railsim.load_vehicle(name), run.track(), run.settings(), SPEED, 0.0)
+    ahead = {
+        where: np.unique(np.round(s - run["distance"], 3)).tolist()
+        for _, where, s, *_ in module._signals(case, run)
+        if where.startswith("floor")
+    }
+    assert ahead == {"floor_front": [9.5], "floor_rear": [-9.5]}
 
 
 def test_sections_are_counted_by_hand():

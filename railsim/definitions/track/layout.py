@@ -51,7 +51,10 @@ def is_straight_and_level(track: "Track") -> bool:
 
 def is_uniform(track: "Track") -> bool:
     """Whether a track is the same everywhere but for its irregularities: also the rails on it."""
-    tables = (track.gauge_widening, track.friction_table, track.sections, track.check_rail)
+    tables = (
+        track.gauge_widening, track.friction_table, track.sections, track.check_rail,
+        track.support.variation,
+    )  # fmt: skip
     return is_straight_and_level(track) and not any(tables)
 
 
