@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions import Settings, Track
+from railsim.definitions import Settings, Track, Vehicle
 from railsim.kernels.state import ARC_LENGTH
-from railsim.model.uneven_wheels import UnevenWheels
+from railsim.model.assembly import Model
 
 LENGTH = 50.0  # m; the tables reach beyond both ends
 POSITION = 25.0  # m, where a vehicle stands on it
@@ -21,15 +21,18 @@ def placed(state: Floats) -> Floats:
     return found
 
 
-def left_out(track: Track, settings: Settings, wheels: UnevenWheels) -> tuple[str, ...]:
+def left_out(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> tuple[str, ...]:
     """Remark on what a track of constant curvature and steady rolling leave out."""
     parts = {
+        "controllers (actuators get no command)": vehicle.controllers,
+        "applied forces": len(model.system.loads.body),
+        "traction and brakes": len(model.system.drives.body),
         "check rails": track.check_rail,
         "gauge widening": track.gauge_widening,
         "friction that varies along the track": _varies(track.friction_table),
         "support that varies along the track": _varies(track.support.variation),
         "sections of rails": track.sections,
-        "wheels that are not round": wheels.uneven,
+        "wheels that are not round": model.wheels.uneven,
         "transient creep forces": settings.transient_creep,
     }
     found = [name for name, there in parts.items() if there]

@@ -151,7 +151,7 @@ class LinearVehicle:
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
-        omitted = left_out(track, settings or Settings(), assembled.wheels)
+        omitted = left_out(vehicle, track, settings or Settings(), assembled)
         self.remarks = (*balance.remarks, *omitted)
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         if self.sticking:

@@ -314,7 +314,7 @@ class _Search:
                 f"{pads} friction elements hold nothing: what the way into the curve leaves in "
                 "them, up to their limits, is left out",
             )
-        self.remarks += left_out(track, settings, assembled.wheels)
+        self.remarks += left_out(vehicle, track, settings, assembled)
         self.parts = parts_of(self.model, coordinates(self.model))
         self.shares = np.ones(2)
         values = np.array([0.0, 0.0, WALKING_PACE**2, np.mean(track.friction_at(0.0))])

@@ -209,7 +209,7 @@ def stationary(
     name = f"cant {1e3 * cant:g} mm"
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
-    remarks = (*balance.remarks, *left_out(track, settings, model.wheels))
+    remarks = (*balance.remarks, *left_out(vehicle, track, settings, model))
     judged = tuple(values), tuple(reasons), loops, remarks
     return Stationary(vehicle.name, limits.edition, held, *judged)
 

@@ -259,3 +259,30 @@ def test_friction_and_support_are_those_at_the_beginning_of_the_track():
         assert "friction that varies" in said
         assert "support that varies" in said
     assert not any("left out" in one for one in wanted.remarks)
+
+
+def test_controllers_and_given_forces_are_left_out_with_a_remark(tmp_path):
+    """The actuator of the controller gets no command: modes are those of the vehicle without it."""
+    law = tmp_path / "skyhook.py"
+    law.write_text("def skyhook(time, v):\n    return -20e3 * v\n")
+    passive = railsim.load_vehicle("coach_manchester")
+    data = passive.model_dump(exclude_none=True)
+    up = {"points": [[9.5, 0.0, -1.1], [9.5, 0.0, -0.6]], "bodies": ["carbody", "front.frame"]}
+    wind = {"bodies": ["carbody"], "point": [0.0, 0.0, -2.0], "force_table": [[0.0, 0.0, 2e4, 0.0]]}
+    data["elements"] = {
+        "damper": {"kind": "actuator", **up},
+        "wind": {"kind": "applied_force", **wind},
+    }
+    data["laws"] = {"skyhook": {"file": str(law)}}
+    data["signals"] = {"v": {"quantity": "velocity", "body": "carbody", "axis": "z"}}
+    data["controllers"] = {
+        "skyhook": {"law": "skyhook", "period": 5e-3, "inputs": {"v": "v"}, "outputs": ["damper"]}
+    }
+    active = railsim.Vehicle.model_validate(data)
+    found = railsim.modes(active, speed=20.0)
+    for remarks in (found.remarks, railsim.curving(active, radius=[500.0]).remarks):
+        (said,) = [one for one in remarks if "left out" in one]
+        assert "controllers" in said
+        assert "applied forces" in said
+    bounce = railsim.modes(passive, speed=20.0)["car body bounce"].eigenvalue
+    assert found["car body bounce"].eigenvalue == pytest.approx(bounce)
