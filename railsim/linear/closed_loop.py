@@ -3,7 +3,8 @@
 With the vehicle's x' = A x + B u, what the controllers give for the state is measured on the run's
 own code: w = K x + D u, by differences of one call of the loop at the states about steady rolling.
 It acts as u(t) = w(t - T), T being the actuator's delay, that of the slowest signal, a step of the
-loop, and half the controller's period for which a command is held (Franklin, Powell, Workman 1998,
+loop, and half the time for which a command is held, the longest of the controller's period and the
+time between two samples of its signals (Franklin, Powell, Workman 1998,
 Digital control of dynamic systems, 4.4); the delay is that of Pade of order 1,
 (1 - T s/2)/(1 + T s/2).  Noise, resolution and limits are left out, laws start with their memory
 at 0.
@@ -126,5 +127,6 @@ def _loop(
         begin, gives = one[kernel.WIRES], one[kernel.GIVES]
         wires = controllers.wires[begin : begin + gives + one[kernel.TAKES]]
         late = signals.row[wires[gives:], kernel.DELAY].max(initial=0.0)
-        delay[wires[:gives]] += 0.5 * controllers.period[c] + late
+        held = signals.row[wires[gives:], kernel.PERIOD].max(initial=controllers.period[c])
+        delay[wires[:gives]] += 0.5 * held + late
     return K, D, np.maximum(delay, 1e-6)
