@@ -80,7 +80,7 @@ def selected(
     for name, quantity in chosen.items():
         array = result[name]
         if quantity.dims[:1] == ("time",):
-            smooth = array if rate is None or name in POSITIONS else _smooth(time, array, rate)
+            smooth = array if rate is None or name in POSITIONS else _smooth(result, name, rate)
             array = array[rows] if rate is None else _at(instants, time, smooth)
         arrays[name] = array * (quantity.scale if shown_units else 1.0)
     if shown_units:
@@ -88,12 +88,29 @@ def selected(
     return Result(arrays, chosen, result.coordinates, result.attributes, result.profiles)
 
 
-def _smooth(time: Floats, values: Floats, rate: float) -> Floats:
-    """Return values without what changes faster than half the rate; as they are at uneven times."""
+def _smooth(result: Result, name: str, rate: float) -> Floats:
+    """Return a quantity without what changes faster than half the rate; as it is at uneven times.
+
+    Y/Q is the quotient of both after the filter.  Others are bridged where they do not exist, as at
+    a wheel that does not touch, and do not exist there afterwards.
+    """
+    time, values = result["time"], result[name]
     step = even_step(time)
     if step is None or len(time) < 4 or rate * step >= 1.0:
         return values
-    return low_passed(values, 1.0 / step, 0.4 * rate)
+
+    def passed(x: Floats) -> Floats:
+        return low_passed(x, 1.0 / step, 0.4 * rate)
+
+    if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
+        Y, Q = passed(result["Y"]), passed(result["Q"])
+        return np.array([-1.0, 1.0]) * Y / np.where(Q > 0.0, Q, np.nan)
+    columns = values.reshape(len(time), -1).copy()
+    for column in columns.T:
+        known = np.isfinite(column)
+        if known.any() and not known.all():
+            column[:] = np.interp(time, time[known], column[known])
+    return np.where(np.isnan(values), np.nan, passed(columns).reshape(values.shape))
 
 
 def _at(instants: Floats, time: Floats, values: Floats) -> Floats:

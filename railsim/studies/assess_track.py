@@ -264,7 +264,7 @@ def _extent(track: Track) -> tuple[float, float]:
 def _behind(vehicle: Vehicle) -> float:
     """How far the last wheelset is behind the reference body: it covers a piece, too [m]."""
     flat = flatten(vehicle)
-    (origin,) = [body.position[0] for body in flat.bodies if body.name == flat.reference]
+    origin = flat.body(flat.reference).position[0]
     return max(0.0, origin - min(w.position[0] for w in flat.of_kind("wheelset")))
 
 

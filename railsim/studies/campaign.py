@@ -279,7 +279,9 @@ def counting_sections(
 ) -> list[TestSection]:
     """Sections that count, of the zone with most of them, at constant speed."""
     vehicle = case.vehicle
-    x = [b.position[0] for b in flatten(vehicle).of_kind("wheelset")]
+    flat = flatten(vehicle)
+    origin = flat.body(flat.reference).position[0]
+    x = [b.position[0] - origin for b in flat.of_kind("wheelset")]
     x += [sensor.offset + sensor.arm[0] for sensor in sensors(vehicle).values()]
     ahead, behind = max(0.0, *x), min(0.0, *x)
     begin = case.start + max(START * case.speed, ahead - behind) + ahead

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -19,7 +20,7 @@ from railsim.definitions.loading import load_running_limits, load_scenario
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.profiles import load_profile
-from railsim.studies.campaign import campaign, part_speed, scenario_cases
+from railsim.studies.campaign import campaign, counting_sections, part_speed, scenario_cases
 
 
 @pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
@@ -283,3 +284,17 @@ def test_runs_of_one_name_are_refused(tmp_path, capsys):
     given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester"]
     assert main([*given, "--out", str(tmp_path / "out")]) == 2
     assert "2 runs of this name" in capsys.readouterr().err
+
+
+def test_sections_that_count_do_not_depend_on_the_origin_of_the_vehicle():
+    """The x of the origin is arbitrary: the same coach drawn 40 m further ahead."""
+    limits = load_running_limits("en14363")
+    case = scenario_cases(load_scenario("en14363"), ["coach_manchester"])[0]
+    bogies = "assemblies.bogie.placements"
+    ahead = {f"{bogies}.front.position.0": 49.5, f"{bogies}.rear.position.0": 30.5}
+    moved = case.vehicle.with_values({"bodies.carbody.position.0": 40.0, **ahead})
+    found = [
+        counting_sections(case.track, replace(case, vehicle=vehicle), limits, vehicle.service)
+        for vehicle in (case.vehicle, moved)
+    ]
+    assert found[0] == found[1]

@@ -47,6 +47,23 @@ def test_values_at_a_lower_rate_are_filtered(result):
     np.testing.assert_allclose(part.distance[5:-5], expected, rtol=1e-3)
 
 
+def test_a_wheel_that_lifts_spoils_no_other_values_at_a_lower_rate(result):
+    """Y/Q is that of the filtered forces; other values are missing where they do not exist."""
+    arrays = {name: np.array(result[name]) for name in result}
+    middle = len(result.time) // 2
+    for name in ("Y_over_Q", "contact_y"):
+        arrays[name][middle : middle + 3, 0, 0] = np.nan
+    about = result.quantities, result.coordinates, result.attributes, result.profiles
+    lifts = railsim.Result(arrays, *about)
+    part, whole = (selected(one, rate=5.0) for one in (lifts, result))
+    Y, Q = part.Y, part.Q
+    inner = slice(5, -5)
+    np.testing.assert_allclose(part.Y_over_Q[inner], ([-1.0, 1.0] * Y / Q)[inner], rtol=1e-3)
+    assert np.isnan(part.contact_y[:, 0, 0]).sum() <= 2
+    there = ~np.isnan(part.contact_y)
+    np.testing.assert_allclose(part.contact_y[there], whole.contact_y[there], atol=1e-3)
+
+
 def test_all_that_is_wrong_is_named_at_once(result, tmp_path, capsys):
     file = result.to_hdf5(tmp_path / "run.h5")
     wrong = ["export", str(file), "QQ", "--between", "1e6", "2e6", "--rate", "-1"]
