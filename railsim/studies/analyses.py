@@ -1,11 +1,11 @@
 """The analyses of a case: computed in addition to, or instead of, a run in the time domain.
 
-Each returns numbers by name, which become columns of ``summary.csv``; the names of an analysis
-called ``curve`` in the study begin with ``curve.``.
+Each returns numbers by name, which become columns of ``summary.csv``, and remarks; the names of an
+analysis called ``curve`` in the study begin with ``curve.``.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from railsim.definitions.study.analyses import (
@@ -20,24 +20,27 @@ from railsim.result import Result
 from railsim.studies.case import Case
 
 Numbers = dict[str, float]
+Outcome = tuple[Numbers, Sequence[str]]
 
 LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
-def analysed(case: Case, result: Result | None) -> Numbers:
-    """Return the numbers of all analyses of a case.
+def analysed(case: Case, result: Result | None) -> tuple[Numbers, list[str]]:
+    """Return the numbers of all analyses of a case, and remarks on them.
 
     `result`: result of its run, if one of its analyses needs one. Raises InputError, ModelError: an
     analysis fails; the message names it.
     """
     found: Numbers = {}
+    said: list[str] = []
     for name, analysis in case.analyses.items():
-        numbers = _ACTIONS[type(analysis)](case, analysis, result)
+        numbers, remarks = _ACTIONS[type(analysis)](case, analysis, result)
         found |= {f"{name}.{key}": value for key, value in numbers.items()}
-    return found
+        said += [f"{name}: {remark}" for remark in remarks]
+    return found, said
 
 
-def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Numbers:
+def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Outcome:
     """Largest share of each limit; values of comfort, wear and safety."""
     from railsim.assessment import assess
 
@@ -55,7 +58,7 @@ def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Nu
         numbers["largest_share"] = max(shares.values())
     if found.verdict:
         numbers["exceeded"] = float(found.exceeded)
-    return {**numbers, **_largest(found.record(), analysis.standard)}
+    return {**numbers, **_largest(found.record(), analysis.standard)}, ()
 
 
 def _largest(record: Mapping[str, Any], standard: str) -> Numbers:
@@ -81,19 +84,20 @@ def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, fl
             yield f"{before}{key}", float(value)
 
 
-def _modes(case: Case, analysis: ModesAnalysis, result: Result | None) -> Numbers:
+def _modes(case: Case, analysis: ModesAnalysis, result: Result | None) -> Outcome:
     """Damping ratio and frequency of the least damped oscillation from 0.3 to 40 Hz."""
     from railsim.linear.modes import modes
 
     found = modes(
         case.vehicle, case.track, speed=case.speed, settings=case.settings, **_contact(analysis)
-    ).least_damped
-    if found is None:
+    )
+    least = found.least_damped
+    if least is None:
         raise ModelError("no oscillation from 0.3 to 40 Hz")
-    return {"damping": found.damping_ratio, "frequency": found.frequency}
+    return {"damping": least.damping_ratio, "frequency": least.frequency}, found.remarks
 
 
-def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result | None) -> Numbers:
+def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result | None) -> Outcome:
     """Critical speeds by method; an end of the search where it hunts at no speed, or at all."""
     from railsim.stability.critical_speed import critical_speed
 
@@ -114,7 +118,7 @@ def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result 
         numbers = {"linear": analysis.low if unstable else analysis.high}
     for method, point in found.nonlinear.items():
         numbers[method] = analysis.high if point is None else point.speed
-    return numbers
+    return numbers, found.remarks
 
 
 def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
@@ -122,7 +126,7 @@ def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
     return {name: getattr(analysis, name) for name in names}
 
 
-def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Numbers:
+def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Outcome:
     """Largest magnitudes over the wheels or wheelsets, and the sum of the wear numbers."""
     import numpy as np
 
@@ -145,16 +149,14 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Nu
     names = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "car_roll")
     numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in names}
     numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards: no derailment
-    return {
-        **numbers,
-        "sum_abs_Y": float(np.max(np.abs(found.Y).sum(axis=-1))),
-        "T_gamma": float(np.sum(found.T_gamma)),
-        "T_gamma_largest": float(np.max(found.T_gamma)),
-    }
+    numbers["sum_abs_Y"] = float(np.max(np.abs(found.Y).sum(axis=-1)))
+    numbers["T_gamma"] = float(np.sum(found.T_gamma))
+    numbers["T_gamma_largest"] = float(np.max(found.T_gamma))
+    return numbers, found.remarks
 
 
-_ACTIONS: dict[type[Any], Callable[..., Numbers]] = {
-    RunAnalysis: lambda *_: {},  # peaks and mid-curve values, as in every study
+_ACTIONS: dict[type[Any], Callable[..., Outcome]] = {
+    RunAnalysis: lambda *_: ({}, ()),  # peaks and mid-curve values, as in every study
     AssessAnalysis: _assessed,
     ModesAnalysis: _modes,
     CriticalSpeedAnalysis: _critical_speed,

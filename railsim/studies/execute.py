@@ -130,7 +130,7 @@ def _analysed(job: Job) -> Record:
     """Return the record of a job without a run in the time domain."""
     begin = time.process_time()
     try:
-        quantities = analysed(job.case, None)
+        quantities, said = analysed(job.case, None)
     except ModelError as error:  # no solution: a result too, not computed again
         facts: Record = {"status": "stopped", "status_reason": str(error)}
     except Exception as error:
@@ -138,6 +138,7 @@ def _analysed(job: Job) -> Record:
     else:
         cpu_time = time.process_time() - begin
         facts = {"status": "complete", "cpu_time": cpu_time, "quantities": quantities}
+        facts["remarks"] = said
     return waiting_record(job.case) | facts
 
 

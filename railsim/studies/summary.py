@@ -58,8 +58,10 @@ def finished_record(case: Case, result: Result, function: str | None = None) -> 
 
     Raises RailsimError: one of these fails.
     """
-    found = user_quantities(function, result) | analysed(case, result)
+    numbers, said = analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
+    facts["remarks"] = [*facts["remarks"], *said]
+    found = user_quantities(function, result) | numbers
     return {**facts, "quantities": found} if function or case.analyses else facts
 
 

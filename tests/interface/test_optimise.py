@@ -193,6 +193,24 @@ def test_analyses_are_columns_of_the_summary(tmp_path):
     assert again.computed == 0
 
 
+def test_remarks_on_analyses_stand_with_their_numbers(tmp_path):
+    """What steady curving leaves out; that a number is the end of the search."""
+    analyses = {
+        "curve": ANALYSES["curve"],
+        "hunts": {"kind": "critical_speed", "low": 5.0, "high": 10.0},
+    }
+    outcome = railsim.study(
+        "coach_manchester", "straight", None, analyses=analyses, out=tmp_path, workers=1,
+        assignments=["track.gauge_widening=[[0.0, 0.01]]"],
+    )  # fmt: skip
+    (record,) = outcome.records
+    assert record["quantities"]["hunts.linear"] == 10.0
+    said = [remark.partition(": ")[::2] for remark in record["remarks"]]
+    assert any(name == "curve" and "gauge widening" in words for name, words in said)
+    assert any(name == "hunts" and "no linear critical speed" in words for name, words in said)
+    assert "no linear critical speed" in (tmp_path / "summary.csv").read_text()
+
+
 def test_analyses_that_no_speed_counts_for_need_none(tmp_path):
     analyses = {"curve": ANALYSES["curve"]}
     outcome = railsim.study(
