@@ -1,5 +1,6 @@
 """`critical_speed`: from which speed a vehicle hunts, linear and non-linear, and how it begins."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -10,7 +11,9 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions import Settings, Track, Vehicle
-from railsim.definitions.loading import load_track
+from railsim.definitions.limits import Situation
+from railsim.definitions.loading import load_running_limits, load_track
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Faults, InputError, ModelError
 from railsim.linear.eigenmodes import (
     SEARCHED,
@@ -140,7 +143,7 @@ def critical_speed(
                 _by_continuation(found, motion, begins, share)
         except (LeftRange, ModelError) as error:
             found.remarks.append(f"{method}: {error}")
-    _conclude(found, of_runs, begins.parameter)
+    _conclude(found, vehicle, of_runs, begins.parameter)
     _remark_range(found, vehicle)
     return found
 
@@ -354,7 +357,22 @@ def _by_continuation(
         found.nonlinear["continuation"] = min(ends, key=lambda point: point.speed)
 
 
-def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | None) -> None:
+def _unstable_force(vehicle: Vehicle, Q0: Floats) -> float:
+    """Limit of the rms of a wheelset's lateral force (EN 14363), of the lightest one [N].
+
+    Without a service table that of a passenger vehicle.
+    """
+    laws = load_running_limits("en14363").limits
+    service = vehicle.service or Service(admissible_speed=1.0, cant_deficiency=0.1)
+    lightest = int(np.argmin(Q0.sum(axis=1)))
+    load = float(Q0[lightest].mean())
+    at = Situation(vehicle, service, "1", math.inf, lightest, load, laws)
+    return float(laws["instability"].at(at))
+
+
+def _conclude(
+    found: CriticalSpeed, vehicle: Vehicle, prepared: LinearVehicle, begins: float | None
+) -> None:
     """Find type and limits from all branches."""
     lowest = found.lowest
     if not found.nonlinear:
@@ -365,8 +383,7 @@ def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | Non
         found.type = "subcritical"
     else:
         found.type = "supercritical"
-    # EN 14363: sum_Y 10 kN + 2 Q0/3, of which the instability criterion takes half as rms
-    force = 0.5 * (10e3 + 2.0 * float(np.min(prepared.Q0)) / 3.0)
+    force = _unstable_force(vehicle, prepared.Q0)
     # a ramp passes the end of a branch late
     branches = [branch for branch in found.branches if branch.direction != "ramp"]
     only_ramp = not branches

@@ -7,6 +7,7 @@ import pytest
 
 import railsim
 from railsim.cli import main
+from railsim.stability import critical_speed
 
 
 def test_linear_critical_speed(capsys, tmp_path):
@@ -286,3 +287,13 @@ def test_controllers_and_given_forces_are_left_out_with_a_remark(tmp_path):
         assert "applied forces" in said
     bounce = railsim.modes(passive, speed=20.0)["car body bounce"].eigenvalue
     assert found["car body bounce"].eigenvalue == pytest.approx(bounce)
+
+
+def test_instability_limit_is_that_of_the_category():
+    """Half of k1 (10 kN + 2 Q0/3), k1 0.85 for freight; 2 Q0 the load of the lightest axle."""
+    for name, k1 in (("coach_manchester", 1.0), ("wagon_y25", 0.85)):
+        vehicle = railsim.load_vehicle(name)
+        axles = railsim.static_loads(vehicle).axle_load
+        uneven = np.outer(axles / 2.0, [0.9, 1.1])
+        limit = 0.5 * k1 * (10e3 + min(axles) / 3.0)
+        assert critical_speed._unstable_force(vehicle, uneven) == pytest.approx(limit)
