@@ -35,7 +35,7 @@ from railsim.linear.vehicle import WALKING_PACE
 from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
-from railsim.model.work import work_arrays
+from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
 from railsim.notation import ROLL, YAW
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
@@ -323,7 +323,8 @@ class _Search:
     def _system(self, curvature: float, cant: float, friction: float) -> System:
         left, right = (friction * self.shares).tolist()
         there = circle(self.track, curvature=curvature, cant=cant, friction=(left, right))
-        return self.model.system._replace(track=track_tables(there))
+        given = without_loads(self.model.system)  # at constant speed, as Newton's method has it
+        return given._replace(track=track_tables(there), drive=CONSTANT_SPEED)
 
     def point(self, radius: float, deficiency: float, friction: float) -> Point:
         """Steady state at one point of the grid."""

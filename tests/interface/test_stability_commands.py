@@ -7,7 +7,8 @@ import pytest
 
 import railsim
 from railsim.cli import main
-from railsim.stability import critical_speed
+from railsim.linear.steady import NotConverged
+from railsim.stability import critical_speed, curving
 
 
 def test_linear_critical_speed(capsys, tmp_path):
@@ -297,3 +298,23 @@ def test_instability_limit_is_that_of_the_category():
         uneven = np.outer(axles / 2.0, [0.9, 1.1])
         limit = 0.5 * k1 * (10e3 + min(axles) / 3.0)
         assert critical_speed._unstable_force(vehicle, uneven) == pytest.approx(limit)
+
+
+def test_steady_curving_in_time_has_neither_given_forces_nor_a_speed_profile(monkeypatch):
+    """Where Newton's method fails, the run on the circle finds what Newton's would have found."""
+    data = railsim.load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    wind = {"bodies": ["carbody"], "point": [0.0, 0.0, -2.0], "force_table": [[0.0, 0.0, 2e4, 0.0]]}
+    data["elements"] = {"wind": {"kind": "applied_force", **wind}}
+    windy = railsim.Vehicle.model_validate(data)
+    slow = {"mode": "table", "speed_table": [[0.0, 5.0], [100.0, 5.0]]}
+    how = {"radius": [500.0], "cant": 0.1, "cant_deficiency": [0.05]}
+    found = railsim.curving(windy, settings=railsim.Settings(drive=slow), **how)
+    assert found.converged.item() == curving.NEWTON
+
+    def fails(*_, **__):
+        raise NotConverged("no steady state")
+
+    monkeypatch.setattr(curving, "led", fails)
+    in_time = railsim.curving(windy, settings=railsim.Settings(drive=slow), **how)
+    assert in_time.converged.item() == curving.TIME
+    np.testing.assert_allclose(in_time.Y, found.Y, atol=50.0)
