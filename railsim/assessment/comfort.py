@@ -249,10 +249,16 @@ def transition_comfort(
     return TransitionComfort(begin, end, *felt, p_ct(*felt, "standing"), p_ct(*felt, "seated"))
 
 
-def event_comfort(lateral: Floats, rate: float) -> dict[str, float]:
-    """Largest P_DE of a record by posture [%]: all windows of 2 s, low-pass filter of 2 Hz."""
-    low = low_passed(lateral, rate, 2.0)
-    size = round(2.0 * rate)
+EVENT_WINDOW = 2.0  # s
+
+
+def event_comfort(lateral: Floats, rate: float, counted: slice = slice(None)) -> dict[str, float]:
+    """Largest P_DE of a record by posture [%]: all windows of 2 s, low-pass filter of 2 Hz.
+
+    `counted`: Part of the record within which the windows lie; the filter sees all of it.
+    """
+    low = low_passed(lateral, rate, 2.0)[counted]
+    size = round(EVENT_WINDOW * rate)
     if len(low) <= size:
         return dict.fromkeys(EVENT, math.nan)
     from scipy.ndimage import maximum_filter1d, minimum_filter1d

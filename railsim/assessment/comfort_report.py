@@ -128,7 +128,10 @@ class _Gathered:
             self.hunting += float(np.sum(near**2))
         for axis, way in enumerate(self.sperling, start=1):
             self.sperling[way] += size * sperling_mean_square(a[counted, axis], rate, way)
-        for posture, value in comfort.event_comfort(a[counted, 1], rate).items():
+        # windows over the border to the part before lie in this one
+        over = round(comfort.EVENT_WINDOW * rate) if self.count > size else 0
+        events = slice(max(0, counted.start - over), counted.stop)
+        for posture, value in comfort.event_comfort(a[:, 1], rate, events).items():
             self.events[posture] = max(self.events[posture], np.nan_to_num(value))
 
 

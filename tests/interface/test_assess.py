@@ -10,7 +10,7 @@ from made_record import Q0, curve, made, track
 
 import railsim
 from railsim.assessment import Assessment, assess
-from railsim.assessment.comfort import MeanComfort
+from railsim.assessment.comfort import MeanComfort, event_comfort
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.tables import tables
 from railsim.cli import main
@@ -380,6 +380,22 @@ def test_wear_of_a_run_that_ended_soon(duration, counted, status, tmp_path, caps
     assert "NaN" not in said.out
     words = "run: time: 3 s; more than the first 3 s, which do not count\n"
     assert said.err == (words if status == 2 else "")
+
+
+@pytest.mark.parametrize("instant", [40.0, 63.0])
+def test_an_event_counts_wherever_it_is(instant):
+    """Also where a run is read in pieces of 60 s after the first 3 s: a bump of the car body."""
+
+    def bump(time):
+        return 1.5 * np.exp(-(((time - instant) / 0.5) ** 2))
+
+    run = made(track({"type": "STR", "length": 2000.0}), 20.0, rate=200.0, lateral=bump,
+               settings='{"outputs": {"low_pass": {"frequency": 50.0}}}')  # fmt: skip
+    (found,) = assess(run, "comfort")
+    points = next(iter(found.comfort.values()))
+    events = next(p.events for p in points if p.sensor == "floor_middle")
+    assert events == pytest.approx(event_comfort(bump(run["time"]), 200.0), rel=1e-3)
+    assert events["standing"] > 5.0
 
 
 def test_hunting_is_named_as_the_cause_of_discomfort():
