@@ -162,7 +162,7 @@ def steering(signals: Signals, section: TestSection) -> Values:
     wheelset = flatten(signals.record.result.vehicle()).of_kind("wheelset")[0].wheelset
     if geometry is None or wheelset is None:
         return {}
-    index = steering_index(geometry, abs(section.radius), float(np.mean(wheelset.radius)))
+    index = steering_index(geometry, section.radius, float(np.mean(wheelset.radius)))
     return {} if math.isnan(index) else {"wheelset 1": [index]}
 
 
@@ -173,16 +173,19 @@ def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: flo
     the profiles offer before the flange makes contact: above 1 the wheelset cannot steer without
     its flange.
 
-    `geometry`: Contact functions of the leading wheelset. `radius`, `rolling_radius`: Of the
-    curve, unsigned, and of the wheels [m].
+    `geometry`: Contact functions of the leading wheelset. `radius`: Of the curve, positive to the
+    right: there the wheelset moves to the left [m]. `rolling_radius`: Of the wheels [m].
     """
-    y, difference = geometry.lateral, np.asarray(geometry.delta_r)
+    outwards = -math.copysign(1.0, radius)
+    y, difference = outwards * geometry.lateral, outwards * np.asarray(geometry.delta_r)
     ahead = np.flatnonzero((y >= 0.0) & np.isfinite(difference))
+    ahead = ahead[np.argsort(y[ahead])]
     touching = ahead[np.abs(geometry.contact_angle[ahead]).max(axis=1) > FLANGE]
-    if not len(touching) or touching[0] == 0 or difference[touching[0] - 1] <= 0.0:
+    free = ahead[y[ahead] < y[touching[0]]] if len(touching) else ahead[:0]
+    if not len(free) or difference[free[-1]] <= 0.0:
         return math.nan
     apart = float(np.ptp(geometry.contact_y[ahead[0]]))
-    return float(apart * rolling_radius / radius / difference[touching[0] - 1])
+    return float(apart * rolling_radius / abs(radius) / difference[free[-1]])
 
 
 @dataclass(frozen=True)

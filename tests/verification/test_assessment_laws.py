@@ -212,11 +212,23 @@ def test_steering_index_of_cones_is_proportional_to_the_curvature():
     wheel, rail = load_profile("cone_1in20"), load_profile("60E1")
     lateral = np.arange(0.0, 9.0e-3, 1e-5)
     geometry = contact_geometry(wheel, rail, lateral=lateral)
-    gentle, tight = (steering_index(geometry, R, 0.46) for R in (4000.0, 2000.0))
+    gentle, tight = (steering_index(geometry, R, 0.46) for R in (-4000.0, -2000.0))
     assert tight / gentle == pytest.approx(2.0)
     flange = lateral[np.abs(geometry.contact_angle).max(axis=1) > 0.5][0]
     # rails curved to 300 mm steepen the contact of a cone that moves and rolls: 5 %
     assert tight * flange == pytest.approx(3.45e-3, rel=0.06)
+
+
+def test_steering_index_is_that_of_the_outer_wheel_on_either_hand():
+    """Cone on one wheel, S1002 on the other: what counts is which of them runs outside."""
+    cone, worn, rail = load_profile("cone_1in40"), load_profile("S1002"), load_profile("60E1")
+    given, mirrored = (contact_geometry(wheels, rail) for wheels in ((worn, cone), (cone, worn)))
+    right, left = (steering_index(given, R, 0.46) for R in (500.0, -500.0))
+    assert [left, right] == pytest.approx(
+        [steering_index(mirrored, R, 0.46) for R in (500.0, -500.0)], rel=1e-3
+    )
+    # the flange root of S1002 outside gives far more radius difference than the cone does
+    assert right < 0.2 * left
 
 
 # weightings and comfort ---------------------------------------------------------------------------

@@ -73,7 +73,7 @@ def test_steering_index_grows_with_the_distance_of_the_wheels():
     index = {
         gauge: steering_index(
             contact_geometry(wheel, rail, gauge=gauge, back_to_back=gauge - 0.075, lateral=lateral),
-            500.0,
+            -500.0,
             0.46,
         )
         for gauge in (1.435, 1.0)
