@@ -109,14 +109,12 @@ def _held_pressure(dense: Motion, work: float) -> float:
     contact, solve_for = definition.contact, definition.solve
     assert contact is not None
     assert solve_for is not None
-    assert definition.output is not None
     stated = contact.pressure
     automatic = isinstance(stated, Expression) and bool(stated.names & definition.automatic)
     if stated != AUTO and not automatic:
         return float(dense.model.number(stated))
     at = solve(dense.model, [work])
-    _, r1, _ = at.point(definition.output.point)
-    wanted = dense.model.number(contact.force) * r1[:, 1] - forces.generalised_force(at)
+    wanted = dense.model.number(contact.force) * height_of(at)[1] - forces.generalised_force(at)
     force = wanted / forces.unit_work(at, definition.actuators[solve_for.unknown])
     return float(forces.pressure_for(at, solve_for.unknown, force)[0])
 

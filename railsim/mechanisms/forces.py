@@ -48,7 +48,7 @@ class Rates:
 
     speed: Any = 0.0  # ds/dt, a number or one for each position
     acceleration: Any = 0.0  # d2s/dt2, likewise
-    friction: int = 0  # sense of the driver's (slow) motion for friction; 0 leaves friction out
+    friction: Any = 0  # sense of the driver's motion for friction, likewise; 0 leaves it out
     trial: bool = False  # a step is only tried: a gas spring may then go beyond its stroke
 
 
@@ -186,7 +186,7 @@ def _gas_push(motion: Motion, name: str, gas: GasSpring, moved: Any, rates: Rate
     push = components.gas_spring_force(used, F1, n(gas.progression), stroke, gas.law, temperature)
     if pulls:
         push = -push
-    if rates.friction:
+    if np.any(rates.friction):
         # against the motion: more push while it is compressed
         push = push - n(gas.friction) * rates.friction * np.sign(np.real(slope))
     damping = n(gas.damping)

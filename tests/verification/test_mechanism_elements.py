@@ -79,6 +79,43 @@ unknown = "motor"
 angle = "crank"
 speed = 20.0
 """
+SLIDE = """
+format = "railsim-mechanism/1"
+name = "slide"
+[parameters]
+friction = 20.0
+[ground.points]
+o = [0.0, 0.0]
+wall = [1.0, 0.0]
+[bodies.slide]
+points = { pin = [0.0, 0.0] }
+mass = 2.0
+[start]
+slide = { x = 0.4, y = 0.0 }
+[joints.guide]
+prismatic = ["slide.pin", "ground.o"]
+[driver]
+coordinate = "slide.pin"
+axis = "x"
+start = 0.4
+end = 0.6
+[output]
+point = "slide.pin"
+axis = "x"
+[actuators.push]
+cylinder = ["ground.o", "slide.pin"]
+bore = 0.05
+supply_pressure = 0.6e6
+[solve]
+unknown = "push"
+[elements.gas]
+gas_spring = ["slide.pin", "ground.wall"]
+F1 = 100.0
+progression = 1.0
+stroke = 0.3
+extended = 0.65
+friction = "friction"
+"""
 
 
 @pytest.fixture
@@ -250,3 +287,23 @@ def test_friction_does_not_hide_in_the_sense_of_a_rate():
 
 def test_a_force_that_is_zero_everywhere_has_no_zeros(load):
     assert analyse(load(CRANK)).force_zeros == ()  # was one at every position
+
+
+def test_friction_of_a_motion_by_table_turns_with_the_motion(load):
+    """Out and back: m a + F1 + R where the spring is compressed, m a + F1 - R where it extends."""
+    table = [[round(0.1 * k, 1), float(0.05 * (1.0 - np.cos(0.2 * np.pi * k)))] for k in range(11)]
+    motion = f"[motion]\nactuator = 'push'\nlaw = 'table'\ntable = {table}\npoints = 101\n"
+    timed = analyse(load(SLIDE + motion)).timed
+    turned = np.sign(timed.speed)
+    moving = np.abs(timed.speed) > 1e-3
+    expected = 2.0 * timed.acceleration + 100.0 + 20.0 * turned
+    assert timed.force[moving] == pytest.approx(expected[moving], abs=1e-6)
+    assert {-1.0, 1.0} == set(turned[moving])
+
+
+def test_pressure_for_a_contact_force_along_x(load):
+    """The cylinder pushes with p A; the gas spring takes 100 N, the contact 150 N of it."""
+    zone = "[zone]\nlow = 0.05\nwork = 0.1\nhigh = 0.15\n[contact]\nforce = 150.0\n"
+    contact = analyse(load(SLIDE + zone)).contact
+    assert contact.pressure == pytest.approx(250.0 / (0.25 * np.pi * 0.05**2), rel=1e-9)
+    assert contact.force["work"] == pytest.approx(150.0, rel=1e-9)
