@@ -21,7 +21,7 @@ from railsim.assessment.comfort import (
     p_de,
     transition_comfort,
 )
-from railsim.assessment.criteria import steering_index
+from railsim.assessment.criteria import CRITERIA, Measured, steering_index
 from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
 from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
@@ -229,6 +229,22 @@ def test_steering_index_is_that_of_the_outer_wheel_on_either_hand():
     )
     # the flange root of S1002 outside gives far more radius difference than the cone does
     assert right < 0.2 * left
+
+
+def test_values_of_left_hand_curves_are_those_of_their_mirror_images():
+    """Pooled as they are: lateral signals of a left-hand curve are those of the right one, turned.
+
+    Vertical ones and quotients do not turn, and guiding forces are positive outwards before.
+    """
+    x = np.random.default_rng(4).normal(0.3, 1.0, 4000)
+    turned = ("sum_Y", "body_y", "body_y_safety", "body_y_rms", "body_y_qst", "frame_y")
+    for name, one in CRITERIA.items():
+        if not isinstance(one.measure, Measured):
+            continue
+        sign = -1.0 if name in (*turned, "overturning") else 1.0
+        left, right = one.measure.value(sign * x, -1), one.measure.value(x, 1)
+        assert left == pytest.approx(right, rel=1e-9), name
+        assert name not in turned or np.all(np.isfinite(left))
 
 
 # weightings and comfort ---------------------------------------------------------------------------
