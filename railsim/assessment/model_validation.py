@@ -351,7 +351,7 @@ def _ahead(result: Result, selection: str) -> float:
     base, *labels = selection.split(":")
     if base.startswith("sensor_"):
         sensor = all_sensors(result.vehicle())[labels[0]]
-        return sensor.offset + sensor.arm[0]
+        return sensor.along
     names = list(result.wheelsets)
     if not labels or not (labels[0] in names or labels[0].isdecimal()):
         return 0.0

@@ -146,7 +146,7 @@ class Record:
 
     def sensor_offset(self, sensor: str) -> float:
         """Arc length of a sensor relative to the reference body [m]."""
-        return self.sensors[sensor].offset + self.sensors[sensor].arm[0]
+        return self.sensors[sensor].along
 
     def readings(self, rows: slice) -> tuple[Floats, Floats]:
         """Accelerations [m/s2] and roll velocities [rad/s] of all sensors, see `readings`."""

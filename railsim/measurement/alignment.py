@@ -151,4 +151,4 @@ def _ahead(measurement: Measurement, vehicle: Vehicle | None, point: str) -> flo
             raise argument_error("vehicle", "none", allowed)
         vehicle = load_vehicle(name)
     sensor = all_sensors(vehicle)[point]
-    return sensor.offset + sensor.arm[0]
+    return sensor.along

@@ -189,7 +189,7 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
         rows.append(("approved for", f"{3.6 * service.admissible_speed:.0f} km/h, cant deficiency "
                      f"{1e3 * service.cant_deficiency:.0f} mm, {service.category}"))  # fmt: skip
     rows += [
-        (f"measuring point {name}", f"on {s.body}, {s.offset + s.arm[0]:.2f} m ahead of the "
+        (f"measuring point {name}", f"on {s.body}, {s.along:.2f} m ahead of the "
          f"reference body's origin, {-s.arm[2]:.2f} m above that of its body")
         for name, s in sensors(vehicle).items()
     ]  # fmt: skip

@@ -30,6 +30,11 @@ class Sensor:
     arm: tuple[float, float, float]  # point from the centre of gravity, body axes [m]
     axlebox: bool = False  # on a wheelset: the sensor does not spin with it
 
+    @property
+    def along(self) -> float:
+        """Arc length of the point beyond that of the reference body [m]."""
+        return self.offset + self.arm[0]
+
 
 def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     """Sensors of a running test: on the floor and on the bogie frames, and the vehicle's own.

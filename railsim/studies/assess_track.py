@@ -43,6 +43,7 @@ from railsim.table import Amount, Column, Table
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
 APART = 25.0  # m
+POINTS = "floor_front", "floor_rear"
 RATE, LOW_PASS, SLIDING = 100.0, 20.0, 2.0  # 1/s, Hz, m
 QUANTITIES = {
     "Q": Column("Q", unit="kN", format=".1f"),
@@ -251,6 +252,14 @@ def recorded(recording: str | Path) -> Track:
     return track
 
 
+def _behind(vehicle: Vehicle) -> float:
+    """Distance of the last wheelset or floor point behind the reference body [m]."""
+    flat, placed = flatten(vehicle), sensors(vehicle)
+    origin = flat.body(flat.reference).position[0]
+    wheelsets = [body.position[0] - origin for body in flat.of_kind("wheelset")]
+    return -min(0.0, *wheelsets, *(placed[point].along for point in POINTS))
+
+
 def _extent(track: Track) -> tuple[float, float]:
     """Where a recording begins and ends on its track [m]."""
     found = [p.extent(track.length) for p in track.irregularities if isinstance(p, Measured)]
@@ -259,13 +268,6 @@ def _extent(track: Track) -> tuple[float, float]:
         found_words, allowed = f"{end - begin:.0f} m", f"{2.0 * SECTION:g} m at least"
         raise input_error(track.name, found_words, allowed, key="irregularities")
     return begin, end
-
-
-def _behind(vehicle: Vehicle) -> float:
-    """How far the last wheelset is behind the reference body: it covers a piece, too [m]."""
-    flat = flatten(vehicle)
-    origin = flat.body(flat.reference).position[0]
-    return max(0.0, origin - min(w.position[0] for w in flat.of_kind("wheelset")))
 
 
 def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
@@ -365,11 +367,11 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
             values.append(("Y_over_Q", place, mean(result["Y_over_Q"][:, w, side])))
         values.append(("sum_Y", number, np.abs(mean(result["sum_Y"][:, w]))))
         found += [(n, place, at[:, w], x, limit(n, w, float(load[w]))) for n, place, x in values]
-    points = sensors(case.vehicle)
-    for point, axis in product(("floor_front", "floor_rear"), "yz"):
+    placed = sensors(case.vehicle)
+    for point, axis in product(POINTS, "yz"):
         x = result.series("sensor_acceleration", sensor=point, axis=axis)
-        name, ahead = f"body_{axis}", points[point].offset + points[point].arm[0]
-        found.append((name, point, result["distance"] + ahead, np.abs(x), limit(name)))
+        name, s = f"body_{axis}", result["distance"] + placed[point].along
+        found.append((name, point, s, np.abs(x), limit(name)))
     return [(n, p, np.asarray(s, float), np.asarray(v, float), m) for n, p, s, v, m in found]
 
 

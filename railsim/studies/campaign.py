@@ -282,7 +282,7 @@ def counting_sections(
     flat = flatten(vehicle)
     origin = flat.body(flat.reference).position[0]
     x = [b.position[0] - origin for b in flat.of_kind("wheelset")]
-    x += [sensor.offset + sensor.arm[0] for sensor in sensors(vehicle).values()]
+    x += [sensor.along for sensor in sensors(vehicle).values()]
     ahead, behind = max(0.0, *x), min(0.0, *x)
     begin = case.start + max(START * case.speed, ahead - behind) + ahead
     end = (case.until or track.length) + behind - 1.0

@@ -10,6 +10,7 @@ from railsim.cli import main
 from railsim.plot.study import heat_strip
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
+from railsim.studies.case import Case
 from railsim.studies.geometry_limits import CELL, GEOMETRY, RecordedGeometry
 from railsim.track.irregularity import displacement
 
@@ -69,6 +70,22 @@ def test_nothing_is_computed_again(judged):
     assert found.computed == 2
     assert again.computed == 0
     assert again.table().records() == found.table().records()
+
+
+def test_every_wheel_runs_to_the_end_of_its_piece_and_points_are_where_they_are(judged):
+    """The last of four axles is 10.78 m behind the car's middle, the floor points 9.5 m off it."""
+    out = judged[2]
+    middle = 0.5 * (LENGTH - 0.25)
+    path = next(out.glob("*_0000.h5"))
+    result = railsim.open_result(path)
+    assert result["wheelset_distance"][-1].min() > middle - SPEED / module.RATE
+    case = Case("first", result.vehicle(), result.track(), result.settings(), SPEED)
+    signals = module._signals(case, result)
+    off = {
+        where: s - result["distance"] for quantity, where, s, *_ in signals if quantity == "body_y"
+    }
+    assert off["floor_front"] == pytest.approx(9.5)
+    assert off["floor_rear"] == pytest.approx(-9.5)
 
 
 def test_pieces_say_what_one_run_says(judged, recording, tmp_path):
