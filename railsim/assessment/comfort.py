@@ -24,6 +24,8 @@ from railsim.result.filters import integral, low_passed
 
 BLOCK = 5.0  # s
 BLOCKS = 60
+EVENT_WINDOW = 2.0  # s
+ALL = slice(None)
 
 
 def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
@@ -249,15 +251,9 @@ def transition_comfort(
     return TransitionComfort(begin, end, *felt, p_ct(*felt, "standing"), p_ct(*felt, "seated"))
 
 
-EVENT_WINDOW = 2.0  # s
-
-
-def event_comfort(lateral: Floats, rate: float, counted: slice = slice(None)) -> dict[str, float]:
-    """Largest P_DE of a record by posture [%]: all windows of 2 s, low-pass filter of 2 Hz.
-
-    `counted`: Part of the record within which the windows lie; the filter sees all of it.
-    """
-    low = low_passed(lateral, rate, 2.0)[counted]
+def event_comfort(lateral: Floats, rate: float, part: slice = ALL) -> dict[str, float]:
+    """Largest P_DE of a part of a record by posture [%]: windows of 2 s in it, filter of 2 Hz."""
+    low = low_passed(lateral, rate, 2.0)[part]
     size = round(EVENT_WINDOW * rate)
     if len(low) <= size:
         return dict.fromkeys(EVENT, math.nan)

@@ -7,7 +7,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.assessment import comfort
 from railsim.assessment.record import PIECE, Record
-from railsim.assessment.sperling import Direction, index_of_rms, sperling_mean_square
+from railsim.assessment.sperling import Direction, index_of_rms, sperling_weighted
 from railsim.assessment.weighting import WK
 from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.definitions.track.layout import curvature_sections
@@ -118,7 +118,7 @@ class _Gathered:
         if len(blocks):
             self.blocks.append(blocks)
             self.back.append(comfort.block_rms(back[counted], rate))
-        size = counted.stop - counted.start
+        size, count = counted.stop - counted.start, self.count
         iso = np.column_stack([floor[:, 0], floor[:, 1], WK.weighted(a[:, 2], rate)])
         self.iso += np.sum(iso[counted] ** 2, axis=0)
         self.count += size
@@ -127,11 +127,12 @@ class _Gathered:
             near = band_passed(floor[:, 1], rate, low, high)[counted]
             self.hunting += float(np.sum(near**2))
         for axis, way in enumerate(self.sperling, start=1):
-            self.sperling[way] += size * sperling_mean_square(a[counted, axis], rate, way)
-        # windows over the border to the part before lie in this one
-        over = round(comfort.EVENT_WINDOW * rate) if self.count > size else 0
-        events = slice(max(0, counted.start - over), counted.stop)
-        for posture, value in comfort.event_comfort(a[:, 1], rate, events).items():
+            weighted = sperling_weighted(a[:, axis], rate, way)[counted]
+            self.sperling[way] += float(np.sum(weighted**2))
+        # events over the end of the part before belong to neither of both
+        before = round(comfort.EVENT_WINDOW * rate) if count else 0
+        part = slice(counted.start - before, counted.stop)
+        for posture, value in comfort.event_comfort(a[:, 1], rate, part).items():
             self.events[posture] = max(self.events[posture], np.nan_to_num(value))
 
 

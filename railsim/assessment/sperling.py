@@ -16,9 +16,11 @@ from typing import Literal
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.result.filters import filtered
 
 FACTOR = {"vertical": 0.588, "lateral": 0.735}
 BAND = (0.5, 30.0)  # frequency range of the index [Hz]
+MARGIN = 16.0  # s, which the lower end of the range looks around itself
 Direction = Literal["vertical", "lateral"]
 
 
@@ -36,16 +38,20 @@ def sperling_index(a: Floats, rate: float, direction: Direction) -> float:
     `a` (float64[time]): Acceleration [m/s2]. `rate`: Samples per second [1/s]. `direction`
     ({'vertical', 'lateral'}). Returns: Wz [1].
     """
-    return index_of_rms(float(np.sqrt(sperling_mean_square(a, rate, direction))))
+    return index_of_rms(float(np.sqrt(np.mean(sperling_weighted(a, rate, direction) ** 2))))
 
 
-def sperling_mean_square(a: Floats, rate: float, direction: Direction) -> float:
-    """Mean square of the weighted acceleration of a record from 0.5 to 30 Hz [m2/s4]."""
-    n = len(a)
-    power = np.abs(np.fft.rfft(a - np.mean(a)) / n) ** 2  # half the mean square of each component
-    f = np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64)
-    counted = (f >= BAND[0]) & (f <= BAND[1])
-    return float(2.0 * np.sum(power[counted] * sperling_gain(f[counted], direction) ** 2))
+def sperling_weighted(a: Floats, rate: float, direction: Direction) -> Floats:
+    """Weighted acceleration of a record from 0.5 to 30 Hz [m/s2].
+
+    A curve in which the record ends is no vibration: the record is continued at its ends.
+    """
+
+    def response(f: Floats) -> Floats:
+        f = np.asarray(f, dtype=np.float64)
+        return np.where((f >= BAND[0]) & (f <= BAND[1]), sperling_gain(f, direction), 0.0)
+
+    return filtered(a, rate, response, MARGIN)
 
 
 def index_of_rms(a_w: float) -> float:

@@ -21,6 +21,7 @@ from railsim.assessment.comfort import (
     p_de,
     transition_comfort,
 )
+from railsim.assessment.comfort_report import _Gathered
 from railsim.assessment.criteria import CRITERIA, Measured, steering_index
 from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
 from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
@@ -371,6 +372,27 @@ def test_sperling_of_tones(tones, Wz):
     single = [index_of_rms(a / np.sqrt(2) * float(sperling_gain(np.array(f), "vertical")))
               for f, a in tones.items()]  # fmt: skip
     assert sum(v ** (20 / 3) for v in single) ** 0.15 == pytest.approx(Wz, abs=5e-3)
+
+
+def test_sperling_of_a_run_that_ends_in_a_curve():
+    """A transition of 4 s to 1 m/s2 has next to nothing above 0.5 Hz: Wz is that of the tone."""
+    t = np.arange(0.0, 40.0, 1.0 / RATE)
+    u = np.clip((t - 15.0) / 4.0, 0.0, 1.0)
+    curve, tone = u**3 * (10.0 - 15.0 * u + 6.0 * u**2), 0.05 * np.sin(2.0 * np.pi * 3.0 * t)
+    alone = sperling_index(tone, RATE, "lateral")
+    assert sperling_index(tone + curve, RATE, "lateral") == pytest.approx(alone, rel=0.02)
+
+
+def test_event_where_two_parts_of_a_record_meet():
+    """A pulse to the left before the end of the first part, to the right behind it: one event."""
+    t = np.arange(0.0, 80.0, 1.0 / RATE)
+    pulse = np.where(np.abs(t - 40.0) < 0.75, 2.0 * np.sin(2.0 * np.pi * (t - 40.0) / 1.5), 0.0)
+    a = np.stack([0.0 * t, 1.0 + pulse, 0.0 * t], axis=-1)
+    gathered, half, margin = _Gathered(0.0), round(40.0 * RATE), round(16.0 * RATE)
+    gathered.add(a[: half + margin], slice(0, half), RATE)
+    gathered.add(a[half - margin :], slice(margin, margin + half), RATE)
+    whole = event_comfort(a[:, 1], RATE)
+    assert gathered.events["seated"] == pytest.approx(whole["seated"], rel=1e-3)
 
 
 def test_sperling_of_flat_noise():
