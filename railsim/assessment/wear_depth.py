@@ -8,6 +8,7 @@ of wheel and rail of like hardness.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import inclined_to_track, tape_circle_position
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Wheelset
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import Fault, Faults, input_error
 from railsim.profiles import Profile
 from railsim.profiles.profile import FLANGE_BACK
 from railsim.result import Result
@@ -31,6 +32,7 @@ DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the 
 UPDATE = 0.1e-3  # m, after which the contact is computed again on the worn profile
 MOST_PARTS = 100  # of a step
 OF_PATCHES = ("T_gamma", "N", "friction", "a", "b", "y", "z", "angle")
+OF_RAILS = "rail_lateral", "rail_deflection_lateral"
 NEEDED = (*(f"patch_{name}" for name in OF_PATCHES), "body_position")
 
 
@@ -61,17 +63,18 @@ def rail_depth(
 ) -> Floats:
     """Depth of wear of a rail profile per passing wheelset, over `grid` from the rail's middle.
 
-    Mean over the distance of the run.  Arguments and errors as of `worn_depth`.
+    Mean over the distance of the run.  Arguments and errors as of `worn_depth`; the run also needs
+    `outputs.track`, which says where the rails are.
 
     Returns float64[position]: [m]; its integral over the grid is the worn area of a passage.
     """
     areas, ways, _, widths, wheel = _patches(result, wheelset, side, law)
+    _need(result, OF_RAILS, "settings.outputs.track=true")
     at, track = (slice(None), wheelset, side), result.track()
     body = result.bodies.index(result.wheelsets[wheelset])
     across = result["patch_y"][at] + result["body_position"][:, body, 1, None]
-    for moved in ("rail_lateral", "rail_deflection_lateral"):
-        if moved in result:
-            across = across - result[moved][at][:, None]
+    for moved in OF_RAILS:
+        across = across - result[moved][at][:, None]
     rail = result.profiles[track.rail[side]]
     head = upper_side(rail)
     y = inclined_to_track(rail, track.gauge, track.inclination)[0][head]
@@ -84,10 +87,7 @@ def _patches(
     result: Result, wheelset: int, side: int, law: WearLaw
 ) -> tuple[Floats, Floats, Floats, Floats, Wheelset]:
     """Worn areas, distances, positions across in the wheelset's axes, half widths; wheelset."""
-    missing = [name for name in NEEDED if name not in result]
-    if missing:
-        allowed = "run it with settings.outputs.contact_patches=true"
-        raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
+    _need(result, NEEDED, "settings.outputs.contact_patches=true")
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
         raise input_error("result", f"no wheelset {wheelset}", "", "wheelset")
@@ -100,6 +100,12 @@ def _patches(
     # from the axes of the track to those of the wheelset
     across = y + result["body_position"][:, body, 3, None] * z
     return law.worn_area(patches), ways, across, b * np.abs(np.cos(angle)), wheel
+
+
+def _need(result: Result, names: Sequence[str], output: str) -> None:
+    """Refuse a result that lacks quantities."""
+    words = "is not in it", f"run it with {output}"
+    Faults(Fault("result", name, *words) for name in names if name not in result).check()
 
 
 def upper_side(profile: Profile) -> slice:

@@ -51,7 +51,8 @@ def rail_wear(
             for k, side in enumerate(SIDES)
         }
 
-    return carry_out(Wearing(runs, new, sides, depths, unit="Mt", scale=1e-9), Loop(**how))
+    needed: dict[str, Any] = {"outputs": ("contact_patches", "track"), "unit": "Mt", "scale": 1e-9}
+    return carry_out(Wearing(runs, new, sides, depths, **needed), Loop(**how))
 
 
 def rail_rows(found: Sequence[WearStep]) -> dict[str, list[dict[str, float | None]]]:

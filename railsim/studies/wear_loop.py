@@ -106,7 +106,7 @@ class Loop:
       profiles are updated as often as one has worn by 0.1 mm
     - `steps`: number of steps
     - `law`: name of a law of `railsim.assessment.wear.LAWS`, or the path of a file of one
-    - `settings`: `outputs.contact_patches` is switched on
+    - `settings`: the outputs that the loop needs are switched on
     - `folder`: folder for finished steps: the same call, or one with more steps, continues after
       them
     - `on_step`: called after each step; before an error also with the part of the step that was
@@ -163,8 +163,8 @@ class Wearing:
 
     `new`: profiles at the beginning; `names`: names by which vehicle or track call them; `depths`:
     a result and a law to the depth of each profile per distance or tonnage; `ended`: worn profiles
-    to the sentence why the loop ends; empty while it goes on; `unit`, `scale`: in which messages
-    give distance or tonnage, and its factor from SI.
+    to the sentence why the loop ends; empty while it goes on; `outputs`: what the runs put out;
+    `unit`, `scale`: in which messages give distance or tonnage, and its factor from SI.
     """
 
     runs: Sequence[Run]
@@ -172,6 +172,7 @@ class Wearing:
     names: Mapping[str, str]
     depths: Callable[[Result, WearLaw], dict[str, Floats]]
     ended: Callable[[Mapping[str, Profile]], str] = lambda _: ""
+    outputs: Sequence[str] = ("contact_patches",)
     unit: str = "km"
     scale: float = 1e-3
 
@@ -183,9 +184,9 @@ class Wearing:
 def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
     """Run, subtract what has worn, and run again."""
     _check(wearing, how)
-    law, outputs = wear_law(how.law), {"contact_patches": True}
-    settings = how.settings or Settings()
-    settings = settings.model_copy(update={"outputs": settings.outputs.model_copy(update=outputs)})
+    law, settings = wear_law(how.law), how.settings or Settings()
+    outputs = settings.outputs.model_copy(update=dict.fromkeys(wearing.outputs, True))
+    settings = settings.model_copy(update={"outputs": outputs})
     tell, remark = how.progress or (lambda _: None), how.on_remark or _LOG.warning
     profiles, whole = dict(wearing.new), how.steps * how.step
     found: list[WearStep] = []

@@ -24,7 +24,7 @@ def curve(hand=1):
 
 @pytest.fixture(scope="module")
 def run():
-    outputs = {"contact_patches": True}
+    outputs = {"contact_patches": True, "track": True}
     return railsim.simulate(railsim.load_vehicle("coach_manchester"), curve(), speed=20.0,
                             settings=SETTINGS.model_copy(update={"outputs": Settings(
                                 outputs=outputs).outputs}))  # fmt: skip
@@ -37,6 +37,27 @@ def test_rail_loses_the_volume_of_the_wheel_where_it_is_touched(run, side):
     middle = np.sum(worn * grid()) / np.sum(worn)
     # the outer rail, the left one, on its gauge side; the inner one on its head
     assert middle < -0.015 if side == 0 else abs(middle) < 0.03
+
+
+def test_rails_that_are_wider_apart_wear_in_the_place_of_the_contact():
+    """The slope of the head, R 300 mm, where it wears is the mean one of the contacts.
+
+    The right rail stands 3 mm aside, and deflects by up to 0.7 mm: 0.0100 and 0.0023 of slope.
+    """
+    coach, outputs = railsim.load_vehicle("coach_manchester"), {"contact_patches": True}
+    wider = curve().replace(gauge_widening=[[-1e3, 0.0, 3e-3], [1e3, 0.0, 3e-3]])
+    (step,) = rail_wear(wider, [(coach, 20.0, 1.0)], step=5e6, steps=1, settings=SETTINGS)
+    depth = step.depths["right"]
+    middle = np.sum(depth * grid()) / np.sum(depth)
+    y, z = step.profiles["right"].y, step.profiles["right"].z
+    slope = np.interp(middle, 0.5 * (y[1:] + y[:-1]), np.diff(z) / np.diff(y)) - 1.0 / 40.0
+    run = railsim.simulate(
+        coach, wider, speed=20.0, settings=Settings(start_state="steady", outputs=outputs)
+    )
+    worn = [np.sum(wheel_depth(run, w, 1)) for w in range(4)]
+    most = np.argmax(run["patch_N"][-1, :, 1], axis=-1)[:, None]
+    angles = np.take_along_axis(run["patch_angle"][-1, :, 1], most, axis=-1)[:, 0]
+    assert slope == pytest.approx(-np.average(np.tan(angles), weights=worn), abs=0.001)
 
 
 @pytest.mark.parametrize("place", [-0.034, -0.02, 0.0, 0.02])
@@ -68,7 +89,7 @@ def test_rails_wear_over_the_tonnage_of_a_mix():
     # a train of all its axles passes for every mass of the coach
     def passed(speed):
         run = railsim.simulate(coach, curve(), speed=speed, settings=Settings(
-            start_state="steady", outputs={"contact_patches": True}))  # fmt: skip
+            start_state="steady", outputs={"contact_patches": True, "track": True}))  # fmt: skip
         trains = 5e6 / (float(np.sum(run["Q0"])) / GRAVITY)
         return [sum(rail_depth(run, w, side) for w in range(4)) * trains for side in (0, 1)]
 
