@@ -16,6 +16,7 @@ from railsim.assessment.record import Record
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 from railsim.profiles import Profile
+from railsim.track.irregularity import shown_displacement
 
 
 def nadal(flange_angle: float, mu: ArrayLike) -> Floats:
@@ -159,14 +160,16 @@ def safety_report(record: Record) -> SafetyReport:
 def _height(record: Record, w: int, side: int) -> np.ndarray:
     """Height of a wheel above its rail, from position and roll of the wheelset [m].
 
-    Relative to the irregularities of the rails where the result has them.
+    Above the rail as it lies, irregular but not deflected; nan where the result has no positions.
     """
-    result = record.result
+    result, track = record.result, record.result.track()
     if "body_position" not in result:
-        return np.zeros(len(record.time))
+        return np.full(len(record.time), np.nan)
     position = result["body_position"][:, result.bodies.index(result.wheelsets[w])]
     outwards = (-1.0, 1.0)[side]
-    height = -(position[:, 2] + 0.5 * outwards * record.result.track().rail_base * position[:, 3])
+    height = -(position[:, 2] + 0.5 * outwards * track.rail_base * position[:, 3])
     if "rail_vertical" in result:
         height = height + result["rail_vertical"][:, w, side]
+    elif (rails := shown_displacement(track)) is not None:
+        height = height + rails(result["wheelset_distance"][:, w])[0][1 + 2 * side]
     return np.asarray(height)

@@ -84,3 +84,19 @@ def test_curving_takes_the_friction_of_each_rail_as_a_run_does(side):
         coach, on, speed=float(found.speed[0, 0]), duration=2.0, settings=settings
     )
     assert found.Y[0, 0, 0] == pytest.approx(run.Y[-1], rel=1e-3, abs=50.0)
+
+
+def test_rise_of_a_climbing_wheel_is_that_above_its_rail():
+    """A hump of 20 mm lifts the rail with the wheel: nothing climbs, whatever Y/Q says.
+
+    With a coefficient of friction beyond the slope of the flange Nadal's limit is below zero, and
+    each wheel is above it all the way.
+    """
+    hump = [{"type": "dip", "s": 40.0, "length": 30.0, "depth": -0.02}]
+    track = railsim.load_track("straight").replace(friction=4.0, irregularities=hump)
+    run = railsim.simulate(railsim.load_vehicle("coach_manchester"), track, speed=10.0, until=80.0,
+                           settings=railsim.load_settings(None, ["output_rate=1000"]))  # fmt: skip
+    (found,) = assess(run, "safety")
+    ((report),) = found.safety.values()
+    assert min(wheel.climb_distance for wheel in report.wheels) > 70.0
+    assert max(wheel.rise for wheel in report.wheels) < 0.5e-3
