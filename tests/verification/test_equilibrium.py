@@ -10,10 +10,11 @@ from hollow_wheels import hollow_wheel
 from selection import points
 
 import railsim.model.equilibrium
-from railsim.definitions.loading import load_vehicle_text
+from railsim.constants import GRAVITY
+from railsim.definitions.loading import load_vehicle, load_vehicle_text
 from railsim.errors import ModelError
 from railsim.model.assembly import assemble
-from railsim.model.equilibrium import RESIDUAL, equilibrium
+from railsim.model.equilibrium import RESIDUAL, _at_rest, equilibrium
 
 DATA = Path(__file__).parents[1] / "data" / "vehicles"
 WAGON = (DATA / "two_axle_wagon.toml").read_text(encoding="utf-8")
@@ -88,3 +89,30 @@ def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
     np.testing.assert_allclose(found.Q0, found.Q0[0, 0], rtol=1e-6)
     for body in found.model.system.contact.body:
         assert abs(found.state[6 * body + 1]) < 1e-9
+
+
+@pytest.mark.parametrize("difference", [0.3e-3, 0.5e-3, -1e-3])
+def test_wheels_of_unequal_radii_stand_on_both_rails(difference):
+    """The larger wheel lifts its side by 2/3 mrad a millimetre; the weights lean to the other one.
+
+    Moments of the weights about the middle of the track against those of the wheel loads, whose
+    places move with the wheelset.
+    """
+    radii = [0.46 + 0.5 * difference, 0.46 - 0.5 * difference]
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.radius"
+    model = assemble(
+        load_vehicle("coach_manchester", [f"{key}={radii}"]),
+        load_track("straight").replace(support={"preset": "rigid"}),
+        Settings(),
+    )
+    balance = equilibrium(model, 1.0)
+    rest, index = _at_rest(model).state, model.index
+    roll, y = ([rest[index.coordinate(w, k)] for w in index.wheelsets] for k in (3, 1))
+    assert roll == pytest.approx([difference / 1.5] * 4, rel=0.05)
+    lean = sum(
+        GRAVITY * mass * rest[index.coordinate(name, 1)]
+        for name, mass in zip(index.bodies, model.system.bodies.mass, strict=True)
+    )
+    right_less_left = np.sum(balance.Q0[:, 1] - balance.Q0[:, 0])
+    assert 0.75 * right_less_left == pytest.approx(lean, rel=0.1)
+    assert np.sign(lean) == np.sign(difference) == np.sign(y[0])
