@@ -156,6 +156,15 @@ def _guided(system: System, check: CheckRails) -> System:
     return system._replace(contact=system.contact._replace(**check._asdict()))
 
 
+def _supported(system: System, s: float) -> System:
+    """Return the system with rails that are supported everywhere as at `s`."""
+    rows = system.support.variation
+    if not len(rows):
+        return system
+    even = np.array([[0.0, *(np.interp(s, rows[:, 0], rows[:, k]) for k in (1, 2))]])
+    return system._replace(support=system.support._replace(variation=even))
+
+
 def _friction(track: Track, s: float) -> tuple[float, float]:
     """Coefficients of friction of the left and right rail at `s`."""
     left, right = track.friction_at(s).tolist()
@@ -294,8 +303,7 @@ def _steady(
         )
         return None
     speed, friction = float(balance.state[SPEED]), _friction(track, start)
-    level = _guided(model.system, standing_at(model.check, start))
-    level = level._replace(support=level.support._replace(variation=level.support.variation[:0]))
+    level = _guided(_supported(model.system, start), standing_at(model.check, start))
 
     def along(share: float) -> tuple[System, float]:
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)
@@ -346,7 +354,8 @@ def settled(
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
-    system = _guided(without_loads(model.system), standing_at(model.check, start))._replace(
+    there = _supported(without_loads(model.system), start)
+    system = _guided(there, standing_at(model.check, start))._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED
     )
     state = balance.state.copy()

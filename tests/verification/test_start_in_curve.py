@@ -107,3 +107,24 @@ def test_curving_without_the_forces_of_friction_elements_says_so():
         assert left[name] == pytest.approx(-right[name], rel=1e-6)
     assert right["Y"] < 0.0
     assert right["Y_over_Q"] == pytest.approx(-right["Y"] / right["Q"])
+
+
+@pytest.mark.parametrize("start", ["run-in", "steady"])
+def test_rails_are_supported_on_the_way_as_at_the_start(start):
+    """Where rails are soft all around the start, what they are elsewhere makes no difference."""
+    plan = [{"type": "CIR", "length": 800.0, "radius": 400.0}]
+    cant = [{"type": "CST", "length": 800.0, "cant": 0.1}]
+    curve = railsim.load_track("straight").replace(plan=plan, cant=cant)
+    soft, stiff_before = (
+        curve.replace(support={"preset": "ballasted", "variation": rows})
+        for rows in ([[0.0, 0.3]], [[0.0, 1.0], [200.0, 1.0], [250.0, 0.3]])
+    )
+    coach, settings = railsim.load_vehicle("coach_manchester"), Settings(start_state=start)
+    runs = [
+        railsim.simulate(coach, track, speed=20.0, start=400.0, duration=1.0, settings=settings)
+        for track in (soft, stiff_before)
+    ]
+    for run in runs:
+        lateral = run["wheelset_lateral"][:, 0]
+        assert lateral == pytest.approx(np.full(len(lateral), lateral[-1]), abs=2e-5)
+    np.testing.assert_allclose(runs[0].Y, runs[1].Y, atol=1.0)
