@@ -16,6 +16,7 @@ rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,8 +41,8 @@ from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
-from railsim.linear.circle import circle, placed
-from railsim.linear.steady import NotConverged, led
+from railsim.linear.circle import POSITION, circle, placed
+from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.check_rails import CheckRails, standing_at
 from railsim.model.equilibrium import Equilibrium, initial_state
@@ -141,7 +142,7 @@ def _arrived(
         state = settled(model, balance, track, s, step, settling)
     if state is None:
         work = _located(model, s)
-        state = initial_state(model, balance, s, work.frames)
+        state = initial_state(model, _standing(model, balance, track, s), s, work.frames)
     state[ARC_LENGTH] = s
     if steps:
         follow_rails(model, state)
@@ -156,13 +157,24 @@ def _guided(system: System, check: CheckRails) -> System:
     return system._replace(contact=system.contact._replace(**check._asdict()))
 
 
-def _supported(system: System, s: float) -> System:
-    """Return the system with rails that are supported everywhere as at `s`."""
-    rows = system.support.variation
-    if not len(rows):
-        return system
-    even = np.array([[0.0, *(np.interp(s, rows[:, 0], rows[:, k]) for k in (1, 2))]])
-    return system._replace(support=system.support._replace(variation=even))
+def _standing(model: Model, balance: Equilibrium, track: Track, s: float) -> Equilibrium:
+    """Return the balance on rails supported as at `s`: softer ones are pressed down further."""
+    if not len(model.system.support.variation):
+        return balance
+    system = _supported(model.system, s, POSITION)._replace(track=track_tables(circle(track)))
+    speed = float(balance.state[SPEED])
+    try:
+        state = SteadyRolling(model, system).solve(placed(balance.state), speed)
+    except NotConverged:  # the rails settle as the run begins
+        return balance
+    state[-3:] = balance.state[-3:]
+    return replace(balance, state=state)
+
+
+def _supported(system: System, s: float, there: float) -> System:
+    """Return the system with the support of the rails at `s` moved to another place `there`."""
+    moved = system.support.variation + np.array([there - s, 0.0, 0.0])
+    return system._replace(support=system.support._replace(variation=moved))
 
 
 def _friction(track: Track, s: float) -> tuple[float, float]:
@@ -303,7 +315,7 @@ def _steady(
         )
         return None
     speed, friction = float(balance.state[SPEED]), _friction(track, start)
-    level = _guided(_supported(model.system, start), standing_at(model.check, start))
+    level = _guided(_supported(model.system, start, POSITION), standing_at(model.check, start))
 
     def along(share: float) -> tuple[System, float]:
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)
@@ -354,7 +366,10 @@ def settled(
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
-    there = _supported(without_loads(model.system), start)
+    there = without_loads(model.system)
+    if len(rows := there.support.variation):
+        everywhere = np.array([[start, *(np.interp(start, rows[:, 0], f) for f in rows.T[1:])]])
+        there = there._replace(support=there.support._replace(variation=everywhere))
     system = _guided(there, standing_at(model.check, start))._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED
     )

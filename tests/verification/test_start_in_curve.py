@@ -128,3 +128,15 @@ def test_rails_are_supported_on_the_way_as_at_the_start(start):
         lateral = run["wheelset_lateral"][:, 0]
         assert lateral == pytest.approx(np.full(len(lateral), lateral[-1]), abs=2e-5)
     np.testing.assert_allclose(runs[0].Y, runs[1].Y, atol=1.0)
+
+
+@pytest.mark.parametrize("rows", [[[0.0, 0.3]], [[0.0, 1.0], [90.0, 1.0], [110.0, 0.5]]])
+def test_on_straight_track_wheels_begin_on_the_rails_as_they_are_supported(rows):
+    """Softer rails are pressed down further: nothing drops onto them when the run begins."""
+    straight = railsim.load_track("straight")
+    track = straight.replace(support={"preset": "ballasted", "variation": rows})
+    run = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), track, speed=5.0, start=100.0, duration=0.05
+    )
+    np.testing.assert_allclose(run.Q, np.broadcast_to(run.Q0, run.Q.shape), rtol=2e-2)
+    np.testing.assert_allclose(run.Q[0], run.Q0, rtol=1e-3)
