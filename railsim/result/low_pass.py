@@ -5,7 +5,8 @@ symmetric filter of finite length (Kaiser window, ripple and stop band 80 dB), f
 band's end f_p and zero from output_rate - f_p on, so that what is folded back lies above f_p.
 Causal: Butterworth of order 4 with -3 dB at f_p.
 
-Time and distance are taken as they are.  `Y_over_Q` is made of the filtered Y and Q.
+Time and distance are taken as they are.  `Y_over_Q` is made of the filtered Y and Q.  What does not
+exist while a wheel does not touch is held for the filter, and does not exist there afterwards.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,6 +22,8 @@ from railsim.result.sinks import ALWAYS, Sink, SinkBefore
 
 ATTENUATION = 80.0  # dB
 UNFILTERED = ("time", "distance", "mileage", "curvature", "cant")
+WITH_GAPS = ("contact_y", "contact_z")
+GAPS = " gaps"  # behind the name: where they are
 
 
 class LowPassSink(SinkBefore):
@@ -44,6 +47,7 @@ class LowPassSink(SinkBefore):
             self._filter = _Symmetric(self._rate, frequency, output_rate - frequency, every)
         self._names: tuple[str, ...] = ()
         self._last: float | None = None
+        self._held: dict[str, Floats] = {}
 
     def begin(
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
@@ -74,7 +78,16 @@ class LowPassSink(SinkBefore):
         names = set(self._names)
         if "Y_over_Q" in names:
             names = names - {"Y_over_Q"} | {"Y", "Q"}
-        return {name: np.asarray(chunk[name]) for name in names}
+        found = {name: np.asarray(chunk[name]) for name in names}
+        for name in names.intersection(WITH_GAPS):
+            values, known = found[name], ~np.isnan(found[name])
+            found[name + GAPS] = np.where(known, 0.0, 1.0)
+            before = self._held.get(name, np.zeros(values.shape[1:]))
+            rows = np.arange(1, len(values) + 1).reshape(-1, *(1 for _ in before.shape))
+            last = np.maximum.accumulate(np.where(known, rows, 0), axis=0)
+            found[name] = np.take_along_axis(np.concatenate([before[None], values]), last, axis=0)
+            self._held[name] = found[name][-1]
+        return found
 
     def _hand_on(self, filtered: dict[str, Floats]) -> None:
         if not filtered or not len(filtered["time"]):
@@ -83,6 +96,9 @@ class LowPassSink(SinkBefore):
             Q = filtered["Q"]
             loaded = np.where(Q > 0.0, Q, np.nan)
             filtered["Y_over_Q"] = np.array([-1.0, 1.0]) * filtered["Y"] / loaded
+        for name in [name for name in filtered if name.endswith(GAPS)]:
+            gaps, of = filtered.pop(name) > 0.0, name.removesuffix(GAPS)
+            filtered[of] = np.where(gaps, np.nan, filtered[of])
         self._sink.append(filtered)
 
 
@@ -140,7 +156,7 @@ class _Symmetric:
         found = {}
         for name, array in self._window.items():
             part = array[span]
-            if name in UNFILTERED:
+            if name in UNFILTERED or name.endswith(GAPS):
                 found[name] = part[self._half :: self._every][:count]
             else:
                 flat = matrix @ part.reshape(len(part), -1)
@@ -179,7 +195,7 @@ class _Causal:
         found = {}
         for name, array in chunk.items():
             passed = array
-            if name not in UNFILTERED:
+            if name not in UNFILTERED and not name.endswith(GAPS):
                 if name not in self._states:
                     self._states[name] = steady_start(self._sections, array[0])
                 passed, self._states[name] = self._signal.sosfilt(

@@ -69,6 +69,25 @@ def test_causal_filter_is_scipys_butterworth_of_order_4():
     np.testing.assert_allclose(found.Y[:, 0, 0], whole[::5], atol=1e-6)
 
 
+@pytest.mark.parametrize("causal", [False, True])
+@pytest.mark.parametrize("chunks", [1, 7, 301])
+def test_a_wheel_that_lifts_spoils_no_other_instants(causal, chunks):
+    """Its contact exists nowhere for 0.1 s; before and afterwards it is where it was."""
+    t = np.arange(10_001) / 1000.0
+    place = np.full((len(t), 1, 2), 0.75)
+    place[4000:4100, 0, 0] = np.nan
+    sink = LowPassSink(MemorySink(), 5, 200.0, 20.0 if causal else 80.0, causal=causal)
+    names = ("time", "distance", "contact_y")
+    sink.begin(COORDINATES, [QUANTITIES[name] for name in names])
+    given = {"time": t, "distance": 20.0 * t, "contact_y": place}
+    for rows in np.array_split(np.arange(len(t)), chunks):
+        sink.append({name: array[rows] for name, array in given.items()})
+    found = sink.close({"status": "complete"})
+    missing = np.isnan(found.contact_y)
+    np.testing.assert_array_equal(missing, np.isnan(place[::5]))
+    np.testing.assert_allclose(found.contact_y[~missing], 0.75, rtol=1e-6)
+
+
 def test_end_of_a_run_between_two_instants_is_left_out():
     found = passed(lambda t: 1e3 + 0.0 * t, extra=4e-4)
     assert len(found.time) == 2001
