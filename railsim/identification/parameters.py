@@ -188,7 +188,7 @@ def _scalable(value: Any) -> bool:
 
 
 def scaled(value: Any, factor: float) -> Any:
-    """Return a number, a vector or the last column of a table times a factor.
+    """Return a number, a vector or what a table holds over its first column, times a factor.
 
     Examples
     --------
@@ -196,7 +196,7 @@ def scaled(value: Any, factor: float) -> Any:
     (6.0, [2.0, 4.0], [[0.1, 10.0], [0.2, 14.0]])
     """
     if isinstance(value, list) and value and isinstance(value[0], list):
-        return [[*row[:-1], factor * row[-1]] for row in value]
+        return [[row[0], *(factor * member for member in row[1:])] for row in value]
     if isinstance(value, list):
         return [factor * member for member in value]
     return factor * value

@@ -235,6 +235,8 @@ def test_whiteness_has_its_own_level():
 
 def test_tables_scale_their_forces_only():
     assert scaled([[0.0, 1.0], [0.5, 3.0]], 2.0) == [[0.0, 2.0], [0.5, 6.0]]
+    # friction of both rails
+    assert scaled([[0.0, 0.3, 0.4], [9.0, 0.1, 0.2]], 2.0) == [[0.0, 0.6, 0.8], [9.0, 0.2, 0.4]]
     one = Model(railsim.load_vehicle("coach_25t"), TRACK)
     keys = parsed(["primary_vertical_damper.damper_table", "track.friction"], one.vehicle, TRACK)
     both = one.with_parameters(keys, np.log([0.5, 0.5]))
