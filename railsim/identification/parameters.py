@@ -122,6 +122,9 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
             for key in one.keys:
                 kind, own = _side(key)
                 path, value = present({"vehicle": vehicle, "track": track}[kind], own)
+                if kind == "track" and path[0] == "friction" and track.friction_table:
+                    words = "the track has a friction_table in its place"
+                    raise ValueError(words, "track.friction_table")
                 if not _scalable(value):
                     words = f"{'.'.join(path)} is {value!r}"[:100]
                     raise ValueError(words, "a number that is not 0")

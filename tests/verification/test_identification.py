@@ -233,6 +233,17 @@ def test_whiteness_has_its_own_level():
     assert np.mean(chances < 0.5) == pytest.approx(0.5, abs=0.06)
 
 
+def test_friction_beside_its_table_is_no_parameter():
+    """A run does not depend on it; a track file that has both says so."""
+    wet = TRACK.replace(friction=0.3, friction_table=[[0.0, 0.1], [500.0, 0.4]])
+    vehicle = railsim.load_vehicle("coach_25t")
+    with pytest.raises(railsim.InputError, match="friction_table"):
+        parsed(["track.friction"], vehicle, wet)
+    assert parsed(["track.friction_table"], vehicle, wet)
+    assert any(remark.key == "friction" for remark in wet.unusual())
+    assert not any(remark.key == "friction" for remark in TRACK.replace(friction=0.3).unusual())
+
+
 def test_tables_scale_their_forces_only():
     assert scaled([[0.0, 1.0], [0.5, 3.0]], 2.0) == [[0.0, 2.0], [0.5, 6.0]]
     # friction of both rails

@@ -83,6 +83,8 @@ def track_remarks(track: "Track") -> list[Remark]:
     remarks += [Remark(behind.key, text) for _, behind in _steps(vertical)]
     remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
     remarks += _cant_sizes(cant) + _cant_sides(cant, plan)
+    if track.friction_table and track.friction != type(track).model_fields["friction"].default:
+        remarks.append(Remark("friction", "has no effect: friction_table takes its place"))
     if track.speed is not None:
         remarks += alignment_remarks(plan, cant, track.speed)
     for section in (*plan, *cant, *vertical):
