@@ -44,9 +44,8 @@ def compiled_beside() -> Iterator[None]:
     """Compile the time loop in another process during the block, where nobody has compiled it.
 
     With one core, or where nothing can be stored, this process compiles when it calls the time
-    loop; so does a worker process, whose pool knows better how many there are.  The creep laws are
-    a tenth of the loop, which this process compiles after the block: the other one then needs
-    not.
+    loop; so does a worker process, whose pool knows better how many there are.  The creep laws,
+    a tenth of the loop, this process compiles after the block, and the other one loads them.
     """
     if is_compiled():
         yield

@@ -89,7 +89,7 @@ def in_flange_contact(
     return _brought(model, track, curve, rolling, 0.5 * step, progress, TIMES)
 
 
-def led(
+def at_rest_beside(
     model: Model, at: tuple[System, Floats], speed: float, less: float
 ) -> tuple[System, Floats]:
     """System and state of rest at another speed and with less friction, by Newton's method.

@@ -29,7 +29,7 @@ from railsim.model.solutions import solution
 from railsim.model.time_step import MARGIN, Situation, Stability
 from railsim.model.work import level_track_with_friction
 from railsim.simulation.auxiliary_track import Progress
-from railsim.simulation.flange import in_flange_contact, led
+from railsim.simulation.flange import at_rest_beside, in_flange_contact
 
 CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
@@ -181,7 +181,8 @@ class StepChoice:
             found = [at]
             if of_class:
                 with suppress(NotConverged):  # then the first decides alone
-                    found.append(led(model, at, CLASS * speed, 0.5 * FRICTION_CLASS))
+                    other = CLASS * speed, 0.5 * FRICTION_CLASS
+                    found.append(at_rest_beside(model, at, *other))
             return found
 
         level = level_track_with_friction(model.system)

@@ -133,7 +133,9 @@ def test_state_led_to_another_speed_and_friction_is_the_one_found_there(
     """Wheel forces within 1e-4 of the load, and the growth of a step."""
     track = railsim.load_track(radius_track)
     model, state, load = rolling(name, with_friction(track, friction), speed)
-    led = flange.led(model, flange.in_flange_contact(model, track, state, STEP), 1.2 * speed, 0.05)
+    led = flange.at_rest_beside(
+        model, flange.in_flange_contact(model, track, state, STEP), 1.2 * speed, 0.05
+    )
     other = with_friction(track, friction - 0.05)
     model, state, _ = rolling(name, other, 1.2 * speed)
     found = flange.in_flange_contact(model, other, state, STEP)
