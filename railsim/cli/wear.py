@@ -14,6 +14,7 @@ from railsim.cli.common import (
     given_options,
     option,
     output_options,
+    together,
     track_argument,
     vehicle_argument,
 )
@@ -26,7 +27,29 @@ RECORD, PICTURE, STEPS = "wear.json", "wear.png", "steps"
 MOST_STEPS = 1000
 
 Mix = tuple[tuple[str, float, float], ...]
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 Rows = Mapping[str, list[dict[str, float | None]]]
+
+
+def mix_option(name: str, what: str, amount: str) -> Decorator:
+    """Option, given repeatedly, for what runs at what speed and its share of the amount."""
+    text = (
+        f"A {what}, its speed in m/s or with a unit, and its share of the {amount} in any unit; "
+        "may be repeated."
+    )
+    form = (str, as_speed, float)
+    return option(name, text, f"{what.upper()} V SHARE", form, required=True, multiple=True)
+
+
+def amount_options(name: str, text: str, unit: str, profile: str) -> Decorator:
+    """Options of the distance or tonnage to run, and of that of one step."""
+    amount = name.split()[0].strip("-").capitalize()
+    between = f"{amount} in {unit} between two updates of {profile}."
+    return together(
+        option(name, text, unit.upper(), float, required=True),
+        option("--step", between, unit.upper(), float, required=True),
+    )
+
 
 law_option = option(
     "--law", "Law of wear; a wrong name shows all.", "NAME_OR_FILE", default="pearce_sherratt"
@@ -35,19 +58,8 @@ law_option = option(
 
 @click.command()
 @vehicle_argument
-@option(
-    "--route routes",
-    "A track, its speed in m/s or with a unit, and its share of the distance in any unit; may "
-    "be repeated.",
-    "TRACK V SHARE",
-    (str, as_speed, float),
-    required=True,
-    multiple=True,
-)
-@option("--distance", "Distance to run in km.", "KM", float, required=True)
-@option(
-    "--step", "Distance in km between two updates of the wheel profile.", "KM", float, required=True
-)
+@mix_option("--route routes", "track", "distance")
+@amount_options("--distance", "Distance to run in km.", "km", "the wheel profile")
 @law_option
 @option("--limits", "Limits of flange and tread at which the loop ends.", "F", default="wheel")
 @given_options("creep law and contact")
@@ -85,19 +97,8 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
 
 @click.command()
 @track_argument
-@option(
-    "--traffic",
-    "A vehicle, its speed in m/s or with a unit, and its share of the tonnage in any unit; "
-    "may be repeated.",
-    "VEHICLE V SHARE",
-    (str, as_speed, float),
-    required=True,
-    multiple=True,
-)
-@option("--tonnage distance", "Traffic in Mt.", "MT", float, required=True)
-@option(
-    "--step", "Tonnage in Mt between two updates of the rail profiles.", "MT", float, required=True
-)
+@mix_option("--traffic", "vehicle", "tonnage")
+@amount_options("--tonnage distance", "Traffic in Mt.", "Mt", "the rail profiles")
 @law_option
 @given_options("creep law and contact", load=False)
 @output_options("Folder for wear.json and the profiles.")
