@@ -10,13 +10,14 @@ holds a lock on the file.
 Opening 100 000 runs reads the heads only; a record is read on access.
 """
 
-import json
 import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Self, overload
+
+import orjson
 
 from railsim.errors import argument_error, input_error
 from railsim.files.access import locked
@@ -107,13 +108,13 @@ class Journal:
             if line[:9] != b"%08x\t" % crc or not line.endswith(b"\n"):
                 raise ValueError
             end = line.index(b"\t", 9)
-            facts = json.loads(line[9:end].decode())
+            facts = orjson.loads(line[9:end])
             if "format" in facts:
-                self.inputs = json.loads(line[end + 1 :]) if facts["format"] == FORMAT else None
+                self.inputs = orjson.loads(line[end + 1 :]) if facts["format"] == FORMAT else None
                 return
             entry = Entry(**facts, offset=offset + end + 1, length=len(line) - end - 2)
             self.entries[entry.name] = entry
-        except (ValueError, TypeError, KeyError, RecursionError):
+        except (ValueError, TypeError, KeyError):
             self.damaged += 1
 
     def clear(self) -> None:
@@ -220,10 +221,10 @@ class Records(Sequence[Record]):
 
     def _record(self, entry: Entry, text: bytes) -> Record:
         try:
-            record: Record = json.loads(text)
+            record: Record = orjson.loads(text)
             if not record.keys() >= RECORD or not isinstance(record["labels"], dict):
                 raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
-        except (ValueError, RecursionError, AttributeError) as error:
+        except (ValueError, AttributeError) as error:
             found = f"a record that cannot be used ({error})"
             allowed = "remove the journal: existing results are kept"
             raise input_error(str(self._path), found, allowed, key=entry.name) from None
