@@ -16,20 +16,26 @@ ROOT = Path(__file__).parents[2]
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
-# Every page in a frame of each width; measured once it and its styles are loaded.
-WALK = """<!doctype html><iframe id="f" style="height:900px;border:0"></iframe><script>
+# Every page in a frame, measured at each width once it and its styles are loaded; what moves when
+# the width changes comes to rest in half a second.
+WALK = """<!doctype html>
+<iframe id="f" style="height:900px;border:0;visibility:hidden"></iframe><script>
 const frame = document.getElementById("f"), found = [];
+const overflow = root => root.scrollWidth - root.clientWidth;
 async function walk(pages) {
-  for (const width of [412, 1440]) for (const page of pages) {
-    frame.style.width = width + "px";
+  for (const page of pages) {
     await new Promise(done => { frame.onload = done; frame.src = page; });
     const d = frame.contentDocument, root = d.documentElement;
-    const text = d.querySelector("article").innerText;
-    found.push({page, width, overflow: root.scrollWidth - root.clientWidth,
-      outside: frame.contentWindow.performance.getEntriesByType("resource")
-        .map(r => r.name).filter(n => !n.startsWith(location.origin)),
-      source: (text.match(/--8<--|\\$\\$|\\\\frac|\\\\[([]/g) || []),
-      broken: Array.from(d.images).filter(i => i.complete && !i.naturalWidth).map(i => i.src)});
+    for (const width of [412, 1440]) {
+      frame.style.width = width + "px";
+      if (overflow(root)) await new Promise(done => setTimeout(done, 500));
+      const text = d.querySelector("article").innerText;
+      found.push({page, width, overflow: overflow(root),
+        outside: frame.contentWindow.performance.getEntriesByType("resource")
+          .map(r => r.name).filter(n => !n.startsWith(location.origin)),
+        source: (text.match(/--8<--|\\$\\$|\\\\frac|\\\\[([]/g) || []),
+        broken: Array.from(d.images).filter(i => i.complete && !i.naturalWidth).map(i => i.src)});
+    }
   }
   fetch("found", {method: "POST", body: JSON.stringify(found)});
 }
@@ -38,7 +44,12 @@ walk(PAGES);
 
 
 class Site(SimpleHTTPRequestHandler):
-    """Hands out the pages; takes what the browser found."""
+    """Hands out the pages, with nothing to search; takes what the browser found."""
+
+    def do_GET(self):
+        if self.path.endswith("search_index.json"):  # read anew by every page
+            self.path = "/walk.json"
+        super().do_GET()
 
     def do_POST(self):
         self.server.found = self.rfile.read(int(self.headers["Content-Length"]))
@@ -65,6 +76,8 @@ def walked(site, tmp_path_factory):
     """Measurements of every page at both widths, and what the browser's console said."""
     pages = sorted(str(p.relative_to(site).parent) + "/" for p in site.rglob("index.html"))
     (site / "walk.html").write_text(WALK.replace("PAGES", json.dumps(pages)), "utf-8")
+    index = json.loads((site / "search" / "search_index.json").read_bytes())
+    (site / "walk.json").write_text(json.dumps({**index, "docs": []}))
     server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Site, directory=site))
     log = tmp_path_factory.mktemp("log") / "stderr"
     with log.open("w") as stream:
