@@ -280,6 +280,7 @@ def test_every_value_of_the_table_is_finite_with_positive_stiffness_and_axes():
 
 def test_stored_table_is_the_built_one_and_any_input_makes_another(tmp_path, monkeypatch):
     monkeypatch.setenv("RAILSIM_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("railsim.kernels.cache.notices", {})
     wheel, rail = load_profile("S1002"), load_profile("60E1")
     grid = TableGrid(ds=1e-3, droll=3e-3, n_w=2)
     built = build_contact_table(wheel, rail, grid=grid)

@@ -91,7 +91,9 @@ def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
         assert abs(found.state[6 * body + 1]) < 1e-9
 
 
-@pytest.mark.parametrize("difference", [0.3e-3, 0.5e-3, -1e-3])
+# one the mirror image of the other: two contact tables serve both
+@pytest.mark.parametrize("difference", [1e-3, -1e-3])
+@pytest.mark.usefixtures("small_contact_tables")
 def test_wheels_of_unequal_radii_stand_on_both_rails(difference):
     """The larger wheel lifts its side by 2/3 mrad a millimetre; the weights lean to the other one.
 

@@ -44,6 +44,7 @@ def hanging(stiffness):
     }
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_a_mass_on_springs_to_the_ground_has_its_closed_frequencies():
     """sqrt(k/m)/2pi along three axes; about each sqrt(k_r/I)/2pi."""
     found = railsim.modes(
@@ -54,6 +55,7 @@ def test_a_mass_on_springs_to_the_ground_has_its_closed_frequencies():
     assert frequencies == pytest.approx(closed, rel=1e-6)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_a_run_on_the_rig_oscillates_as_the_closed_solution():
     """z = z0 cos(omega t); the frequency is wrong by (omega h)^2/24, 4e-6."""
     vehicle = rig("probe", spring=hanging([2e5, 3e5, 4e5]))
@@ -65,6 +67,7 @@ def test_a_run_on_the_rig_oscillates_as_the_closed_solution():
     assert not position[:, anchor].any()
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_wheelset_on_springs_to_the_ground_hunts_at_the_speed_computed_independently():
     """L2: cones 1:20, friction 1, k_y 2e5 N/m, k_yaw 4e5 N m; 41.37 m/s, 2.524 Hz, 2 %."""
     spring = {

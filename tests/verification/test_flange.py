@@ -65,6 +65,7 @@ def not_converged(*_):
     raise NotConverged("no steady state")
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_growth_does_not_depend_on_the_step_of_the_way():
     """Slopes learnt while the wheels vibrated on the way would change it by a fifth."""
     track = railsim.load_track("curve_r500")
@@ -127,6 +128,7 @@ def with_friction(track, friction):
     ("name", "radius_track", "speed", "friction"),
     [("coach_manchester", "curve_r250", 18.5, 0.3), ("locomotive_coco_a", "curve_r500", 22.2, 0.4)],
 )
+@pytest.mark.usefixtures("small_contact_tables")
 def test_state_led_to_another_speed_and_friction_is_the_one_found_there(
     name, radius_track, speed, friction
 ):

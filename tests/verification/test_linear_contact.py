@@ -37,6 +37,7 @@ def on_springs(linearisation, lateral, yaw):
 @pytest.mark.parametrize(
     "contact", [Contact("harmonic", 0.3e-3), Contact("harmonic", 1e-3), Contact("harmonic", 3e-3)]
 )
+@pytest.mark.usefixtures("small_contact_tables")
 def test_critical_speed_of_a_wheelset_on_springs(contact):
     """L2: cones 1:20 on 60E1, friction 1; 41.37 m/s and 2.524 Hz computed independently, 2 %."""
     wheelset = LinearVehicle(
@@ -72,6 +73,7 @@ def coned():
 
 
 @points("contact", [Contact(), Contact("harmonic", 3e-3)], always=(1,))
+@pytest.mark.usefixtures("small_contact_tables")
 def test_critical_speed_of_the_benchmark_coach_on_cones(coned, contact):
     """L8: 99.0 m/s and 2.96 Hz computed independently, 5 %; on cones at any amplitude."""
     lost = loss_of_stability(coned(contact).linearised, 60.0, 130.0, points=4)
@@ -105,6 +107,7 @@ def test_half_the_spacing_of_the_contact_table_keeps_the_tangent_critical_speed(
         assert 95.0 < found[0] < 99.0
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_creep_coefficients_without_saturation_are_kalkers(coned):
     """L8: f11 9.694e6, f22 8.826e6, f23 2.03e4 per wheel; 2 %."""
     speed, mass = 50.0, 1813.0

@@ -39,6 +39,9 @@ def wagon(back_to_back, **frame):
     })  # fmt: skip
 
 
+pytestmark = pytest.mark.usefixtures("small_contact_tables")
+
+
 @pytest.mark.parametrize(("gauge", "back_to_back"), [METRE, BROAD])
 def test_dip_of_one_rail_lowers_its_wheel_and_not_the_other(gauge, back_to_back):
     """6 mm over 20 m at 1 m/s: heights where the wheels stand, 32.5 mm outside the gauge face."""

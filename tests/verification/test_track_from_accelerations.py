@@ -137,6 +137,7 @@ def test_long_waves_move_everything_with_the_track(coach, linear):
     assert abs(H[response.outputs.index("Q.1.left"), 1]) < 1e3
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_mirror_image():
     """Level moves both sides alike and nothing across; cross level and alignment the opposite."""
     vehicle = railsim.load_vehicle("coach_zhai_high_speed")
