@@ -76,8 +76,12 @@ def kalker_coefficients(
 
     Notes
     -----
-    Printed to three digits (0.2 %); against a recomputation with the full half-space theory within
-    1 % for a/b <= 5 (C22 1.6 % at 10).  c33 is the least accurate (1.3 % up to a/b = 2.5).
+    Printed to three digits (0.2 %); at the printed rows within 1 % of a recomputation with the full
+    half-space theory for a/b <= 5 (C22 1.6 % at 10).  c33 is the least accurate (1.3 % up to
+    a/b = 2.5).  Between the rows straight lines are too high, the more the slenderer the patch: C23
+    by 5 % at a/b = 4 and 14 % at 7, C33 by 12 % at 0.14.  Powers of g would be within 1.5 %, but
+    FASTSIM would then differ from that of other programs, which take straight lines, and be no
+    closer to the full theory.
     Source: Kalker (1990), table E.3 and its asymptotes.
 
     Examples
