@@ -105,6 +105,25 @@ def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
     assert "lateral body acceleration" in data["verdicts"]["ride"]["reasons"][0]
 
 
+# very large radii ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hand", [1.0, -1.0])
+def test_very_large_radii_of_zone_1_are_pooled_with_straight_track(hand):
+    """R 4000 m, 36.7 m/s, cant 20 mm: 31 mm deficiency; the sections are those of zone 1."""
+    plan = [{"type": "STR", "length": 900.0}, *curve(hand * 4000.0, 600.0)[1:4], STRAIGHT]
+    to_the_right = lambda t, s: np.full((*s.shape, 2), 4e3)  # noqa: E731
+    (found,) = assess(made(track(*plan, cant=hand * 0.02), FAST, Y=to_the_right))
+    (zone,) = (z for z in found.zones if z.zone == "1")
+    assert sorted({v.section.radius for v in zone.values}) == sorted([hand * 4000.0, np.inf])
+    row = rows_of(found, "1", "sum_Y")["wheelset 1"]
+    assert row.estimate.N == len(zone.values) == 3 + 2 + 6
+    assert row.estimate.value == pytest.approx(8e3, rel=1e-6)
+    assert not rows_of(found, "1", "Y_over_Q")
+    assert set(rows_of(found, "1", "Q")) == {f"wheelset {w} {side}" for w in (1, 2, 3, 4)
+                                            for side in ("left", "right")}  # fmt: skip
+
+
 # correction for high friction ---------------------------------------------------------------------
 
 
