@@ -200,6 +200,20 @@ def test_fault_mode_is_assessed_for_running_safety_only():
     assert not any(c.name == "number of sections" for c in found.conditions)
 
 
+def test_fault_mode_without_a_section_that_counts_is_no_pass():
+    """At 20 m/s no straight section is one of zone 1: nothing of the fault mode is judged."""
+    fault = vehicle(condition="failed damper", fault=True)
+    whole = made(ON_ZONE_4, 23.0, vehicle=fault)
+    slow = made(track(STRAIGHT), 20.0, vehicle=fault)
+    name = "sections of the fault mode"
+    (found,) = assess({"whole": whole, "slow": slow})
+    assert not any(c.name == name for c in found.conditions)
+    (found,) = assess({"new": made(ON_ZONE_4, 23.0, vehicle=vehicle(condition="new")),
+                       "slow": slow})  # fmt: skip
+    assert condition(found, name, "failed damper").state == "not met"
+    assert any(name in why for why in found.verdicts["safety"].reasons)
+
+
 # conditions of the test ---------------------------------------------------------------------------
 
 
