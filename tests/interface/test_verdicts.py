@@ -10,6 +10,7 @@ from railsim.assessment import assess
 from railsim.cli import main
 from railsim.errors import InputError
 from railsim.profiles import load_profile
+from railsim.report.limits import assessed
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
@@ -80,6 +81,33 @@ def test_wheel_off_the_rail_5_m_in_every_70_m_fails():
     low = rows_of(found, "4", "Q_low")
     assert low["wheelset 1 outer"].estimate.value < 0.0
     assert low["wheelset 2 outer"].estimate.value == pytest.approx(Q0, rel=1e-6)
+
+
+def test_wheel_above_nadals_limit_before_it_lifts_is_said_to_exceed_it():
+    """Y/Q 1.5 over 10 m, then 2 m without load; S1002, 70 degrees, and friction 0.4: 1.12."""
+
+    def Q(t, s):
+        loads = np.full((*s.shape, 2), Q0)
+        loads[(s[:, 0] > 410.0) & (s[:, 0] < 412.0), 0, 0] = 0.0
+        return loads
+
+    def Y(t, s):
+        forces = np.zeros((*s.shape, 2))
+        forces[(s[:, 0] > 400.0) & (s[:, 0] <= 410.0), 0, 0] = -1.5 * Q0
+        return forces
+
+    profiles = {name: load_profile(name) for name in ("S1002", "60E1")}
+    run = made(ON_ZONE_4, 23.0, Q=Q, Y=Y, profiles=profiles)
+    (found,) = assess(run, "safety")
+    wheel, *others = found.safety["run"].wheels
+    assert (wheel.Y_over_Q, wheel.lifted) == (pytest.approx(1.5), True)
+    assert wheel.limit < 1.2
+    assert wheel.climb_distance == pytest.approx(12.0, abs=0.1)
+    assert not any(other.lifted for other in others)
+    verdicts, page = assessed({"run": run})
+    assert ("failed", "Limits exceeded: run: Nadal's limit, wheelset 1 left.") in verdicts
+    row = next(t for t in page.tables if t.caption.startswith("Derailment")).rows[0]
+    assert (row[1], row[-1]) == ("wheelset 1 left", "wheelset 1 left")
 
 
 # three verdicts -----------------------------------------------------------------------------------
