@@ -2,7 +2,7 @@
 
 What is compared: sections (number, mean radius, both hands, independence, quality of the track) in
 each zone of each population; conicity, load states and friction over all runs of the vehicle.
-Fault modes need none of them.
+Of them fault modes need a section that is judged, in any zone.
 """
 
 from collections import Counter
@@ -85,10 +85,15 @@ def _number(place: str, found: str, wanted: Zone, *, met: bool) -> Condition:
 def missing_zones(
     population: Population, reports: Sequence[ZoneReport], limits: RunningLimits
 ) -> list[Condition]:
-    """Zones in which a population has no sections; fault modes need none."""
+    """Zones in which a population has no sections; a fault mode needs one in any zone."""
+    own = [report for report in reports if report.population is population]
     if population.fault:
-        return []
-    there = {report.zone for report in reports if report.population is population}
+        if any(report.values for report in own):
+            return []
+        found = "; ".join(["none", *reasons([s for report in own for s in report.sections])])
+        about = "sections of the fault mode", population.name, NOT_MET
+        return [Condition(*about, found, "one at least", "ours")]
+    there = {report.zone for report in own}
     zones = [pair for pair in sorted(limits.zones.items()) if pair[0] not in there]
     behind = f", {population.name}" if population.name else ""
     return [_number(f"zone {name}{behind}", "none", zone, met=False) for name, zone in zones]

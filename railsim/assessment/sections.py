@@ -39,8 +39,12 @@ class TestSection:
 
     @property
     def turn(self) -> int:
-        """1 in a right-hand curve, -1 in a left-hand one, 0 on straight track."""
-        return 0 if math.isinf(self.radius) else int(math.copysign(1.0, self.radius))
+        """1 in a right-hand curve, -1 in a left-hand one; 0 on straight track and in zone 1.
+
+        Very large radii are pooled there with straight track: values of either side.
+        """
+        straight = self.zone == "1" or math.isinf(self.radius)
+        return 0 if straight else int(math.copysign(1.0, self.radius))
 
     def wheel(self, side: int | None) -> str:
         """Name of the wheels on a side: ``outer`` and ``inner`` in curves; empty for no side."""

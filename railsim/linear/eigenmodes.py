@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eig
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import brentq, linear_sum_assignment, minimize_scalar
 
 from railsim.arrays import Complexes, Floats, Indices
 from railsim.linear.system import Linearisation
@@ -27,6 +27,7 @@ SAME = 0.6  # pairing of neighbouring modes that needs no look in between
 UNRELATED = 0.1  # pairing below which two modes are not the same
 EQUAL = 0.02  # relative distance of eigenvalues that cannot be distinguished
 MOST_HALVINGS = 3
+STEP = 0.2  # of the parameter, in which a loss of stability is looked for
 
 
 @dataclass(frozen=True)
@@ -189,9 +190,13 @@ def loss_of_stability(
 ) -> LossOfStability:
     """Find the lowest parameter at which an oscillation is no longer damped.
 
+    The range is looked through in steps of a share `STEP` of the parameter, and where the growth
+    has a peak near zero between them: a vehicle may be unstable over 4 m/s only, when the frequency
+    of hunting passes that of its body's sway.
+
     `at`: parameter to linearisation; `low`, `high`: range of the search; `counts`: whether a mode
-    that is undamped counts; by default all do; `points`: values of the parameter at which the range
-    is looked through.
+    that is undamped counts; by default all do; `points`: least number of values of the parameter at
+    which the range is looked through.
     """
     known: dict[float, Eigenmodes] = {}
 
@@ -200,15 +205,37 @@ def loss_of_stability(
             known[parameter] = _least_damped(eigenmodes(at(parameter)), counts)
         return float(known[parameter].eigenvalues[0].real)
 
-    grid = np.linspace(low, high, points).tolist()
-    if growth(grid[0]) >= 0.0:
-        return LossOfStability(None, True, (known[grid[0]],))
-    for before, after in pairwise(grid):
-        if growth(after) >= 0.0:
-            root = float(brentq(growth, before, after, xtol=1e-7 * high, rtol=1e-12))
+    if growth(low) >= 0.0:
+        return LossOfStability(None, True, (known[low],))
+    before = passed = low
+    while passed < high:
+        after = min(high, passed + min((high - low) / (points - 1), STEP * passed))
+        after = high if high - after < 1e-9 * high else after
+        unstable = after if growth(after) >= 0.0 else _beyond_zero(growth, before, passed, after)
+        if unstable is not None:
+            stable = passed if unstable > passed else before
+            root = float(brentq(growth, stable, unstable, xtol=1e-7 * high, rtol=1e-12))
             growth(root)
             return LossOfStability(root, False, (known[root],))
-    return LossOfStability(None, False, (known[grid[0]], known[grid[-1]]))
+        before, passed = passed, after
+    return LossOfStability(None, False, (known[low], known[high]))
+
+
+def _beyond_zero(
+    growth: Callable[[float], float], before: float, middle: float, after: float
+) -> float | None:
+    """Where a peak about the middle one of three parameters is not negative, if it may be.
+
+    A parabola rises over the largest of three values at equal distances by an eighth of what this
+    is above the least one, at most; more is looked into where peaks are sharper.
+    """
+    low, peak, high = map(growth, (before, middle, after))
+    if not (peak >= max(low, high) and 2.0 * peak - min(low, high) >= 0.0):
+        return None
+    found = minimize_scalar(
+        lambda x: -growth(x), bounds=(before, after), method="bounded", options={"maxiter": 12}
+    )
+    return float(found.x) if found.fun <= 0.0 else None
 
 
 def _least_damped(

@@ -44,6 +44,7 @@ LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
 NEAR = (0.8, 1.25)  # times the linear critical speed: where most speeds of a diagram stand ...
 SHARE = 0.75  # ... this share of them
+ABOVE = 1.1  # times the speed at which rest is unstable: where a second ramp begins
 AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
 OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
@@ -85,7 +86,7 @@ def critical_speed(
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].
     over_amplitude : bool
-        Find the linear critical speed over amplitude and on rigid rails too, 4 s of CPU time.
+        Find the linear critical speed over amplitude and on rigid rails too, 5 to 8 s of CPU time.
     settings : Settings, optional
         Scheme, creep law, contact.
     profiles : mapping of str to Profile, optional
@@ -136,14 +137,14 @@ def critical_speed(
 
         try:
             if method == "ramp":
-                _by_ramp(found, motion, excitations, share)
+                _by_ramp(found, motion, begins, excitations, share)
             elif method == "bifurcation":
                 _by_diagram(found, motion, begins.parameter, points, excitations, share)
             else:
                 _by_continuation(found, motion, begins, share)
         except (LeftRange, ModelError) as error:
             found.remarks.append(f"{method}: {error}")
-    _conclude(found, vehicle, of_runs, begins.parameter)
+    _conclude(found, vehicle, of_runs, begins)
     _remark_range(found, vehicle)
     return found
 
@@ -227,6 +228,7 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
     if lost.parameter is not None:
         mode = lost.modes[0]
         return LinearLoss(lost.parameter, float(mode.frequencies[0]), mode_name(parts, mode))
+    found.unstable_at_low = lost.already
     if lost.already:
         found.remarks.append(f"unstable at the lower end of the range: {words(lost.modes[0])}")
     else:
@@ -294,11 +296,28 @@ def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
 
 
 def _by_ramp(
-    found: CriticalSpeed, motion: VehicleMotion, excitations: Sequence[float], progress: Progress
+    found: CriticalSpeed,
+    motion: VehicleMotion,
+    begins: LossOfStability,
+    excitations: Sequence[float],
+    progress: Progress,
 ) -> None:
     lowest, branch = ramp(motion, found.low, found.high, progress, excitations)
-    found.nonlinear["ramp"] = lowest
     found.branches.append(branch)
+    unstable = found.low if begins.already else begins.parameter
+    end = found.high if lowest is None else lowest.speed
+    if unstable is not None and end > _far_above(unstable):
+        # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
+        top = min(ABOVE * unstable, 0.5 * (unstable + end))
+        below, second = ramp(motion, found.low, top, progress, excitations)
+        found.branches.append(second)
+        lowest = below or lowest
+        if below is None:
+            found.remarks.append(
+                f"ramp: rest is unstable at {unstable:.4g} m/s, but grows too slowly there for a "
+                "ramp to show what it becomes (bifurcation)"
+            )
+    found.nonlinear["ramp"] = lowest
     if lowest is None:
         found.remarks.append(f"ramp: nothing hunts from {found.low:g} to {found.high:g} m/s")
     elif lowest.speed <= found.low:
@@ -306,6 +325,11 @@ def _by_ramp(
     if branch.points[0].speed < found.high:
         top = branch.points[0].speed
         found.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
+
+
+def _far_above(speed: float) -> float:
+    """Speed above which hunting does not begin where rest loses its stability [m/s]."""
+    return max(speed + 2.0, 1.05 * speed)
 
 
 def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[float]:
@@ -330,8 +354,8 @@ def _by_diagram(
     progress: Progress,
 ) -> None:
     speeds = _speeds(found, begins, points)
-    branches = diagram(motion, speeds, progress, excitations)
-    found.nonlinear["bifurcation"] = lowest_of(branches)
+    branches = diagram(motion, speeds, progress, excitations, found.low)
+    found.nonlinear["bifurcation"] = lowest = lowest_of(branches)
     found.branches += branches
     found.jumps = jumps(branches)
     reached = max((point.speed for point in branches[0].points), default=None)
@@ -339,6 +363,8 @@ def _by_diagram(
         found.remarks.append("bifurcation: the vehicle derails at the lower end")
     elif reached < speeds[-1]:
         found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
+    if lowest is not None and lowest.speed <= found.low:
+        found.remarks.append(f"bifurcation: hunts still at the lower end, {found.low:g} m/s")
 
 
 def _by_continuation(
@@ -371,15 +397,21 @@ def _unstable_force(vehicle: Vehicle, Q0: Floats) -> float:
 
 
 def _conclude(
-    found: CriticalSpeed, vehicle: Vehicle, prepared: LinearVehicle, begins: float | None
+    found: CriticalSpeed, vehicle: Vehicle, prepared: LinearVehicle, begins: LossOfStability
 ) -> None:
-    """Find type and limits from all branches."""
-    lowest = found.lowest
+    """Find type and limits from all branches.
+
+    Where rest is unstable at the lower end already, or nothing was seen to hunt where it becomes
+    so, the type is not known.
+    """
+    lowest, at = found.lowest, begins.parameter
     if not found.nonlinear:
         return  # every method failed, as the remarks say
     if lowest is None:
-        found.type = "none"
-    elif begins is None or lowest.speed < begins - RESOLUTION or found.onset == "subcritical":
+        found.type = "" if begins.already or at is not None else "none"
+    elif begins.already or (at is not None and lowest.speed > _far_above(at)):
+        found.type = found.onset
+    elif at is None or lowest.speed < at - RESOLUTION or found.onset == "subcritical":
         found.type = "subcritical"
     else:
         found.type = "supercritical"

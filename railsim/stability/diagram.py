@@ -22,7 +22,16 @@ from railsim.stability.branches import (
     seen_at,
 )
 from railsim.stability.motion import LeftRange, Motion, Stretch
-from railsim.stability.ramp import CHANGE, EXCITATIONS, SMALL, WINDOW, Progress, hunting, moved
+from railsim.stability.ramp import (
+    CHANGE,
+    EXCITATIONS,
+    SMALL,
+    WINDOW,
+    Progress,
+    hunting,
+    looked_at,
+    moved,
+)
 
 ALIKE = 0.1  # relative difference of two amplitudes at a speed that count as one motion
 NEAR = 0.03  # relative difference of amplitudes that need not settle further
@@ -39,15 +48,17 @@ def diagram(
     speeds: Sequence[float],
     tell: Progress = lambda _: None,
     excitations: Sequence[float] = EXCITATIONS,
+    low: float | None = None,
 ) -> list[Branch]:
     """Bifurcation diagram by steps of speed upwards and then downwards with carried states.
 
     Further motions are sought from all disturbances at all speeds; speeds are added to the branches
     where they end or jump, to `RESOLUTION`.
 
-    `speeds`: rising [m/s]; `excitations`: sizes of the disturbances [m]. Returns: branches up and
-    down, then the others, at last the unstable motions between two branches. A branch upwards ends
-    where the vehicle derails.
+    `speeds`: rising [m/s]; `excitations`: sizes of the disturbances [m]; `low`: speed to which
+    motions that last below the lowest speed are followed, in steps as the first one [m/s]. Returns:
+    branches up and down, then the others, at last the unstable motions between two branches. A
+    branch upwards ends where the vehicle derails.
     """
     up, down = Branch("up"), Branch("down")
     for speed in speeds:
@@ -64,23 +75,33 @@ def diagram(
     if not up.points:
         return [up, down]
     reached = [point.speed for point in up.points]
+    lower = _below(speeds, speeds[0] if low is None else low)
     state, before = hunting(motion, reached[-1], excitations).state, reached[-1]
-    for speed in reversed(reached):
+    for speed in [*reversed(reached), *lower]:
+        if speed < reached[0] and down.points[-1].amplitude <= THRESHOLD:
+            break
         try:
             seen = settled(motion, state, before, speed)
         except LeftRange:  # while it brakes
             seen = hunting(motion, speed, excitations)
         down.points.append(seen_at(speed, seen))
         state, before = down.points[-1].state, speed
-        tell(0.25 * (1.0 + len(down.points) / len(speeds)))
+        tell(0.25 * (1.0 + min(1.0, len(down.points) / len(speeds))))
     branches = [up, down]
     for number, speed in enumerate(reached):
-        branches += _further(motion, branches, speed, excitations)
+        branches += _further(motion, branches, speed, excitations, lower)
         tell(0.5 + 0.25 * number / len(reached))
     branches = [_refined(motion, branch) for branch in branches]
     up, down = branches[:2]
     between = _threshold(motion, up, down, lambda share: tell(0.75 + 0.25 * share))
     return [*branches, *([between] if between.points else [])]
+
+
+def _below(speeds: Sequence[float], low: float) -> list[float]:
+    """Falling speeds below the first ones, in steps as that between these, down to `low`."""
+    first, step = speeds[0], max(speeds[1] - speeds[0], RESOLUTION) if len(speeds) > 1 else 1.0
+    found = np.arange(first - step, low + 0.5 * step, -step).tolist()
+    return [*found, low] if first - low > 1e-9 else []
 
 
 def settled(
@@ -94,7 +115,7 @@ def settled(
     state, before = moved(motion, state, begin, speed), np.inf
     dead = THRESHOLD if 0.0 in known else 0.02 * THRESHOLD
     for _ in range(MOST_SETTLING):
-        seen = motion.stretch(state, speed, speed, SETTLING)
+        seen = looked_at(motion, state, speed, SETTLING)
         change = abs(seen.amplitude - before) / max(seen.amplitude, 1e-12)
         near = any(abs(a - seen.amplitude) < NEAR * a for a in known)
         if change < 0.1 * CHANGE or (near and change < 0.5 * CHANGE):
@@ -120,11 +141,19 @@ def _amplitudes(branches: Sequence[Branch], speed: float) -> list[float]:
 
 
 def _further(
-    motion: Motion, branches: Sequence[Branch], speed: float, excitations: Sequence[float]
+    motion: Motion,
+    branches: Sequence[Branch],
+    speed: float,
+    excitations: Sequence[float],
+    lower: Sequence[float],
 ) -> list[Branch]:
-    """Branches of motions at a speed that no branch has, followed to both sides."""
+    """Branches of motions at a speed that no branch has, followed to both sides.
+
+    `lower`: falling speeds below those of the branch upwards [m/s].
+    """
     speeds = [point.speed for point in branches[0].points]
-    below, above = [v for v in speeds[::-1] if v < speed], [v for v in speeds if v > speed]
+    below = [*(v for v in speeds[::-1] if v < speed), *lower]
+    above = [v for v in speeds if v > speed]
     found: list[Branch] = []
     for size in excitations:
         known = _amplitudes([*branches, *found], speed)

@@ -22,6 +22,7 @@ HOLD = 10.0  # s, for the oscillation to settle above the critical speed
 BRAKING = 0.5  # m/s2, to see where about hunting dies
 DECELERATION = 0.05  # m/s2, of the ramp
 LEAD = 6.0  # m/s above the end of that braking, where the ramp begins
+WHOLE = 4.0  # s, of a look at a motion too slow to be seen whole in a shorter one: 0.3 Hz, at least
 CONSTANT = 20.0  # s, of a run that decides whether an oscillation sustains itself
 CHANGE = 0.02  # of the amplitude over half of it
 MOST_HALVES = 10  # halves of such a run, at most
@@ -57,6 +58,17 @@ def moved(motion: Motion, state: Floats, begin: float, end: float) -> Floats:
     if abs(end - begin) < 1e-9:
         return state
     return motion.stretch(state, begin, end, abs(end - begin) / BRAKING).state
+
+
+def looked_at(motion: Motion, state: Floats, speed: float, duration: float) -> Stretch:
+    """A stretch at constant speed in which one period at least is seen, if anything moves.
+
+    The amplitude of a part of a period is that of no motion.
+    """
+    seen = motion.stretch(state, speed, speed, duration)
+    if np.isfinite(seen.frequency) or seen.amplitude < SMALL or duration >= WHOLE:
+        return seen
+    return motion.stretch(seen.state, speed, speed, WHOLE)
 
 
 def ramp(
@@ -145,7 +157,7 @@ def sustained(motion: Motion, state: Floats, speed: float) -> Point | None:
     before = np.inf
     for _ in range(MOST_HALVES):
         state = motion.stretch(state, speed, speed, half).state
-        seen = motion.stretch(state, speed, speed, WINDOW)
+        seen = looked_at(motion, state, speed, WINDOW)
         if seen.amplitude < THRESHOLD:
             return None
         if seen.amplitude > (1.0 - CHANGE) * before:

@@ -85,7 +85,9 @@ class CriticalSpeed(Plottable):
     - `nonlinear`: slowest motion of sustained hunting by method, None where there is none
     - `branches`: amplitude over speed
     - `type`: whether anything hunts below the speed at which rest loses its stability, in the runs'
-      own law; empty where it was not looked for
+      own law; empty where it was not looked for, rest is unstable at the lower end already, or
+      nothing was seen to hunt where it becomes so
+    - `unstable_at_low`: whether rest is unstable at the lower end of the range
     - `onset`: how the small motions begin there, whatever else is possible
     - `amplitude_limit`, `instability_limit`: amplitude of 3 mm, and half the limit of the
       track-shifting force as rms
@@ -100,6 +102,7 @@ class CriticalSpeed(Plottable):
     low: float = 0.0
     high: float = 0.0
     linear: LinearLoss | None = None
+    unstable_at_low: bool = False
     linear_over_amplitude: OverAmplitude | None = None
     nonlinear: dict[str, Point | None] = field(default_factory=dict)
     branches: list[Branch] = field(default_factory=list)
@@ -139,6 +142,7 @@ class CriticalSpeed(Plottable):
         return {
             **self.contact.record(),
             "linear": self.linear and asdict(self.linear),
+            "unstable_at_low": self.unstable_at_low,
             "nonlinear": nonlinear,
             "nonlinear_by_method": by_method,
             "amplitude_limit": self.amplitude_limit and asdict(self.amplitude_limit),
@@ -186,7 +190,8 @@ class CriticalSpeed(Plottable):
         how, lost, line = self.contact.words(), self.linear, self.linear_over_amplitude
         none = f"none up to {self.high:g} m/s"
         if lost is None:
-            yield f"linear, {how}", None, None, None, "none in this range"
+            words = "unstable at its lower end" if self.unstable_at_low else "none in this range"
+            yield f"linear, {how}", None, None, None, words
         else:
             yield f"linear, {how}", lost.speed, lost.frequency, None, lost.mode
             for words, speed in (

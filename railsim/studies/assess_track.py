@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from railsim.arrays import Floats, Integers
 from railsim.definitions import Settings, Track, Vehicle
@@ -228,6 +228,15 @@ def _hunting(records: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
+def _lifting(unloaded: Mapping[tuple[str, float], Sequence[float]]) -> list[str]:
+    """Remark on wheels without load, by vehicle and speed, and where the first one is so [m]."""
+    return [
+        f"{vehicle} lifts a wheel at {3.6 * speed:.0f} km/h, first at s = {min(s):.0f} m: Y/Q has "
+        "no value there, and its sections are flagged."
+        for (vehicle, speed), s in unloaded.items()
+    ]
+
+
 def recorded(recording: str | Path) -> Track:
     """Return a track with a recording; of a CSV, on straight track as long as it is.
 
@@ -309,6 +318,8 @@ def _judged(
     geometry = RecordedGeometry(track, begin, end)
     shares: dict[tuple[str, float, str], Floats] = {}
     places: list[Place] = []
+    unloaded: dict[tuple[str, float], list[float]] = {}
+    lifted = np.zeros(len(cells), dtype=np.bool_)
     for case, a, b, moved in runs:
         path = outcome.folder / case.file_name
         if not path.is_file():
@@ -321,17 +332,21 @@ def _judged(
                 continue
             s, part = s[inside], value[inside] / limit
             row = shares.setdefault((name, case.speed, quantity), np.full(len(cells), np.nan))
-            np.fmax.at(row, np.minimum(((s - begin) / CELL).astype(int), len(cells) - 1), part)
+            cell = np.minimum(((s - begin) / CELL).astype(int), len(cells) - 1)
+            np.fmax.at(row, cell, part)
+            if (gaps := np.isnan(part)).any():
+                lifted[cell[gaps]] = True
+                unloaded.setdefault((name, case.speed), []).append(float(s[gaps][0]))
             for k in _peaks(s, part, share):
                 places.append(
                     Place(name, case.speed, quantity, where, float(s[k]), float(part[k] * limit),
                           limit, geometry.shape(float(s[k])))
                 )  # fmt: skip
     asked = len({(case.labels["vehicle"], case.speed) for case, *_ in runs}) * len(QUANTITIES)
-    rows = np.full((1, len(cells)), np.nan)
-    if len(shares) == asked:
-        rows = np.array([*shares.values()])
-    exceeded, unknown = np.any(rows > share, axis=0), np.isnan(rows).any(axis=0)
+    rows = np.array([*shares.values()]).reshape(-1, len(cells))
+    exceeded = np.any(rows > share, axis=0) | lifted
+    unknown = ~lifted & (np.isnan(rows).any(axis=0) | (len(shares) < asked))
+    remarks = [*remarks, *_lifting(unloaded)]
     sections, flagged = geometry.sections(exceeded, unknown, max(case.speed for case, *_ in runs))
     return TrackAssessment(
         outcome.folder, share, tuple(_strongest(places)), cells, shares, sections, flagged,
@@ -356,7 +371,10 @@ def _signals(case: Case, result: Result) -> list[tuple[str, str, Floats, Floats,
     window = max(1, round(SLIDING / case.speed * rate))
 
     def mean(x: Floats) -> Floats:
-        return np.asarray(uniform_filter1d(x, window))
+        """Sliding mean; nan where a window holds an instant without value."""
+        unknown = np.isnan(x)
+        known = uniform_filter1d(np.where(unknown, 0.0, x), window)
+        return np.where(maximum_filter1d(unknown, window), np.nan, known)
 
     for w in range(at.shape[1]):
         number = f"wheelset {w + 1}"

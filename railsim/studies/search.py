@@ -20,6 +20,7 @@ CANDIDATES = 512  # candidates for a batch, from Sobol's sequence
 NEAR = 256  # further candidates about members of the front, at each distance
 CELLS = 1024  # points for the estimate of the gain of a candidate
 SMALLEST_DISTANCE = 2e-3  # of the cube's side, between designs
+NO_ANSWER = 1e9  # excess of designs without values
 MARGIN = 0.1  # distance of the reference point beyond the front, as a share of its range
 
 
@@ -242,15 +243,19 @@ def _differential_evolution(task: Task) -> None:
     from scipy.optimize import Bounds, differential_evolution
 
     size = max(5, task.batch)
+    scale: list[float] = []  # of the objective, as large as in the first generation
 
     def worth(designs: Any) -> Any:
         values = task.evaluate(designs.T)
         number = designs.shape[1]
-        found = _without_nan(values.objectives)[:, 0]
-        # infeasible designs are worse than all feasible ones (Deb 2000)
-        excess = np.maximum(_without_nan(values.constraints), 0.0).sum(axis=1)
-        worst = found.max()
-        return np.where(excess > 0.0, worst + abs(worst) + excess, found)[-number:]
+        found, broken = values.objectives[-number:, 0], values.constraints[-number:]
+        if not scale:
+            scale.append(float(np.max(np.abs(found), where=~np.isnan(found), initial=0.0)) or 1.0)
+        # infeasible designs are worse than all feasible ones of any generation (Deb 2000)
+        excess = np.maximum(broken, 0.0).sum(axis=1)
+        below_one = found / (scale[0] + np.abs(found))
+        known = np.where(excess > 0.0, 1.0 + excess, below_one)
+        return np.where(np.isnan(found) | np.isnan(excess), NO_ANSWER, known)
 
     differential_evolution(
         worth,

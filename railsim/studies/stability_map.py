@@ -126,7 +126,7 @@ def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
 
 
 def map_table(records: Sequence[Record], parameters: Sequence[str]) -> Table:
-    """Return the critical speeds of a map over its parameters.
+    """Return the critical speeds of a map over its parameters, and why a linear one is missing.
 
     `records`: see `stability_map`; `parameters`: keys that have several values.
     """
@@ -137,6 +137,10 @@ def map_table(records: Sequence[Record], parameters: Sequence[str]) -> Table:
         [*(record["at"][name] for name in parameters), *(column[k] for column in speeds.values())]
         for k, record in enumerate(records)
     ]
+    missing = [_without_linear(record) for record in records]
+    if any(missing):
+        columns.append(Column("linear", " "))
+        rows = [[*row, words] for row, words in zip(rows, missing, strict=True)]
     where: dict[str, str] = next(
         (record["conditions"] for record in records if "conditions" in record), {}
     )
@@ -144,3 +148,13 @@ def map_table(records: Sequence[Record], parameters: Sequence[str]) -> Table:
     if "friction" not in parameters and where:
         words.append(f"friction {where['friction']}")
     return Table(columns, rows, ", ".join(words))
+
+
+def _without_linear(record: Record) -> str:
+    """Why a point has no linear critical speed; empty where it has one."""
+    if record["linear"]:
+        return ""
+    low, high = record.get("searched", (None, None))
+    if low is None:
+        return "not computed"
+    return f"unstable at {low:g} m/s" if record.get("unstable_at_low") else f"none to {high:g} m/s"

@@ -1,6 +1,8 @@
 """`railsim assess-track`: places, pieces against one run, geometry beside it, resume, bad input."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -177,6 +179,78 @@ def test_places_on_the_floor_are_those_of_their_points(judged):
         if where.startswith("floor")
     }
     assert ahead == {"floor_front": [9.5], "floor_rear": [-9.5]}
+
+
+class _Lifting:
+    """A run whose third wheelset's left wheel is without load over some outputs."""
+
+    def __init__(self, run, gap):
+        self.run, self.gap = run, gap
+
+    def __getitem__(self, name):
+        values = np.array(self.run[name])
+        if name == "Y_over_Q":
+            values[self.gap, 2, 0] = np.nan
+        return values
+
+    def series(self, *names, **labels):
+        return self.run.series(*names, **labels)
+
+
+@pytest.fixture
+def pieces(judged):
+    """Runs of `judged` as `_judged` takes them."""
+    runs = []
+    for number, a in enumerate((0.0, 499.875)):
+        result = railsim.open_result(judged[2] / f"coach_manchester_40_{number:04d}.h5")
+        case = Case(f"coach_manchester_40_{number:04d}", result.vehicle(), result.track(),
+                    result.settings(), SPEED, 0.0,
+                    labels={"vehicle": "coach_manchester", "speed": SPEED})  # fmt: skip
+        moved = max(0.0, a - module.RUN_IN - module.BEYOND)
+        runs.append(module._Run(case, a, a + 499.875, moved))
+    return runs, SimpleNamespace(folder=judged[2], computed=0, records=())
+
+
+def test_a_wheel_that_lifts_is_flagged_and_spoils_no_other_place(
+    judged, recording, pieces, monkeypatch
+):
+    """Without load over 3 outputs: only windows of 2 m with one of these have no mean."""
+    runs, outcome = pieces
+    opened = railsim.open_result
+    gap = slice(500, 503)
+    whole = {p[:2]: p[3] for p in module._signals(runs[0].case, opened(
+        judged[2] / runs[0].case.file_name))}  # fmt: skip
+    lifting = _Lifting(opened(judged[2] / runs[0].case.file_name), gap)
+    for quantity, where, _, values, _ in module._signals(runs[0].case, lifting):
+        known = np.ones(len(values), dtype=bool)
+        if (quantity, where) == ("Y_over_Q", "wheelset 3 left"):
+            known[gap.start - 2 : gap.stop + 2] = False  # 5 outputs in 2 m
+            assert np.isnan(values[gap]).all()
+        assert values[known] == pytest.approx(whole[quantity, where][known], rel=1e-9)
+
+    def spoilt(path):
+        return _Lifting(opened(path), gap) if path.name.endswith("_0000.h5") else opened(path)
+
+    monkeypatch.setattr(module, "open_result", spoilt)
+    found = module._judged(recorded(recording), runs, 0.6, outcome, [])
+    s = float(lifting["wheelset_distance"][gap.start, 2])
+    (section,) = (r for r in found.sections.records() if r["begin"] <= s < r["end"])
+    assert section["vehicles"] == "flagged"
+    assert found.flagged[4] == 0
+    (remark,) = found.remarks
+    assert "lifts a wheel at 144 km/h" in remark
+    assert f"{s:.0f} m" in remark or f"{s - 1.0:.0f} m" in remark
+
+
+def test_what_one_vehicle_exceeds_counts_where_another_never_ran(judged, recording, pieces):
+    runs, outcome = pieces
+    labels = {"vehicle": "other", "speed": SPEED}
+    never = [run._replace(case=replace(run.case, name="none", labels=labels)) for run in runs]
+    alone = module._judged(recorded(recording), runs, 0.6, outcome, [])
+    both = module._judged(recorded(recording), [*runs, *never], 0.6, outcome, [])
+    shown = [[row["vehicles"] for row in one.sections.records()] for one in (alone, both)]
+    assert "flagged" in shown[0]
+    assert shown[1] == [words or "not run" for words in shown[0]]
 
 
 def test_sections_are_counted_by_hand():

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import tomli_w
 from example_result import example_result, feed
-from made_record import curve, made, track
+from made_record import Q0, curve, made, track
 from test_study import arguments
 from test_study import simulated as simulated
 
@@ -24,6 +24,7 @@ from railsim.cli import main
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day, in_words
 from railsim.report.inputs import _flat
+from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
 from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
@@ -510,6 +511,27 @@ def test_page_and_assessment_of_a_folder_agree(tmp_path, capsys):
     # a section without curves says so instead of showing controls
     assert "The results hold none of the quantities that are drawn here." in html
     assert '"curves":[]' in html
+
+
+def test_assessments_of_two_vehicles_of_one_name_stand_side_by_side():
+    """The one that exceeds Y/Q 0.8 is not hidden by the other, whichever comes first."""
+    on = track(*curve(300.0, 300.0), cant=0.12)
+    texts = [railsim.load_vehicle("coach_manchester").model_copy(update={"source": name}).to_toml()
+             for name in ("one", "other")]  # fmt: skip
+
+    def pushed(force, text):
+        force_on = np.array([-force, 0.0])
+        return made(on, 23.0, Y=lambda t, s: np.tile(force_on, (*s.shape, 1)), vehicle=text)
+
+    for forces in ((80e3, 10e3), (10e3, 80e3)):
+        runs = dict(zip("ab", map(pushed, forces, texts), strict=True))
+        _, section = assessed(runs)
+        zone = next(table for table in section.tables if "zone 4" in table.caption)
+        assert [name[-3:] for name in zone.header[1:3]] == ["(a)", "(b)"]
+        quotient = next(k for k, row in enumerate(zone.rows) if "quotient" in row[0][0])
+        assert quotient in zone.failed
+        large = zone.rows[quotient][1 + forces.index(80e3)]
+        assert large[1].startswith(f"{100.0 * 80e3 / Q0 / 0.8:.0f} %")
 
 
 def test_vehicles_are_shown_at_rest_in_their_load_case(tmp_path):

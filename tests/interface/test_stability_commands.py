@@ -9,6 +9,7 @@ import railsim
 from railsim.cli import main
 from railsim.linear.steady import NotConverged
 from railsim.stability import critical_speed, curving
+from railsim.studies.stability_map import map_table
 
 
 def test_linear_critical_speed(capsys, tmp_path):
@@ -318,3 +319,18 @@ def test_steady_curving_in_time_has_neither_given_forces_nor_a_speed_profile(mon
     in_time = railsim.curving(windy, settings=railsim.Settings(drive=slow), **how)
     assert in_time.converged.item() == curving.TIME
     np.testing.assert_allclose(in_time.Y, found.Y, atol=50.0)
+
+
+def test_a_map_tells_stable_points_from_those_unstable_throughout():
+    """Both have no linear critical speed in the range."""
+    points = [(None, False), ({"speed": 41.0}, False), (None, True)]
+    records = [
+        {"at": {"conicity": k}, "linear": linear, "nonlinear": None, "searched": [20.0, 80.0],
+         "unstable_at_low": low}
+        for k, (linear, low) in enumerate(points)
+    ]  # fmt: skip
+    records.append({"at": {"conicity": 9}, "linear": None, "nonlinear": None, "remarks": ["no"]})
+    rows = map_table(records, ["conicity"]).rows
+    assert [row[-1] for row in rows] == [
+        "none to 80 m/s", "", "unstable at 20 m/s", "not computed"
+    ]  # fmt: skip

@@ -10,6 +10,7 @@ from railsim.assessment import assess
 from railsim.cli import main
 from railsim.errors import InputError
 from railsim.profiles import load_profile
+from railsim.report.limits import assessed
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
@@ -82,6 +83,33 @@ def test_wheel_off_the_rail_5_m_in_every_70_m_fails():
     assert low["wheelset 2 outer"].estimate.value == pytest.approx(Q0, rel=1e-6)
 
 
+def test_wheel_above_nadals_limit_before_it_lifts_is_said_to_exceed_it():
+    """Y/Q 1.5 over 10 m, then 2 m without load; S1002, 70 degrees, and friction 0.4: 1.12."""
+
+    def Q(t, s):
+        loads = np.full((*s.shape, 2), Q0)
+        loads[(s[:, 0] > 410.0) & (s[:, 0] < 412.0), 0, 0] = 0.0
+        return loads
+
+    def Y(t, s):
+        forces = np.zeros((*s.shape, 2))
+        forces[(s[:, 0] > 400.0) & (s[:, 0] <= 410.0), 0, 0] = -1.5 * Q0
+        return forces
+
+    profiles = {name: load_profile(name) for name in ("S1002", "60E1")}
+    run = made(ON_ZONE_4, 23.0, Q=Q, Y=Y, profiles=profiles)
+    (found,) = assess(run, "safety")
+    wheel, *others = found.safety["run"].wheels
+    assert (wheel.Y_over_Q, wheel.lifted) == (pytest.approx(1.5), True)
+    assert wheel.limit < 1.2
+    assert wheel.climb_distance == pytest.approx(12.0, abs=0.1)
+    assert not any(other.lifted for other in others)
+    verdicts, page = assessed({"run": run})
+    assert ("failed", "Limits exceeded: run: Nadal's limit, wheelset 1 left.") in verdicts
+    row = next(t for t in page.tables if t.caption.startswith("Derailment")).rows[0]
+    assert (row[1], row[-1]) == ("wheelset 1 left", "wheelset 1 left")
+
+
 # three verdicts -----------------------------------------------------------------------------------
 
 
@@ -103,6 +131,25 @@ def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
     assert data["verdict"] == "incomplete"
     assert data["verdicts"]["ride"]["verdict"] == "fail"
     assert "lateral body acceleration" in data["verdicts"]["ride"]["reasons"][0]
+
+
+# very large radii ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hand", [1.0, -1.0])
+def test_very_large_radii_of_zone_1_are_pooled_with_straight_track(hand):
+    """R 4000 m, 36.7 m/s, cant 20 mm: 31 mm deficiency; the sections are those of zone 1."""
+    plan = [{"type": "STR", "length": 900.0}, *curve(hand * 4000.0, 600.0)[1:4], STRAIGHT]
+    to_the_right = lambda t, s: np.full((*s.shape, 2), 4e3)  # noqa: E731
+    (found,) = assess(made(track(*plan, cant=hand * 0.02), FAST, Y=to_the_right))
+    (zone,) = (z for z in found.zones if z.zone == "1")
+    assert sorted({v.section.radius for v in zone.values}) == sorted([hand * 4000.0, np.inf])
+    row = rows_of(found, "1", "sum_Y")["wheelset 1"]
+    assert row.estimate.N == len(zone.values) == 3 + 2 + 6
+    assert row.estimate.value == pytest.approx(8e3, rel=1e-6)
+    assert not rows_of(found, "1", "Y_over_Q")
+    assert set(rows_of(found, "1", "Q")) == {f"wheelset {w} {side}" for w in (1, 2, 3, 4)
+                                            for side in ("left", "right")}  # fmt: skip
 
 
 # correction for high friction ---------------------------------------------------------------------
@@ -179,6 +226,20 @@ def test_fault_mode_is_assessed_for_running_safety_only():
     (found,) = assess(run)
     assert {row.criterion.group for z in found.zones for row in z.rows} == {"safety"}
     assert not any(c.name == "number of sections" for c in found.conditions)
+
+
+def test_fault_mode_without_a_section_that_counts_is_no_pass():
+    """At 20 m/s no straight section is one of zone 1: nothing of the fault mode is judged."""
+    fault = vehicle(condition="failed damper", fault=True)
+    whole = made(ON_ZONE_4, 23.0, vehicle=fault)
+    slow = made(track(STRAIGHT), 20.0, vehicle=fault)
+    name = "sections of the fault mode"
+    (found,) = assess({"whole": whole, "slow": slow})
+    assert not any(c.name == name for c in found.conditions)
+    (found,) = assess({"new": made(ON_ZONE_4, 23.0, vehicle=vehicle(condition="new")),
+                       "slow": slow})  # fmt: skip
+    assert condition(found, name, "failed damper").state == "not met"
+    assert any(name in why for why in found.verdicts["safety"].reasons)
 
 
 # conditions of the test ---------------------------------------------------------------------------

@@ -78,6 +78,21 @@ def test_a_constraint_is_reached_and_kept(method, number, near):
     assert 0.08 <= best <= 0.08 + near  # at (0.5, 0.5); over the square it goes up to 0.98
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_evolution_prefers_feasible_designs_to_infeasible_ones_of_lower_objective(seed):
+    """Feasible above 0.9, with objectives of 3.9 to 4; below, of -5 to -1.4."""
+    points = []
+
+    def evaluate(designs):
+        points.extend(designs[:, 0].tolist())
+        x = np.array(points)
+        return Values(np.where(x > 0.9, 3.0 + x, 4.0 * x - 5.0)[:, None], (0.9 - x)[:, None])
+
+    search("differential_evolution", Task(evaluate, 2, 1, 1, 400, 8, seed))
+    # members that are feasible contract on the optimum at the limit
+    assert min(x for x in points if x > 0.9) == pytest.approx(0.9, abs=1e-5)
+
+
 def test_a_search_goes_on_where_designs_have_no_answer():
     def holes(x):
         return np.where(x[:, :1] > 0.8, np.nan, zdt1(x))

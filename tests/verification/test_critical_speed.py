@@ -6,12 +6,16 @@ import pytest
 from dynamics import load_track, load_vehicle
 from selection import points
 
+from railsim.linear.eigenmodes import LossOfStability
 from railsim.linear.modes import modes
+from railsim.linear.vehicle import Contact
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
-from railsim.stability.critical_speed import critical_speed
+from railsim.stability.critical_speed import _by_ramp, critical_speed
 from railsim.stability.diagram import diagram
-from railsim.stability.ramp import ramp
+from railsim.stability.motion import Stretch
+from railsim.stability.ramp import ramp, sustained
+from railsim.stability.result import CriticalSpeed
 
 RIGID = load_track("straight").replace(support={"preset": "rigid"})
 
@@ -43,6 +47,76 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
     assert back[66.0] < THRESHOLD
     lowest = lowest_of(branches)
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
+
+
+def test_diagram_follows_what_hunts_below_its_lowest_speed():
+    """Speeds of the diagram end 3.3 m/s above the fold at 66.69 m/s (N2)."""
+    assert lowest_of(diagram(cooperrider.Rolling(), [70.0, 72.0])).speed == 70.0
+    lowest = lowest_of(diagram(cooperrider.Rolling(), [70.0, 72.0], low=60.0))
+    assert lowest.speed == pytest.approx(66.69, abs=0.15)
+
+
+class Cycles:
+    """Amplitude a and phase of an oscillation, a' = growth(speed) a - 1e5 a^3, of given frequency.
+
+    Its limit cycle is sqrt(growth/1e5) in closed form.
+    """
+
+    def __init__(self, growth, frequency):
+        self.growth, self.frequency = growth, frequency
+
+    def rest(self, speed, amplitude):
+        return np.array([amplitude, 0.0])
+
+    def stretch(self, state, begin, end, duration):
+        step = 0.02
+        rows, (a, phase) = [], state
+        for k in range(round(duration / step)):
+            rows.append(a * np.cos(phase))
+            g = self.growth(begin + (end - begin) * k * step / duration)
+            a *= np.exp(step * (g - 1e5 * a * a))
+            phase += 2.0 * np.pi * self.frequency * step
+        lateral = np.array(rows)[:, None]
+        time = step * np.arange(len(rows))
+        return Stretch(np.array([a, phase]), time, lateral, np.zeros_like(lateral))
+
+
+@pytest.mark.parametrize("phase", np.linspace(0.0, np.pi, 6))
+def test_whether_a_slow_oscillation_lasts_is_decided_by_whole_periods(phase):
+    """0.36 Hz: 2.8 s, of which 1 s shows 0.1 to 0.9 of the amplitude."""
+    dies = Cycles(lambda _: -0.02, 0.36)
+    assert sustained(dies, np.array([2e-3, phase]), 16.0) is None
+    lasts = sustained(Cycles(lambda _: 0.4, 0.36), np.array([1e-3, phase]), 16.0)
+    assert lasts.amplitude == pytest.approx(2e-3, rel=0.02)
+
+
+def test_a_ramp_goes_on_where_rest_is_unstable_below_the_speed_at_which_it_dies():
+    """Unstable above 60 m/s and from 17 to 30 m/s: the slowest hunting is that near 17 m/s."""
+
+    def growth(speed):
+        return max(0.2 * (speed - 60.0), 0.5 - (speed - 23.5) ** 2 / 84.5)
+
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=70.0)
+    begins = LossOfStability(17.0, False, ())
+    _by_ramp(found, Cycles(growth, 5.0), begins, (1e-3, 3e-3), lambda _: None)
+    assert found.nonlinear["ramp"].speed == pytest.approx(17.0, abs=0.5)
+    assert [branch.direction for branch in found.branches] == ["ramp", "ramp"]
+
+
+def test_where_rest_is_unstable_from_the_start_the_type_is_not_known():
+    """The bifurcation lies below the range: its kind cannot be seen."""
+    found = critical_speed(
+        load_vehicle("coach_flexicoil"),
+        RIGID,
+        methods=("ramp",),
+        low=80.0,
+        high=80.5,
+        over_amplitude=False,
+    )
+    assert found.unstable_at_low
+    assert found.lowest is not None
+    assert (found.type, found.verdict()) == ("", "")
+    assert "unstable at its lower end" in str(found.table())
 
 
 @pytest.mark.slow

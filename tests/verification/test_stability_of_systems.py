@@ -84,6 +84,28 @@ def test_a_range_without_loss_of_stability_says_so(low, high, parameter, already
     assert len(growth) == (1 if already else 2)
 
 
+@pytest.mark.parametrize(("peak", "half"), [(18.6, 2.1), (18.0, 0.3), (67.3, 0.5), (111.0, 0.4)])
+@pytest.mark.parametrize(("low", "high"), [(5.0, 120.0), (10.0, 115.0), (2.0, 120.0)])
+def test_a_narrow_range_of_instability_is_found_wherever_the_search_begins(peak, half, low, high):
+    """An oscillator of 1 Hz whose growth is a parabola: positive over a few m/s about its peak."""
+
+    def oscillator(growth):
+        matrix = np.array([[growth, 2.0 * np.pi], [-2.0 * np.pi, growth]])
+        return lambda speed: Linearisation(("x", "y"), matrix, np.zeros(2), speed)
+
+    def unstable(speed):
+        return oscillator(0.015 * (1.0 - ((speed - peak) / half) ** 2))(speed)
+
+    lost = loss_of_stability(unstable, low, high)
+    assert lost.parameter == pytest.approx(peak - half, abs=1e-4)
+    assert not lost.already
+
+    def stable(speed):
+        return oscillator(-1e-5 - 0.015 * ((speed - peak) / half) ** 2)(speed)
+
+    assert loss_of_stability(stable, low, high).parameter is None
+
+
 @pytest.mark.parametrize(("speed", "millimetres"), [(75.0, 11.155), (70.0, 10.185), (68.0, 9.735)])
 def test_limit_cycle_of_cooperriders_bogie(birth, motions, speed, millimetres):
     """N1: amplitude of the leading wheelset, computed independently; 0.5 %."""
