@@ -103,9 +103,9 @@ class WheelSafety:
 
     `limit`: Nadal's limit of Y/Q for the flange angle of the profile and the friction of the rail,
     where Y/Q comes nearest to it [1]. `Y_over_Q`: Derailment quotient there, unfiltered: the
-    largest where the friction does not vary [1]; nan where the wheel was without load.
-    `climb_distance`, `climb_begin`, `rise`: Longest distance above the limit, position of its
-    beginning, rise of the wheel on it [m].
+    largest where the friction does not vary [1]; nan where the wheel never carried load. `lifted`:
+    Whether it was without load, where Y/Q has no value. `climb_distance`, `climb_begin`, `rise`:
+    Longest distance above the limit, position of its beginning, rise of the wheel on it [m].
     """
 
     place: str  # wheelset, from 1, and side
@@ -114,6 +114,7 @@ class WheelSafety:
     climb_distance: float
     climb_begin: float
     rise: float
+    lifted: bool
 
 
 @dataclass(frozen=True)
@@ -148,13 +149,16 @@ def safety_report(record: Record) -> SafetyReport:
             angle = flange_angle(result.profiles[wheelset.profile[k]])
             limit = nadal(angle, track.friction_at(s[:, w])[:, k])
             climb = climb_distance(s[:, w], quotient[:, w, k], limit, _height(record, w, k))
-            nearest = int(np.argmax(quotient[:, w, k] / limit))  # nan where the wheel was lifted
+            unloaded = np.isnan(quotient[:, w, k])
+            nearest = int(np.argmax(np.where(unloaded, -np.inf, quotient[:, w, k] / limit)))
             there = float(limit[nearest]), float(quotient[nearest, w, k])
-            own = f"wheelset {w + 1} {side}", *there
-            wheels.append(WheelSafety(*own, climb.length, climb.begin, climb.rise))
+            own = f"wheelset {w + 1} {side}", *there, climb.length, climb.begin, climb.rise
+            wheels.append(WheelSafety(*own, bool(unloaded.any())))
     Q = result["Q"]
     tilt = {name: np.abs(overturning(Q[:, own])) for name, own in record.bogies.items()}
-    return SafetyReport(tuple(wheels), {name: float(np.max(x)) for name, x in tilt.items()})
+    # a bogie without any load has no coefficient
+    most = {name: float(np.max(x, where=~np.isnan(x), initial=0.0)) for name, x in tilt.items()}
+    return SafetyReport(tuple(wheels), most)
 
 
 def _height(record: Record, w: int, side: int) -> np.ndarray:

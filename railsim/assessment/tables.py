@@ -100,11 +100,9 @@ def _safety(run: str, report: SafetyReport) -> list[Table]:
         Column("place", run), Column("limit", "Nadal", format=".3f"),
         Column("Y_over_Q", "largest Y/Q", format=".3f"),
         Column("climb_distance", "climb", "m", ".2f"), Column("rise", unit="mm", format=".2f"),
+        Column("lifted", "off its rail"),
     ]  # fmt: skip
-    rows = [
-        vars(w) | ({} if w.Y_over_Q == w.Y_over_Q else {"Y_over_Q": "lifted"})
-        for w in report.wheels
-    ]
+    rows = [vars(w) | {"lifted": "yes" if w.lifted else ""} for w in report.wheels]
     bogies = [Column("bogie"), Column("overturning", format=".3f")]
     return [Table(wheels, rows), Table(bogies, list(report.overturning.items()))]
 

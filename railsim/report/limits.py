@@ -1,6 +1,7 @@
 """Tables of the values of runs with the limits of standards and the meaning of each limit."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,7 +15,7 @@ from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
-from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table
+from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, listed
 from railsim.result import Result
 from railsim.result.sensors import sensors
 from railsim.text import printable
@@ -49,6 +50,7 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Sect
         found.details.append(remark_table([words]))
         return verdicts, found
     running, remarks = _assessed(runs, "en14363")
+    running = _told_apart(running)
     derailment, more = _assessed(runs, "safety")
     for one in running:
         parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
@@ -86,6 +88,17 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
         except InputError as error:
             remarks += [f"{standard}: {fault}" for fault in error.faults]
     return found, [*remarks, *(remark for one in found for remark in one.remarks)]
+
+
+def _told_apart(assessments: Sequence[Assessment]) -> list[Assessment]:
+    """Assessments of vehicles of one name, which differ in their files, with their runs' names."""
+    count = Counter(one.vehicle for one in assessments)
+    return [
+        replace(one, vehicle=f"{one.vehicle} ({listed(one.runs)})")
+        if count[one.vehicle] > 1
+        else one
+        for one in assessments
+    ]
 
 
 def _reasons(one: Assessment) -> Table:
@@ -303,12 +316,12 @@ def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
     rows: list[Sequence[Cell]] = []
     failed, above = [], []
     for run, report in [pair for one in found for pair in one.safety.items()]:
-        # a wheel that has lifted has no quotient
+        # a wheel that never carried load has no quotient
         shares = [
             -math.inf if math.isnan(w.Y_over_Q) else w.Y_over_Q / w.limit for w in report.wheels
         ]
         worst = report.wheels[shares.index(max(shares))]
-        lifted = ", ".join(w.place for w in report.wheels if math.isnan(w.Y_over_Q)) or "none"
+        lifted = ", ".join(w.place for w in report.wheels if w.lifted) or "none"
         share = worst.Y_over_Q / worst.limit
         if share > 1.0:
             failed.append(len(rows))
