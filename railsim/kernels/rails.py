@@ -164,19 +164,20 @@ def predict_rate_changes(system, work, w, state):
 
 
 @compiled(inline=True)
-def against_rails(plane, rail_base, w, y, z, roll, left_y, left_z, right_y, right_z):
+def against_rails(plane, rail_base, w, y, z, roll, yaw, left_y, left_z, right_y, right_z):
     """Lateral displacement and roll of wheelset `w` against its irregular, deflected rails.
 
     The displacement is that of the wheelset's centre from the middle of the rails, along the line
-    over their tops; the roll is that against this line.
+    over their tops; the roll is that against this line, which a yawed axle on sloping rails is not
+    at right angles to.
 
     Parameters
     ----------
     plane : float64[w, PLANE_SIZE]
     rail_base : float
         See `TrackTables` [m].
-    y, z, roll : float
-        Centre of the wheelset in the track frame, z from the rail tops [m], and its roll [rad].
+    y, z, roll, yaw : float
+        Centre of the wheelset in the track frame, z from the rail tops [m]; roll and yaw [rad].
     left_y, left_z, right_y, right_z : float
         What the rails yield, in the axes of their plane [m].
     """
@@ -186,7 +187,7 @@ def against_rails(plane, rail_base, w, y, z, roll, left_y, left_z, right_y, righ
     lean = (right_z - left_z) / rail_base
     across = cosine * y + sine * z - 0.5 * (left_y + right_y)
     up = cosine * z - sine * y - 0.5 * (left_z + right_z)
-    return across + lean * up, roll - plane[w, ROLL] - lean
+    return across + lean * up, roll - plane[w, ROLL] + plane[w, SLOPE_Z] * yaw - lean
 
 
 @compiled(in_loop=False)
@@ -224,7 +225,8 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
                 yielded = states[i, first + size * w : first + size * w + 4]
             b = 6 * body[w]
             y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
+            yaw = states[i, b + 5]
             left_y, left_z, right_y, right_z = yielded[0], yielded[1], yielded[2], yielded[3]
             found[i, w, 0], found[i, w, 1] = against_rails(
-                plane, track.rail_base, w, y, z, roll, left_y, left_z, right_y, right_z
+                plane, track.rail_base, w, y, z, roll, yaw, left_y, left_z, right_y, right_z
             )
