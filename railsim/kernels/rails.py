@@ -164,7 +164,7 @@ def predict_rate_changes(system, work, w, state):
 
 
 @compiled(inline=True)
-def against_rails(plane, rail_base, w, y, z, roll, yaw, left_y, left_z, right_y, right_z):
+def against_rails(plane, rail_base, w, y, z, roll, yaw, yielded):
     """Lateral displacement and roll of wheelset `w` against its irregular, deflected rails.
 
     The displacement is that of the wheelset's centre from the middle of the rails, along the line
@@ -178,9 +178,10 @@ def against_rails(plane, rail_base, w, y, z, roll, yaw, left_y, left_z, right_y,
         See `TrackTables` [m].
     y, z, roll, yaw : float
         Centre of the wheelset in the track frame, z from the rail tops [m]; roll and yaw [rad].
-    left_y, left_z, right_y, right_z : float
-        What the rails yield, in the axes of their plane [m].
+    yielded : four floats
+        y and z by which the left and the right rail yield, in the axes of their plane [m].
     """
+    left_y, left_z, right_y, right_z = yielded
     sine, cosine = plane[w, SINE], plane[w, COSINE]
     y -= plane[w, MIDDLE_Y]
     z -= plane[w, MIDDLE_Z]
@@ -210,7 +211,7 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
     found : float64[time, w, 2]
         Lateral displacement [m] and roll [rad] (output).
     """
-    yielded = np.zeros(4)
+    yielded = 0.0, 0.0, 0.0, 0.0
     n = body.shape[0]
     cell, cell_u = np.zeros(n, dtype=np.int64), np.zeros(n)
     for i in range(states.shape[0]):
@@ -222,11 +223,11 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
             locate_in_cells(track, cell, cell_u, plane, rail)
         for w in range(n):
             if size > 0:
-                yielded = states[i, first + size * w : first + size * w + 4]
+                k = first + size * w
+                yielded = states[i, k], states[i, k + 1], states[i, k + 2], states[i, k + 3]
             b = 6 * body[w]
             y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
             yaw = states[i, b + 5]
-            left_y, left_z, right_y, right_z = yielded[0], yielded[1], yielded[2], yielded[3]
             found[i, w, 0], found[i, w, 1] = against_rails(
-                plane, track.rail_base, w, y, z, roll, yaw, left_y, left_z, right_y, right_z
+                plane, track.rail_base, w, y, z, roll, yaw, yielded
             )
