@@ -16,7 +16,7 @@ continuously differentiable) and are interpolated linearly in w, whose nodes lie
 where vehicles run, and continued linearly beyond the last of them.  The contact force is the
 gradient of U = 2/5 K e^(5/2) + 1/3 K2 e^3 *through this spline*, hence conservative by
 construction, whatever the table holds.  Only the first four fields, those of the force, have
-gradients.
+gradients.  What has to stay above zero is continued no further than `continue_limited` lets it.
 
 The first axis of the grid is s = y - shear * roll, the lateral displacement of the wheel's foot,
 see `railsim.contact.table`.
@@ -29,6 +29,7 @@ import numba
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.contact_table_simd import sum_of_nodes
 from railsim.kernels.record import record
 
@@ -65,6 +66,9 @@ MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
 SETTLED = 1e-8
 FURTHEST_W = 2.0  # over the last node of w: as far is the table continued
+# of stiffness and width of a patch at the last node of w, as far as they are continued; root of the
+# penetration at which that is judged (m^0.5)
+LEAST_SHARE, JUDGED_AT = 0.5, 0.01
 
 
 @record
@@ -206,6 +210,43 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, offset):
 _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_nodes
 
 
+@compiled(inline=True)
+def allowed_part(there, here):
+    """Part of the way from a value at the last node to its continuation that is gone."""
+    least = LEAST_SHARE * there
+    return 1.0 if here >= least else (there - least) / (there - here)
+
+
+@compiled(python=False)
+def continue_limited(values, start, row, slab, weights, tw, out, first):
+    """Do what `_sum_of_nodes` does, beyond the last node of w.
+
+    A flange that is yawed comes to touch far ahead, where stiffness and width of its patch fall
+    fast: along a straight line they would become negative, and the forces no numbers.  They go no
+    further than to a share of what they are at the last node.
+    """
+    _sum_of_nodes(values, start, row, slab, weights, 1.0, out, first)
+    k, k_y, k_roll = out[first + K], out[first + K_Y], out[first + K_ROLL]
+    k2, k2_y, k2_roll = out[first + K2], out[first + K2_Y], out[first + K2_ROLL]
+    a1, b1, d_b1 = out[first + A1], out[first + B1], out[first + D_B1]
+    _sum_of_nodes(values, start, row, slab, weights, tw, out, first)
+    part = allowed_part(k + JUDGED_AT * k2, out[first + K] + JUDGED_AT * out[first + K2])
+    if part < 1.0:
+        out[first + K] = k + part * (out[first + K] - k)
+        out[first + K_Y] = k_y + part * (out[first + K_Y] - k_y)
+        out[first + K_ROLL] = k_roll + part * (out[first + K_ROLL] - k_roll)
+        out[first + K2] = k2 + part * (out[first + K2] - k2)
+        out[first + K2_Y] = k2_y + part * (out[first + K2_Y] - k2_y)
+        out[first + K2_ROLL] = k2_roll + part * (out[first + K2_ROLL] - k2_roll)
+        out[first + K_W] = out[first + K2_W] = 0.0
+    narrowest = min(out[first + B1], out[first + B1] + out[first + D_B1])
+    part = allowed_part(min(b1, b1 + d_b1), narrowest)
+    if part < 1.0:
+        out[first + A1] = a1 + part * (out[first + A1] - a1)
+        out[first + B1] = b1 + part * (out[first + B1] - b1)
+        out[first + D_B1] = d_b1 + part * (out[first + D_B1] - d_b1)
+
+
 @compiled
 def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     """Fields of one patch and their gradients into ``out[first:first + LOOK_UP_SIZE]``.
@@ -216,7 +257,11 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     row = shape[4] * N_FIELD
     slab = shape[3] * row
     start = ((table * N_PATCH + patch) * shape[2] + iw) * slab + (ir - 1) * row
-    _sum_of_nodes(contact.values, start + (iy - 1) * N_FIELD, row, slab, weights, tw, out, first)
+    start += (iy - 1) * N_FIELD
+    if rarely(tw > 1.0):
+        continue_limited(contact.values, start, row, slab, weights, tw, out, first)
+    else:
+        _sum_of_nodes(contact.values, start, row, slab, weights, tw, out, first)
     shear = contact.shear[table]
     out[first + G_ROLL] -= shear * out[first + G_Y]
     out[first + K_ROLL] -= shear * out[first + K_Y]

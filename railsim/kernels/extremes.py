@@ -65,16 +65,17 @@ def note_extremes(system, work, state):
         left, right = present[X_Y], present[X_Y_RIGHT]
         present[X_SUM_Y] = left + right
         present[X_SUM_ABS_Y] = abs(left) + abs(right)
-        left_y, left_z, right_y, right_z = 0.0, 0.0, 0.0, 0.0
+        yielded = 0.0, 0.0, 0.0, 0.0
         if system.support.elastic:
             i = rails + SUPPORT_SIZE * w
-            left_y, left_z, right_y, right_z = state[i], state[i + 1], state[i + 2], state[i + 3]
+            yielded = state[i], state[i + 1], state[i + 2], state[i + 3]
         height = system.bodies.row[body[w], Z_0]
         y, z, roll = state[b + 1], state[b + 2] + height, state[b + 3]
+        yaw = state[b + 5]
         present[X_LATERAL], present[X_ROLL] = against_rails(
-            plane, system.track.rail_base, w, y, z, roll, left_y, left_z, right_y, right_z
+            plane, system.track.rail_base, w, y, z, roll, yaw, yielded
         )
-        present[X_YAW] = state[b + 5]
+        present[X_YAW] = yaw
         high, low = EXTREMES * (MAX * body.shape[0] + w), EXTREMES * (MIN * body.shape[0] + w)
         beyond = spread(0.0)
         for first in range(0, EXTREMES, LANES):

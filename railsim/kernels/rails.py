@@ -164,29 +164,31 @@ def predict_rate_changes(system, work, w, state):
 
 
 @compiled(inline=True)
-def against_rails(plane, rail_base, w, y, z, roll, left_y, left_z, right_y, right_z):
+def against_rails(plane, rail_base, w, y, z, roll, yaw, yielded):
     """Lateral displacement and roll of wheelset `w` against its irregular, deflected rails.
 
     The displacement is that of the wheelset's centre from the middle of the rails, along the line
-    over their tops; the roll is that against this line.
+    over their tops; the roll is that against this line, which a yawed axle on sloping rails is not
+    at right angles to.
 
     Parameters
     ----------
     plane : float64[w, PLANE_SIZE]
     rail_base : float
         See `TrackTables` [m].
-    y, z, roll : float
-        Centre of the wheelset in the track frame, z from the rail tops [m], and its roll [rad].
-    left_y, left_z, right_y, right_z : float
-        What the rails yield, in the axes of their plane [m].
+    y, z, roll, yaw : float
+        Centre of the wheelset in the track frame, z from the rail tops [m]; roll and yaw [rad].
+    yielded : four floats
+        y and z by which the left and the right rail yield, in the axes of their plane [m].
     """
+    left_y, left_z, right_y, right_z = yielded
     sine, cosine = plane[w, SINE], plane[w, COSINE]
     y -= plane[w, MIDDLE_Y]
     z -= plane[w, MIDDLE_Z]
     lean = (right_z - left_z) / rail_base
     across = cosine * y + sine * z - 0.5 * (left_y + right_y)
     up = cosine * z - sine * y - 0.5 * (left_z + right_z)
-    return across + lean * up, roll - plane[w, ROLL] - lean
+    return across + lean * up, roll - plane[w, ROLL] + plane[w, SLOPE_Z] * yaw - lean
 
 
 @compiled(in_loop=False)
@@ -209,7 +211,7 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
     found : float64[time, w, 2]
         Lateral displacement [m] and roll [rad] (output).
     """
-    yielded = np.zeros(4)
+    yielded = 0.0, 0.0, 0.0, 0.0
     n = body.shape[0]
     cell, cell_u = np.zeros(n, dtype=np.int64), np.zeros(n)
     for i in range(states.shape[0]):
@@ -221,10 +223,11 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
             locate_in_cells(track, cell, cell_u, plane, rail)
         for w in range(n):
             if size > 0:
-                yielded = states[i, first + size * w : first + size * w + 4]
+                k = first + size * w
+                yielded = states[i, k], states[i, k + 1], states[i, k + 2], states[i, k + 3]
             b = 6 * body[w]
             y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
-            left_y, left_z, right_y, right_z = yielded[0], yielded[1], yielded[2], yielded[3]
+            yaw = states[i, b + 5]
             found[i, w, 0], found[i, w, 1] = against_rails(
-                plane, track.rail_base, w, y, z, roll, left_y, left_z, right_y, right_z
+                plane, track.rail_base, w, y, z, roll, yaw, yielded
             )

@@ -389,7 +389,7 @@ def patch_contact(system, work, w, side, patch, wheel, n):
     work.force_rate[w] = max(work.force_rate[w], soon)
     if p > 0.0:
         root = sqrt(p)
-        c_y, c_z, a1, b1, tangent = under_load(t, k, elastic)
+        c_y, c_z, a1, b1, tangent = under_load(t, k, max(elastic, 0.0))
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)

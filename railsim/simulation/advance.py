@@ -387,7 +387,7 @@ class Convoy:
         if not self._evaluation_begins():
             return
         for run, part in zip(self._runs, self.ensemble.parts, strict=True):
-            _take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
+            take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
         self.work.extremes[:] = no_extremes(self.work.extremes.shape[1])
         self.evaluates = True
 
@@ -474,9 +474,9 @@ class Convoy:
             run.state = self.state[part.state]
             run.fresh, run.due = self.fresh, self.due
             run.events += self.work.events[part.wheelsets][:, [0, 1, 4]].sum(axis=0)
-            _take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
+            take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
             if self.evaluates:
-                _take_extremes(run.evaluated, self.work.extremes[:, part.wheelsets])
+                take_extremes(run.evaluated, self.work.extremes[:, part.wheelsets])
             run.unloaded += self.work.unloaded[part.wheelsets]
             run.parts += self.work.parts
             run.again += int(self.work.events[part.wheelsets, AGAIN].sum())
@@ -484,7 +484,7 @@ class Convoy:
             run.memory = self.work.memory.copy()
 
 
-def _take_extremes(before: Floats, later: Floats) -> None:
+def take_extremes(before: Floats, later: Floats) -> None:
     """Take the extremes of a later part of a run into those of all before it."""
     for row, beyond in ((MAX, later[MAX] > before[MAX]), (MIN, later[MIN] < before[MIN])):
         before[row : row + 3][:, beyond] = later[row : row + 3][:, beyond]

@@ -7,6 +7,8 @@ from railsim.simulation.conditions import Inputs
 
 Progress = Callable[[float], None]
 
+NOTHING = 1e-12  # part of a run that is no more than the round-off of its time
+
 
 class RunProgress:
     """The finished fraction of runs and of what comes before them, by simulated time.
@@ -58,7 +60,8 @@ class RunProgress:
         self._on_their_way = True
         before = self._before + self._judged + self._run_in
         runs = self._number * self._length
-        self._tell(1.0 - (1.0 - fraction) * runs / (before + runs))
+        left = 1.0 - fraction if 1.0 - fraction > NOTHING else 0.0
+        self._tell(1.0 - left * runs / (before + runs))
 
     def _tell(self, fraction: float) -> None:
         # a preparation that has to be longer than expected takes nothing back

@@ -121,12 +121,11 @@ class StepChoice:
                     ]
                 )
             requested = interval / count
-        stability = self._stability(self._model, speed, self._states.get(speed))
-        if stability.holds(requested):
+        if self._stability(self._model, speed, self._states.get(speed)).holds(requested):
             return requested
-        stable = stability.choose(interval)
+        stable = self._stable(speed, interval)  # taken where none is given
         # a step is too long or not: growth at a shorter one comes from differences across a kink
-        if requested < stable:
+        if requested <= stable:
             return requested
         raise InputError(
             [

@@ -8,6 +8,7 @@ bits, or where a command has come in between goes on with what is left of it.
 import math
 import time
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
@@ -33,7 +34,7 @@ from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
 from railsim.profiles import Profile
 from railsim.result import Hdf5Sink, MemorySink, Result, Sink
-from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, Convoy, SavedState
+from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, Convoy, SavedState, take_extremes
 from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.conditions import Inputs, check_numbers, own_speed, state_before
 from railsim.simulation.ending import end, verdict
@@ -154,12 +155,20 @@ class Simulation:
     @property
     def status(self) -> str:
         """How the run stands: ``running``, or the status of its result."""
-        return "running" if self.running else verdict(self._run)["status"]
+        return "running" if self.running else self._verdict()["status"]
 
     @property
     def status_reason(self) -> str:
         """Why the run has ended; empty while it goes on."""
-        return "" if self.running else verdict(self._run)["status_reason"]
+        return "" if self.running else self._verdict()["status_reason"]
+
+    def _verdict(self) -> dict[str, str]:
+        """How the run has ended: by its extremes so far, which a state of before takes back."""
+        run = copy(self._run)
+        run.extremes = run.extremes.copy()
+        if self._closed is None:
+            take_extremes(run.extremes, self._convoy.work.extremes)
+        return verdict(run)
 
     @property
     def actuators(self) -> tuple[str, ...]:

@@ -57,3 +57,20 @@ def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one
     assert step(1.66667e-3) == 5e-3 / 3  # as it is printed
     with pytest.raises(InputError, match=r"0\.0025 s, unstable at 20 m/s; at most 0\.00166667 s"):
         step(2.5e-3)
+
+
+def test_given_step_that_is_no_longer_than_the_one_taken_without_it_is_not_refused(monkeypatch):
+    """The default is judged for a class of runs, whose state in the flange has no kink nearby."""
+    monkeypatch.setattr(step_choice.StepChoice, "_in_class", lambda *_: True)
+    monkeypatch.setattr(step_choice.Stability, "holds", lambda *_: False)
+    vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
+
+    def step(given):
+        settings = Settings(step=given)
+        return prepare(vehicle, track, settings, 20.0, duration=1.0).steps.at(20.0)[0]
+
+    usual = step(None)
+    assert step(usual) == usual
+    assert step(0.5 * usual) == 0.5 * usual
+    with pytest.raises(InputError, match=f"at most {usual:g} s"):
+        step(1.5 * usual)

@@ -15,6 +15,19 @@ from selection import points
 from railsim import simulate
 from railsim.contact import build_contact_table
 from railsim.contact.table import TableGrid
+from railsim.definitions.settings import Settings
+from railsim.kernels.contact_table import (
+    B1,
+    D_B1,
+    FURTHEST_W,
+    K2,
+    LOOK_UP_SIZE,
+    N_PATCH,
+    N_WEIGHT,
+    K,
+    cell_weights,
+    look_up,
+)
 from railsim.model import assembly
 
 VEHICLES = ("coach_manchester", "coach_flexicoil", "benchmark_vehicle1")
@@ -71,6 +84,36 @@ def test_smooth_and_sharp_ramps_below_60_mrad_have_no_remark():
     )
     assert result.status == "complete"
     assert not any("contact table" in remark for remark in result.remarks)
+
+
+def looked_up_beyond(contact, shares):
+    """Stiffness at 0.1 mm and least width of all patches, at shares of the table's yaw squared.
+
+    Shape (share, y, patch), over the range of y at no roll.
+    """
+    _, _, n_w, n_roll, n_y, _ = contact.values.shape
+    weights, out = np.empty(N_WEIGHT), np.empty(LOOK_UP_SIZE)
+    stiffness, width = np.empty((2, len(shares), n_y - 3, N_PATCH))
+    cell_weights(contact, 0.5, 0.0, 1.0, weights)
+    for i, share in enumerate(shares):
+        tw = 1.0 + (share - 1.0) * contact.w[-1] / (contact.w[-1] - contact.w[-2])
+        for j in range(n_y - 3):
+            for patch in range(N_PATCH):
+                look_up(contact, 0, patch, j + 1, n_roll // 2, n_w - 2, tw, weights, out)
+                stiffness[i, j, patch] = out[K] + 0.01 * out[K2]
+                width[i, j, patch] = min(out[B1], out[B1] + out[D_B1])
+    return stiffness, width
+
+
+def test_patches_keep_stiffness_and_width_as_far_as_the_table_is_continued():
+    """A straight line takes those of a yawed flange below zero: the run ended as not finite."""
+    vehicle, track = load_vehicle("coach_manchester"), load_any_track("straight")
+    model = assembly.assemble(vehicle, track, Settings())
+    stiffness, width = looked_up_beyond(model.system.contact, [1.0, 1.2, 1.56, FURTHEST_W])
+    exists = (stiffness[0] > 0.0) & (width[0] > 0.0)
+    assert exists.any(axis=1).all()
+    assert np.all(stiffness[:, exists] > 0.0)
+    assert np.all(width[:, exists] > 0.0)
 
 
 @pytest.mark.further

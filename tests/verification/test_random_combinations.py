@@ -1,9 +1,14 @@
 """Vehicle, track, speed, friction, profile and support at random: at half the step, and mirrored.
 
 A seed is a run of some two seconds.  Half the step gives the same status and the same peaks of Q, Y
-and sum of Y within 2 % or 0.5 % of Q0; where wheel loads vibrate by themselves, or wheels lift, the
-instants of their peaks are left to chance, and root mean squares are compared.  The mirrored
-vehicle on the mirrored track gives mirrored forces within 0.01 N.
+and sum of Y within 2 % or 0.5 % of Q0; where wheel loads vibrate by themselves, wheels lift, or
+rails have kinks that are met somewhere within a step, peaks are left to chance, and root mean
+squares are compared.
+
+The mirrored vehicle on the mirrored track, set to the mirror image of the other one's state at the
+end of each step, gives mirrored forces within 1e-6 N in each.  Left to themselves both runs differ
+by what becomes of round-off and of what their balances at the start leave: up to 200 N at single
+outputs where a flange runs at two patches of an elastic rail (see docs/decisions.md).
 
 Seeds are kept.  The further ones also draw other vehicles, rails at 1:20, hollow wheels and the
 lateral ramp of the Manchester benchmarks.
@@ -14,6 +19,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mirrored_state import image
 from test_lateral_ramp import ramp
 
 import railsim
@@ -24,7 +30,8 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.settings import Settings
 
 SEEDS, MORE = 20, 300
-ALWAYS = 8  # that run each time
+# that run each time; 138, 143: a flange meets the lateral ramp, the former leaves its rail there
+ALWAYS = (*range(8), 138, 143)
 # Vehicle and speed up to which it is run [m/s].  The first seeds draw from the first four, whose
 # step is soon found, on rails at 1:40: their contact tables are those of other tests.
 VEHICLES = (
@@ -39,14 +46,27 @@ VEHICLES = (
 QUICK = 4
 SUPPORTS = ("rigid", "co-running", "ballasted")
 RADII = (190.0, 250.0, 350.0, 500.0, 800.0, 2000.0, np.inf)
-# Seeds that fail, of the first 20 and of some 40 further ones; they are run all the same.
-KNOWN = {121: "hollow wheels over a kink on rigid rails: 0.7 N between the sides, of 69 kN"}
+# Seeds that fail; they are run all the same.
+KNOWN = {
+    258: "a flange strikes a rigid rail: peak of Y 30.6 kN, 29.8 at half the step, 29.4 by RK4"
+}
+# A flange strikes the ramp's kink on rigid rails with 35 to 111 times the static wheel load, and
+# where the wheelset then goes hangs on the step: by RK4 at 1/8000, 1/16000 and 1/32000 s the root
+# mean square of Q - Q0 of seed 30 is 68, 53 and 58 kN, and seed 65 ends at the first of them; of
+# seed 73 it is 20, 11, 16 and 19 kN at 1/1000, 1/2000, 1/4000 and 1/8000 s.  Remarks say so.
+OPEN = (30, 65, 73)
+TOO_LONG = "the step is too long there"
+BEYOND = "beyond all experience"
 RAMP = ramp(0.5, begin=14.0).irregularities[0]  # track case 4 of the benchmarks
 DEFICIENCY = 0.13  # m, of cant, at the greatest speed in a curve
 CANT_BASE = 1.5
 GRAVITY = 9.81
 # by themselves: instants of peaks are left to chance
 LIVELY = ("vibrate", "hunt", "lifts off")
+# round-off of mirrored forces after one step: of positions times stiffness [N], and of a strike
+AS_MIRRORED = {"atol": 1e-6, "rtol": 1e-10}
+# m and rad, between two balances, each of which leaves 1e-7 m/s2: over the square of 2 pi 0.5 Hz
+FROM_BALANCE = 2e-8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,19 +78,25 @@ class Case:
     speed: float
     profiles: dict[str, railsim.Profile] = dataclasses.field(default_factory=dict)
 
-    def run(self, mirror=False, **settings):
+    def run(self, **settings):
         """Result of some two seconds."""
+        return railsim.simulate(load_vehicle(self.vehicle), self.track, **self.arguments(settings))
+
+    def beside_its_image(self, step):
+        """The same run, taken step by step, and the one of the mirrored vehicle and track."""
         vehicle, track = load_vehicle(self.vehicle), self.track
-        if mirror:
-            vehicle, track = mirrored_vehicle(vehicle), mirrored_track(track)
-        return railsim.simulate(
-            vehicle,
-            track,
-            speed=self.speed,
-            duration=2.0,
-            settings=Settings(**settings),
-            profiles=self.profiles,
-        )
+        arguments = {**self.arguments({"step": step}), "record": False}
+        images = mirrored_vehicle(vehicle), mirrored_track(track)
+        return [railsim.Simulation(*each, **arguments) for each in ((vehicle, track), images)]
+
+    def arguments(self, settings):
+        """Arguments of a run but for vehicle and track."""
+        return {
+            "speed": self.speed,
+            "duration": 2.0,
+            "settings": Settings(**settings),
+            "profiles": self.profiles,
+        }
 
 
 @cache
@@ -130,16 +156,45 @@ def check(seed):
     case = drawn(seed)
     result = case.run()
     half = case.run(step=0.5 * result.attributes["step"])
+    if seed in OPEN:
+        for each in (result, half):
+            assert any(BEYOND in remark for remark in each.remarks)
+            assert any(TOO_LONG in remark for remark in each.remarks)
+    else:
+        check_at_half_the_step(case, result, half)
+    check_mirrored(case, result)
+
+
+def check_at_half_the_step(case, result, half):
     assert half.status == result.status
     Q0 = float(result.Q0.mean())
     lively = any(word in remark for remark in result.remarks for word in LIVELY)
-    measure = deviations if lively else peaks
+    measure = deviations if lively or RAMP in case.track.irregularities else peaks
     now, then = measure(result), measure(half)
     assert np.all(np.abs(now - then) <= np.maximum(0.02 * then, 0.005 * Q0)), (now, then)
-    mirrored = case.run(mirror=True, step=result.attributes["step"])
-    assert mirrored.status == result.status
-    np.testing.assert_allclose(mirrored.Q[..., ::-1], result.Q, atol=0.01, rtol=0.0)
-    np.testing.assert_allclose(-mirrored.Y[..., ::-1], result.Y, atol=0.01, rtol=0.0)
+
+
+def check_mirrored(case, result):
+    """Each step from a state and from its mirror image gives forces that are mirror images."""
+    run, mirrored = case.beside_its_image(result.attributes["step"])
+    order, signs = image(run._convoy.system, mirrored._convoy.system)
+    begun = signs * run.state.motion[order] - mirrored.state.motion
+    positions = 6 * len(run._convoy.system.bodies.kind)
+    assert np.abs(begun[:positions]).max() < FROM_BALANCE
+    steps, goes_on = 0, True
+    while goes_on:
+        motion = signs * run.state.motion[order]
+        mirrored.state = dataclasses.replace(mirrored.state, motion=motion)
+        goes_on = run.step()
+        assert mirrored.step() == goes_on
+        (Q, Y), (Q_m, Y_m) = (
+            np.moveaxis(each._convoy.work.wheel[..., :2], -1, 0) for each in (run, mirrored)
+        )
+        np.testing.assert_allclose(Q_m[:, ::-1], Q, **AS_MIRRORED)
+        np.testing.assert_allclose(-Y_m[:, ::-1], Y, **AS_MIRRORED)
+        steps += 1
+    assert run.status == mirrored.status == result.status
+    assert steps > 10
 
 
 def seeds(numbers):
@@ -150,7 +205,7 @@ def seeds(numbers):
     ]
 
 
-@pytest.mark.parametrize("seed", seeds(range(ALWAYS)))
+@pytest.mark.parametrize("seed", seeds(ALWAYS))
 def test_random_combination(seed):
     check(seed)
 
@@ -166,6 +221,6 @@ def test_a_step_that_is_too_long_is_remarked_upon():
 
 
 @pytest.mark.further
-@pytest.mark.parametrize("seed", seeds(range(ALWAYS, SEEDS + MORE)))
+@pytest.mark.parametrize("seed", seeds(k for k in range(SEEDS + MORE) if k not in ALWAYS))
 def test_further_random_combination(seed):
     check(seed)
