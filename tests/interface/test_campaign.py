@@ -119,8 +119,8 @@ def test_fault_modes_change_the_vehicle_and_load_cases_that_are_unknown_are_left
 def test_no_two_conditions_share_a_seed_of_a_part_that_is_repeated_often(tmp_path):
     """One to two sections a run of 25 needed: more than ten seeds for each condition."""
     scenario = tmp_path / "often.toml"
-    often = SMALL.replace("560.0", "400.0").replace("[parts", "[conditions.a]\n[conditions.b]\n[parts")
-    scenario.write_text(often.replace("single = true", "single = true\nto_standard = true"))
+    head = "single = true\nto_standard = true\n[conditions.a]\n[conditions.b]"
+    scenario.write_text(SMALL.replace("560.0", "400.0").replace("single = true", head))
     cases = scenario_cases(load_scenario(scenario), ["coach_manchester"])
     seeds = [case.labels["seed"] for case in cases]
     assert len(seeds) > 20
