@@ -167,6 +167,24 @@ def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
     assert not any(str(unit.parent).encode() in content for content in contents)
 
 
+def test_quantities_of_ones_own_are_outputs_whatever_their_unit(active, track, tmp_path):
+    own = {"law": "double", "inputs": {"q": "Q:1:left"}, "unit": "% of Hz"}
+    text = "def double(q):\n    return 2.0 * q\n"
+    settings = railsim.Settings.model_validate({
+        "laws": {"double": {"source": text}}, "outputs": {"own": {"double": own}},
+    })  # fmt: skip
+    outputs, path = ["double", "Q:1:left"], tmp_path / "own.fmu"
+    fmu(active, track, path, outputs=outputs, settings=settings, allow_code=True, **WAY)
+    assert not validate_fmu(str(path))
+    with zipfile.ZipFile(path) as packed:
+        packed.extractall(tmp_path)
+    Called.resources = str(tmp_path / "resources")
+    called = Called()
+    called.exit_initialization_mode()
+    twice, once = called._values.values()
+    assert twice == pytest.approx(2.0 * once)
+
+
 def test_a_unit_as_controller_acts_one_period_late(active, track, tmp_path):
     from pythonfmu3 import FmuBuilder
 
