@@ -240,7 +240,7 @@ class _Run:
             measured = np.zeros(len(row))
             if known.any():
                 measured = np.interp(row, row[known], part[name][known])
-            x = np.interp(part.distance, distance[rising], simulated_there[name][rising])
+            x = _at(part.distance, distance[rising], simulated_there[name][rising])
             where = _ahead(result, selection)
             channels.append(_Channel(name, selection, where, measured, x, ~known))
         every = max(1, round(part.rate / LIKE))
@@ -298,6 +298,8 @@ class _Run:
             if kind == base:
                 side = SIDES.index(labels[1]) if len(labels) > 1 else None
             elif base == "Y_over_Q" and kind == "Y" and f"Q:{labels[0]}:{labels[1]}" in by:
+                if f"{base}:{labels[0]}:{labels[1]}" in by:
+                    continue
                 side = SIDES.index(labels[1])
                 used.append(by[f"Q:{labels[0]}:{labels[1]}"])
             elif base == "sum_Y" and kind == "Y" and labels[1] == "left":
@@ -329,6 +331,15 @@ class _Run:
         names_of = quantity.name, self.measurement.name, f"{label} {wheel}".rstrip()
         where = section.begin, section.end, section.radius
         return [Pair(*names_of, *where, m, v) for m, v in zip(*values, strict=False)]
+
+
+def _at(places: Floats, s: Floats, x: Floats) -> Floats:
+    """Values at other places, by a cubic spline: a straight line takes 4 % of 18 Hz at 200 1/s."""
+    from scipy.interpolate import CubicSpline
+
+    if not np.isfinite(x).all():  # Y/Q of a wheel that lifts
+        return np.interp(places, s, x)
+    return np.asarray(CubicSpline(s, x)(places))
 
 
 def _on_floor(base: str, sensor: str, axis: str) -> bool:

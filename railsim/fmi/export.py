@@ -13,7 +13,6 @@ from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import argument_error, input_error, nearest, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
-from railsim.notation import QUANTITIES, REQUESTED
 from railsim.plot.selection import panels
 from railsim.result import Result, open_run
 from railsim.simulation import Simulation
@@ -63,7 +62,7 @@ def fmu(
         stored, script = Path(folder) / INPUTS, Path(folder) / f"{name}.py"
         with Simulation(vehicle, track, record=stored, **conditions) as run:
             actuators, step = run.actuators, run.step_length
-            signals = tuple(n for n in run.readable if n not in (*QUANTITIES, *REQUESTED))
+            signals = tuple(n for n in run.readable if n in (vehicle.signals or {}))
             run.step()
         result = open_run(stored)
         facts = {

@@ -6,6 +6,7 @@ of resources holds `INPUTS` and `VARIABLES`.
 
 import base64
 import json
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ DERIVED = {
     "J": {"kg": 1, "m": 2, "s": -2},
     "W": {"kg": 1, "m": 2, "s": -3},
 }
+BASE = "kg", "m", "s", "A", "K", "mol", "cd", "rad"
 TIME_TOLERANCE = 1e-9  # s; between the time of the program that calls and that of the run
 
 
@@ -65,7 +67,9 @@ class Unit:
         wrapper = self._wrapper
         causality, variability = wrapper.Fmi3Causality, wrapper.Fmi3Variability
         units = {one["unit"] for one in (*self._facts["inputs"], *self._facts["outputs"])}
-        self.register_units([wrapper.unit.Unit(u, **exponents(u)) for u in sorted(units - {""})])
+        # those of one's own outputs may be any text: what is not known has no unit in FMI
+        known = {u: found for u in sorted(units - {""}) if (found := exponents(u)) is not None}
+        self.register_units([wrapper.unit.Unit(u, **found) for u, found in known.items()])
         time = wrapper.Float64(
             "time", causality=causality.independent, getter=lambda: self._time,
             variability=variability.continuous,
@@ -74,7 +78,7 @@ class Unit:
         for one in self._facts["inputs"]:
             variable = wrapper.Float64(
                 one["name"],
-                unit=one["unit"] or None,
+                unit=one["unit"] if one["unit"] in known else None,
                 description=one["description"],
                 causality=causality.input,
                 variability=variability.discrete,
@@ -86,7 +90,7 @@ class Unit:
         for one in self._facts["outputs"]:
             variable = wrapper.Float64(
                 one["name"],
-                unit=one["unit"] or None,
+                unit=one["unit"] if one["unit"] in known else None,
                 description=one["description"],
                 causality=causality.output,
                 variability=variability.continuous,
@@ -186,22 +190,24 @@ class Unit:
         self._run.state = _restored(saved["state"])
 
 
-def exponents(unit: str) -> dict[str, int]:
-    """Return the exponents of the base units in a unit.
+def exponents(unit: str) -> dict[str, int] | None:
+    """Return the exponents of the base units in a unit; None for one that is not known.
 
     Examples
     --------
-    >>> exponents("N m/rad"), exponents("m/s2")
-    ({'kg': 1, 'm': 2, 's': -2, 'rad': -1}, {'m': 1, 's': -2})
+    >>> exponents("N m/rad"), exponents("m/s2"), exponents("kN")
+    ({'kg': 1, 'm': 2, 's': -2, 'rad': -1}, {'m': 1, 's': -2}, None)
     """
     found: dict[str, int] = {}
     for place, part in enumerate(unit.split("/")):
         for factor in part.split():
-            name, power = (
-                factor.rstrip("0123456789"),
-                factor.lstrip("abcdefghijklmnopqrstuvwxyzNPWJ"),
-            )
-            for base, exponent in DERIVED.get(name, {name: 1} if name else {}).items():
+            if factor == "1":
+                continue
+            written = re.fullmatch(r"([A-Za-z]+)(\d*)", factor)
+            name, power = written.groups() if written else ("", "")
+            if name not in (*DERIVED, *BASE):
+                return None
+            for base, exponent in DERIVED.get(name, {name: 1}).items():
                 times = int(power or 1) * (-1 if place else 1)
                 found[base] = found.get(base, 0) + times * exponent
     return found

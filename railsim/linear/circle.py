@@ -50,26 +50,25 @@ def circle(
     curvature: float = 0.0,
     cant: float = 0.0,
     friction: float | tuple[float, float] | None = None,
+    at: float = 0.0,
 ) -> Track:
     """Return a track of constant curvature and cant with rails, gauge and support of another.
 
-    Support and friction are those at its beginning, s = 0.
-
     `track`: whose rails they are; `curvature`: 1/radius, positive to the right [1/m]; `cant`: left
     rail over the right one, on 1.5 m [m]; `friction`: coefficient of friction; by default that of
-    `track`.
+    `track`; `at`: arc length at which support and friction are taken, by default its beginning [m].
     """
     radius = 1.0 / curvature if curvature else math.inf
     element = {"type": "CIR", "length": LENGTH, "radius": radius}
     if not curvature:
         element = {"type": "STR", "length": LENGTH}
     if friction is None:
-        friction = tuple(track.friction_at(0.0).tolist())
+        friction = tuple(track.friction_at(at).tolist())
     both = (friction, friction) if isinstance(friction, float | int) else tuple(friction)
     support = track.support.model_dump(exclude_none=True)
     if track.support.variation:
         places, *factors = np.transpose(track.support.variation)
-        support["variation"] = [[0.0, *(float(np.interp(0.0, places, f)) for f in factors)]]
+        support["variation"] = [[0.0, *(float(np.interp(at, places, f)) for f in factors)]]
     return track.replace(
         plan=[element],
         cant=[{"type": "CST", "length": LENGTH, "cant": cant}],

@@ -103,8 +103,8 @@ class Contact:
 class LinearVehicle:
     """A vehicle on straight or circular track, to be linearised at any speed.
 
-    - `vehicle`, `track`: definitions; of the track rails, gauge, friction and support at its
-      beginning count
+    - `vehicle`, `track`: definitions; of the track rails, gauge, friction and support count,
+      those at the arc length `at`, by default at its beginning [m]
     - `contact`: how wheel and rail are linearised
     - `radius`, `cant`: of the track on which the vehicle rolls [m]
     - `held`: hold the wheelsets
@@ -129,7 +129,9 @@ class LinearVehicle:
         hold: Sequence[str] = (),
         settings: Settings | None = None,
         profiles: Mapping[str, Profile] | None = None,
+        at: float = 0.0,
     ) -> None:
+        self.at = at
         self.contact = contact or Contact()
         faults = self.contact.faults()
         faults.require(abs(radius) >= 5.0, "radius", f"found {radius:g} m", "5 m at least")
@@ -147,7 +149,7 @@ class LinearVehicle:
         if self.contact.linearisation == "harmonic" and not held:
             self._path = ContactPath(self.contact.amplitude)
         rolling = (settings or Settings()).in_steady_rolling()
-        assembled = assemble(vehicle, circle(track), rolling, known, SharedTables())
+        assembled = assemble(vehicle, circle(track, at=at), rolling, known, SharedTables())
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
@@ -165,7 +167,7 @@ class LinearVehicle:
         self._known: dict[float, Floats] = {}
         self._tangents: dict[float, tuple[FreeVehicle, Floats]] = {}
         self._rest = placed(balance.state)
-        there = circle(track, curvature=self.curvature, cant=cant)
+        there = circle(track, curvature=self.curvature, cant=cant, at=at)
         check_fixed(assembled.flat, there)
         self.system = without_loads(self.model.system)._replace(track=track_tables(there))
 
@@ -198,7 +200,8 @@ class LinearVehicle:
         """The same, led there from straight track."""
 
         def along(share: float) -> tuple[System, float]:
-            part = circle(self.track, curvature=share * self.curvature, cant=share * self.cant)
+            bend, cant = share * self.curvature, share * self.cant
+            part = circle(self.track, curvature=bend, cant=cant, at=self.at)
             system = self.model.system._replace(track=track_tables(part))
             return system, WALKING_PACE + math.sqrt(share) * (speed - WALKING_PACE)
 

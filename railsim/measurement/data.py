@@ -116,11 +116,7 @@ class Measurement:
         """
 
         def passed(x: Floats) -> Floats:
-            found = _bridged(x)
-            if high < np.inf:
-                found = band_passed(found, self.rate, low, high)
-            elif low > 0.0:
-                found = found - low_passed(found, self.rate, low)
+            found = band_passed(_bridged(x), self.rate, low, high)
             return np.where(np.isnan(x), np.nan, found)
 
         return replace(self, channels={name: passed(x) for name, x in self.channels.items()})

@@ -26,6 +26,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError
+from railsim.linear.circle import circle
 from railsim.linear.track_response import COMPONENTS, ORDERS, RAILS, TrackResponse
 from railsim.linear.vehicle import LinearVehicle
 from railsim.observation.pieces import on_grid
@@ -68,17 +69,17 @@ def in_the_mean(
 ) -> tuple[TrackResponse, Noise]:
     """Return the response with the contact of a rough track, and the noise that remains.
 
-    `vehicle`, `track`: The track's rails and friction count. `linear`, `tangent`: About steady
-    rolling, at the speed in question. `irregularity`: Of the type ``random``, as in a track file.
+    `vehicle`, `track`: Of the track the rails count; friction and support where `linear` takes
+    them. `linear`, `tangent`: About steady rolling, at the speed in question. `irregularity`: Of
+    the type ``random``, as in a track file.
     `curve`: Curvature and cant of the run [1/m, m]; what moves about its mean is fitted.
     Raises ModelError: The vehicle does not complete the run.
     """
     curvature, cant = curve
     element = {"type": "CIR", "radius": 1.0 / curvature} if curvature else {"type": "STR"}
-    rough = track.replace(
+    rough = circle(track, at=linear.at).replace(
         plan=[{**element, "length": LENGTH}],
         cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
-        vertical=[],
         irregularities=[{**irregularity, "type": "random", "seed": SEED}],
     )
     result = simulate(vehicle, rough, speed=tangent.speed, settings=Settings(output_rate=RATE))

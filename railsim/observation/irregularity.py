@@ -164,7 +164,8 @@ class _Smooth:
     ) -> None:  # fmt: skip
         self.vehicle, self.track, self.assumed = vehicle, track, assumed
         self.simulations, self.name = simulations, measurement.name
-        self.linear = LinearVehicle(vehicle, track)
+        begin, end = measurement.distance[[0, -1]].tolist()
+        self.linear = LinearVehicle(vehicle, track, at=0.5 * (begin + end))
         self.channels, self.used, self.known = list(used), list(used.values()), all_sensors(vehicle)
         kinds = [measurement.quantities[name].split(":")[0] for name in used]
         default = {**NOISE, "sensor_acceleration": assumed.noise}

@@ -41,8 +41,7 @@ from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
 
-MOST = 20  # seeds of a part
-SEEDS = 100  # between those of two conditions
+MOST, STEP = 20, 10  # seeds of a part, and between two of them: tracks of zones lie between
 LATERAL, VERTICAL = ("lateral", "gauge"), ("vertical", "cross_level")
 
 
@@ -260,7 +259,7 @@ def repeated(case: Case, limits: RunningLimits, service: Service, condition: int
     found: list[Case] = []
     counted = 0
     for number in range(MOST):
-        seed = parts[0].seed + SEEDS * condition + 10 * number
+        seed = parts[0].seed + STEP * (MOST * condition + number)
         part = parts[0].model_copy(update={"seed": seed})
         track = case.track.model_copy(update={"irregularities": (part,)})
         sections = counting_sections(track, case, limits, service)

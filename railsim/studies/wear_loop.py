@@ -23,9 +23,10 @@ from railsim.contact import contact_geometry
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import WheelLimits
 from railsim.definitions.settings import InitialState
-from railsim.definitions.track.elements import Straight
+from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, Faults, InputError, ModelError, RailsimError, input_error
+from railsim.linear.circle import circle
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.hunting import HUNTS
@@ -390,12 +391,15 @@ def _hunting_when_disturbed(
     run: Run, settings: Settings, profiles: Mapping[str, Profile]
 ) -> str | None:
     """Say whether the vehicle hunts on the straights of a route: nothing disturbs it there."""
-    if not any(isinstance(element, Straight) for element in run.track.plan):
+    straights = [part for part in curvature_sections(run.track) if part.type == "STR"]
+    if not straights:
         return None
-    plain = run.track.replace(
-        plan=[{"type": "STR", "length": run.speed * TESTED + ROOM}],
-        cant=[], vertical=[], irregularities=[], gauge_widening=None,
-    )  # fmt: skip
+    longest = max(straights, key=lambda part: part.end - part.begin)
+    middle = 0.5 * (longest.begin + longest.end)
+    # with friction and support of its place: without curves, crossings and what lies elsewhere
+    plain = circle(run.track, at=middle).replace(
+        plan=[{"type": "STR", "length": run.speed * TESTED + ROOM}], cant=[]
+    )
     leading = flatten(run.vehicle).of_kind("wheelset")[0].name
     disturbed = settings.model_copy(update={"initial": {leading: InitialState(y=DISTURBED)}})
     result = simulate(

@@ -116,6 +116,17 @@ def test_fault_modes_change_the_vehicle_and_load_cases_that_are_unknown_are_left
         scenario_cases(load_scenario(scenario), ["coach_manchester"])
 
 
+def test_no_two_conditions_share_a_seed_of_a_part_that_is_repeated_often(tmp_path):
+    """One to two sections a run of 25 needed: more than ten seeds for each condition."""
+    scenario = tmp_path / "often.toml"
+    head = "single = true\nto_standard = true\n[conditions.a]\n[conditions.b]"
+    scenario.write_text(SMALL.replace("560.0", "400.0").replace("single = true", head))
+    cases = scenario_cases(load_scenario(scenario), ["coach_manchester"])
+    seeds = [case.labels["seed"] for case in cases]
+    assert len(seeds) > 20
+    assert len(set(seeds)) == len(seeds)
+
+
 def test_speed_from_the_cant_deficiency():
     """V^2 = g R (h + I)/1.5: LIBRARY's 23.0 m/s at R 300 m, cant 120 mm, 150 mm."""
     service = railsim.load_vehicle("coach_manchester").service

@@ -14,6 +14,7 @@ import railsim
 from railsim.cli import railsim as program
 from railsim.errors import InputError
 from railsim.fmi import Controller, fmu
+from railsim.fmi.unit import Unit
 
 pytest.importorskip("pythonfmu3", reason="no PythonFMU3")
 validate_fmu = pytest.importorskip("fmpy.validation", reason="no FMPy").validate_fmu
@@ -120,6 +121,41 @@ def test_the_unit_without_commands_is_the_run(unit, active, track):
     assert "the run has ended: complete" in ran.stdout + ran.stderr
 
 
+class Slave:
+    """What the wrapper of a unit has of PythonFMU3."""
+
+    resources = ""
+
+    def __init__(self, **facts):
+        self.logged = []
+
+    def register_units(self, units):
+        """Leave the description of the unit out."""
+
+    def register_variable(self, variable, nested):
+        """Leave the description of the unit out."""
+
+    def log(self, *words):
+        self.logged.append(words)
+
+
+class Called(Unit, Slave):
+    """A unit without a program that calls it."""
+
+
+def test_steps_of_communication_may_be_a_little_longer_than_those_of_the_run(unit, tmp_path):
+    """By less than a thousandth of one, in which a step of the run is not divided."""
+    with zipfile.ZipFile(unit) as packed:
+        packed.extractall(tmp_path)
+    Called.resources = str(tmp_path / "resources")
+    called = Called()
+    called.exit_initialization_mode()
+    step = 1.0003 * called._run.step_length
+    for k in range(20):
+        assert called.do_step(3.0 + k * step, step).status.name == "ok", called.logged
+    assert called._run.time == pytest.approx(20 * step, abs=0.001 * step)
+
+
 def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
     with zipfile.ZipFile(unit) as archive:
         description = archive.read("modelDescription.xml").decode()
@@ -129,6 +165,24 @@ def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
     assert re.search('<Float64 name="push"[^>]* unit="N"/>', description)
     assert validate_fmu(str(unit)) == []
     assert not any(str(unit.parent).encode() in content for content in contents)
+
+
+def test_quantities_of_ones_own_are_outputs_whatever_their_unit(active, track, tmp_path):
+    own = {"law": "double", "inputs": {"q": "Q:1:left"}, "unit": "% of Hz"}
+    text = "def double(q):\n    return 2.0 * q\n"
+    settings = railsim.Settings.model_validate({
+        "laws": {"double": {"source": text}}, "outputs": {"own": {"double": own}},
+    })  # fmt: skip
+    outputs, path = ["double", "Q:1:left"], tmp_path / "own.fmu"
+    fmu(active, track, path, outputs=outputs, settings=settings, allow_code=True, **WAY)
+    assert not validate_fmu(str(path))
+    with zipfile.ZipFile(path) as packed:
+        packed.extractall(tmp_path)
+    Called.resources = str(tmp_path / "resources")
+    called = Called()
+    called.exit_initialization_mode()
+    twice, once = called._values.values()
+    assert twice == pytest.approx(2.0 * once)
 
 
 def test_a_unit_as_controller_acts_one_period_late(active, track, tmp_path):

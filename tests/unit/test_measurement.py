@@ -253,6 +253,15 @@ def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):
     assert run["load"][inner] == pytest.approx(LOAD[::10][inner], rel=1e-3)
 
 
+def test_high_pass_alone_is_a_butterworth_one(tmp_path):
+    """Of order 4: tones of 3 and 7 Hz by 1/sqrt(1 + (corner/f)^8)."""
+    run = railsim.load_measurement(written(tmp_path)).filtered(low=3.0)
+    inner = slice(1000, 2000)
+    assert run["load"][inner] == pytest.approx((LOAD - 60e3)[inner] / np.sqrt(2.0), abs=30.0)
+    gain = 1.0 / np.sqrt(1.0 + (3.0 / 7.0) ** 8)
+    assert run["box"][inner] == pytest.approx(gain * BOX[inner], abs=0.01)
+
+
 def test_resampling_at_its_own_rate_changes_nothing(tmp_path):
     """Nor is the last value lost where its time, times the rate, is a little less than whole."""
     whole = railsim.load_measurement(written(tmp_path))

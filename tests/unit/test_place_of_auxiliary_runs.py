@@ -1,0 +1,93 @@
+"""Auxiliary runs of wear loop and recording car: on the track as it is where the vehicle is."""
+
+import pytest
+
+import railsim
+from railsim.definitions import Settings
+from railsim.linear.track_response import track_response
+from railsim.linear.vehicle import LinearVehicle
+from railsim.observation import contact
+from railsim.studies import wear_loop
+
+
+class Seen(Exception):
+    """Ends an auxiliary run where it would begin."""
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return railsim.load_vehicle("coach_manchester")
+
+
+@pytest.fixture(scope="module")
+def track():
+    """A lubricated curve of 300 m with widening and check rail on soft ballast, then a straight."""
+    return railsim.load_track("straight").replace(
+        plan=[
+            {"type": "STR", "length": 50.0},
+            {"type": "CIR", "length": 250.0, "radius": 400.0},
+            {"type": "STR", "length": 700.0},
+        ],
+        friction_table=[[0.0, 0.1, 0.05], [300.0, 0.1, 0.05], [310.0, 0.4, 0.3]],
+        gauge_widening=[[0.0, 0.01], [299.0, 0.01], [300.0, 0.0]],
+        check_rail=[{"rail": "right", "flangeway": [[0.0, 0.04], [300.0, 0.04]]}],
+        support={"preset": "ballasted", "variation": [[300.0, 0.5, 0.5], [310.0, 2.0, 3.0]]},
+    )
+
+
+def ran_on(monkeypatch, module, begin):
+    """The track on which `begin` simulates."""
+    seen = []
+
+    def simulate(vehicle, track, **how):
+        seen.append(track)
+        raise Seen
+
+    monkeypatch.setattr(module, "simulate", simulate)
+    with pytest.raises(Seen):
+        begin()
+    return seen[0]
+
+
+def as_on_the_straight(found):
+    assert found.friction_at(0.0).tolist() == found.friction_at(1400.0).tolist() == [0.4, 0.3]
+    assert found.support.variation[0][1:] == (2.0, 3.0)
+    assert len(found.support.variation) == 1
+    assert not found.check_rail
+    assert not found.gauge_widening
+
+
+def test_wear_loop_looks_for_hunting_on_the_straight_as_it_is(monkeypatch, coach, track):
+    run = wear_loop.Run(coach, track, 40.0, 1.0)
+    as_on_the_straight(
+        ran_on(
+            monkeypatch, wear_loop,
+            lambda: wear_loop._hunting_when_disturbed(run, Settings(), {}),
+        )
+    )  # fmt: skip
+
+
+def test_contact_of_a_recording_car_is_that_of_where_it_recorded(monkeypatch, coach, track):
+    linear = LinearVehicle(coach, track, at=700.0)
+    tangent = track_response(linear, {}, 30.0)
+    rough = {"spectrum": "erri_b176_low", "wavelengths": [3.0, 70.0]}
+    as_on_the_straight(
+        ran_on(
+            monkeypatch, contact,
+            lambda: contact.in_the_mean(coach, track, linear, tangent, rough),
+        )
+    )  # fmt: skip
+
+
+def test_linear_vehicle_has_the_friction_and_support_of_its_place(coach, track):
+    """As on a track that has no others."""
+    there = track.replace(
+        plan=[{"type": "STR", "length": 700.0}], friction_table=None, friction=[0.4, 0.3],
+        support={"preset": "ballasted", "variation": [[0.0, 2.0, 3.0]]},
+    )  # fmt: skip
+    found, expected, begin = (
+        LinearVehicle(coach, one, at=at).steady(30.0)
+        for one, at in ((track, 700.0), (there, 0.0), (track, 0.0))
+    )
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert begin != pytest.approx(expected, rel=1e-3, abs=1e-12)
