@@ -185,7 +185,7 @@ def map_figure(
             )  # fmt: skip
     axes.set(xlabel=first, ylabel="critical speed (m/s)")
     if not any(np.isfinite(values).any() for values in speeds.values()):
-        say(axes, "no critical speed in the range at any point")
+        say(axes, "no critical speed inside the range at any point; the table says why")
         return figure
     axes.set_ylim(0.0, None)
     axes.legend()
