@@ -113,6 +113,7 @@ def test_a_stop_is_said_to_have_no_derivative():
         ([STIFF, STIFF], [HEIGHT], "given twice"),
         ([], [HEIGHT], "one key at least"),
         ([STIFF + ":1.5:2"], [HEIGHT], "factors below and above 1"),
+        ([STIFF + ":1.1:2"], [HEIGHT], "factors below and above 1"),
         ([STIFF + ":a:b"], [HEIGHT], "numbers LOW:HIGH"),
         ([STIFF], ["sensor_displacement:prob:z"], "no sensor 'prob'"),
         ([STIFF], ["speeed:1"], "speeed"),

@@ -130,6 +130,23 @@ def test_rails_are_supported_on_the_way_as_at_the_start(start):
     np.testing.assert_allclose(runs[0].Y, runs[1].Y, atol=1.0)
 
 
+def test_rails_are_supported_as_at_the_start_between_two_rows():
+    """Wheels begin within 2 kN (Y) and 5 kN (Q): their own places differ by 4 % of the factor."""
+    plan = [{"type": "CIR", "length": 800.0, "radius": 400.0}]
+    cant = [{"type": "CST", "length": 800.0, "cant": 0.1}]
+    curve = railsim.load_track("straight").replace(plan=plan, cant=cant)
+    varying, alike = (
+        railsim.simulate(
+            railsim.load_vehicle("coach_manchester"),
+            curve.replace(support={"preset": "ballasted", "variation": rows}),
+            speed=20.0, start=400.0, duration=0.05, settings=Settings(start_state="run-in"),
+        )
+        for rows in ([[300.0, 1.0], [500.0, 0.4]], [[0.0, 0.7]])
+    )  # fmt: skip
+    np.testing.assert_allclose(varying.Y, alike.Y, atol=2e3)
+    np.testing.assert_allclose(varying.Q, alike.Q, atol=5e3)
+
+
 @pytest.mark.parametrize("rows", [[[0.0, 0.3]], [[0.0, 1.0], [90.0, 1.0], [110.0, 0.5]]])
 def test_on_straight_track_wheels_begin_on_the_rails_as_they_are_supported(rows):
     """Softer rails are pressed down further: nothing drops onto them when the run begins."""
