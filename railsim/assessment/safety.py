@@ -94,7 +94,18 @@ def overturning(Q: Floats) -> Floats:
     `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
     """
     left, right = np.sum(Q[..., 0], axis=-1), np.sum(Q[..., 1], axis=-1)
-    return np.asarray((left - right) / (left + right))
+    with np.errstate(invalid="ignore"):  # without load, 0/0: nan
+        return np.asarray((left - right) / (left + right))
+
+
+def largest_overturning(Q: Floats) -> float:
+    """Largest magnitude of the overturning coefficient of a bogie [1].
+
+    Instants at which the whole bogie is without load have no coefficient and do not count.
+
+    `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
+    """
+    return float(np.fmax.reduce(np.abs(overturning(Q))))
 
 
 @dataclass(frozen=True)

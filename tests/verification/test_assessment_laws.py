@@ -24,7 +24,13 @@ from railsim.assessment.comfort import (
 from railsim.assessment.comfort_report import _Gathered
 from railsim.assessment.criteria import CRITERIA, Measured, steering_index
 from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
-from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
+from railsim.assessment.safety import (
+    climb_distance,
+    flange_angle,
+    largest_overturning,
+    nadal,
+    overturning,
+)
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
 from railsim.assessment.track_quality import quality_class
@@ -512,6 +518,12 @@ def test_climb_counts_a_lifted_wheel_and_the_longest_stretch():
 def test_overturning_is_one_when_one_side_is_without_load():
     Q = np.array([[[80e3, 0.0], [70e3, 0.0]], [[50e3, 50e3], [50e3, 50e3]]])
     assert overturning(Q).tolist() == [1.0, 0.0]
+
+
+def test_an_instant_without_any_load_does_not_hide_the_largest_overturning_coefficient():
+    Q = np.array([[[6e4, 5e4]], [[1e4, 9e4]], [[0.0, 0.0]], [[5e4, 5e4]]])
+    assert largest_overturning(Q) == pytest.approx(0.8)  # (1 - 9)/(1 + 9), by hand
+    assert largest_overturning(Q[..., ::-1]) == pytest.approx(0.8)
 
 
 def test_worst_patch_stands_on_the_shakedown_map_where_its_index_says():
