@@ -58,7 +58,7 @@ def flange_angle(profile: Profile) -> float:
 class Climb:
     """Longest distance over which Y/Q of one wheel exceeds a limit."""
 
-    length: float  # length [m]; 0 where the limit is not exceeded
+    length: float  # length [m]; 0 where the limit is exceeded at one stored instant or none
     begin: float  # position of its beginning [m]
     rise: float  # largest rise of the wheel above its rail since this position [m]
 
