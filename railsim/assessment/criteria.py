@@ -162,8 +162,17 @@ def instability(signals: Signals, section: TestSection) -> Values:
 
 
 def steering(signals: Signals, section: TestSection) -> Values:
-    """Steering index of the leading wheelset in a curve, see `steering_index`."""
-    geometry = signals.record.geometry if section.turn else None
+    """Steering index of the leading wheelset in a curve, see `steering_index`.
+
+    With the widening of the gauge in the middle of the section.
+    """
+    if not section.turn:
+        return {}
+    rows = np.array(signals.record.result.track().gauge_widening or [[0.0, 0.0, 0.0]])
+    middle = 0.5 * (section.begin + section.end)
+    geometry = signals.record.geometry_with(
+        float(np.interp(middle, rows[:, 0], rows[:, 1:].sum(1)))
+    )
     wheelset = flatten(signals.record.result.vehicle()).of_kind("wheelset")[0].wheelset
     if geometry is None or wheelset is None:
         return {}

@@ -109,11 +109,15 @@ class Record:
 
         None where the profiles are not kept or do not fit.
         """
+        return self.geometry_with(0.0)
+
+    def geometry_with(self, widening: float) -> ContactGeometry | None:
+        """As `geometry`, where the gauge is wider [m]."""
         wheelset = flatten(self.result.vehicle()).of_kind("wheelset")[0].wheelset
         track, known = self.result.track(), self.result.profiles
         if wheelset is None or not {*wheelset.profile, *track.rail} <= known.keys():
             return None
-        return geometry_of(wheelset, track, known)
+        return geometry_of(wheelset, track, known, widening)
 
     @cached_property
     def conicity(self) -> float:

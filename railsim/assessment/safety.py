@@ -166,9 +166,7 @@ def safety_report(record: Record) -> SafetyReport:
             own = f"wheelset {w + 1} {side}", *there, climb.length, climb.begin, climb.rise
             wheels.append(WheelSafety(*own, bool(unloaded.any())))
     Q = result["Q"]
-    tilt = {name: np.abs(overturning(Q[:, own])) for name, own in record.bogies.items()}
-    # a bogie without any load has no coefficient
-    most = {name: float(np.max(x, where=~np.isnan(x), initial=0.0)) for name, x in tilt.items()}
+    most = {name: largest_overturning(Q[:, own]) for name, own in record.bogies.items()}
     return SafetyReport(tuple(wheels), most)
 
 

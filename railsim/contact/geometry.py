@@ -34,6 +34,9 @@ SEARCH_SPACING = 3e-5
 LARGEST_ROLL = 0.03
 """Largest roll of a wheelset that is tried [rad]."""
 
+LATERAL = 0.010
+"""Largest lateral displacement of a wheelset by default [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactGeometry:
@@ -94,6 +97,12 @@ class ContactGeometry:
         return sorted(found)
 
 
+def _positions(furthest: float) -> Floats:
+    """Lateral displacements in steps of 0.05 mm, as far to either side [m]."""
+    count = round(furthest / 0.05e-3)
+    return np.asarray(np.linspace(-furthest, furthest, 2 * count + 1))
+
+
 def _pair(value: T | tuple[T, T]) -> tuple[T, T]:
     """Left and right of something given once or for each side."""
     if isinstance(value, tuple):
@@ -146,7 +155,7 @@ def contact_geometry(
     ]
     rails = [rail_curve(r, gauge, inclination) for r in _pair(rail)]
     displacements = (
-        np.linspace(-0.010, 0.010, 401)
+        _positions(LATERAL)
         if lateral is None
         else np.atleast_1d(np.asarray(lateral, dtype=np.float64))
     )
@@ -184,22 +193,24 @@ def contact_geometry(
 
 
 def geometry_of(
-    wheelset: Wheelset, track: Track, profiles: Mapping[str, Profile]
+    wheelset: Wheelset, track: Track, profiles: Mapping[str, Profile], widening: float = 0.0
 ) -> ContactGeometry | None:
     """Geometry of a wheelset on a track; None where it does not fit between the rails.
 
-    `profiles` holds those of both by their names.
+    `profiles` holds those of both by their names; by `widening` the gauge is wider there [m].
     """
     wheels = profiles[wheelset.profile[0]], profiles[wheelset.profile[1]]
     rails = profiles[track.rail[0]], profiles[track.rail[1]]
+    gauge, furthest = track.gauge + widening, LATERAL + 0.5 * max(widening, 0.0)
     return _fitting(
-        wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
+        wheels, rails, wheelset.radius, gauge, track.inclination, wheelset.back_to_back, furthest
     )
 
 
 @lru_cache(32)  # maps, optimisations and sections ask for the same profiles over and over
 def _fitting(*arguments: Any) -> ContactGeometry | None:
+    *given, furthest = arguments
     try:
-        return contact_geometry(*arguments)
+        return contact_geometry(*given, _positions(furthest))
     except InputError:
         return None

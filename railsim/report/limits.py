@@ -327,7 +327,8 @@ def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
             failed.append(len(rows))
             above.append(f"{run}: Nadal's limit, {worst.place}")
         climb = f"{max(w.climb_distance for w in report.wheels):.2f} m"
-        tilt = f"{max(report.overturning.values()):.2f}" if report.overturning else ""
+        known = [x for x in report.overturning.values() if not math.isnan(x)]
+        tilt = f"{max(known):.2f}" if known else ""
         rows.append([run, worst.place, f"{worst.Y_over_Q:.3f}", f"{worst.limit:.3f}",
                      f"{100.0 * share:.0f} %", climb, tilt, lifted])  # fmt: skip
     header = ["run", "wheel", "largest Y/Q", "limit", "share", "climb", "overturning", "lifted"]

@@ -1,12 +1,16 @@
 """Tracks of other gauges: the rails, and what stands on them, are as far apart as they are."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import railsim
-from railsim.assessment.criteria import steering_index
+from railsim.assessment.criteria import steering, steering_index
+from railsim.assessment.sections import TestSection
 from railsim.constants import GRAVITY
 from railsim.contact import contact_geometry
+from railsim.contact.geometry import geometry_of
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.stationary import WALKING_PACE, on_cant
 from railsim.model.assembly import assemble
@@ -82,3 +86,23 @@ def test_steering_index_grows_with_the_distance_of_the_wheels():
         for gauge in (1.435, 1.0)
     }
     assert index[1.0] / index[1.435] == pytest.approx(1.065 / 1.5, rel=0.02)
+
+
+def test_steering_index_is_that_of_the_widened_gauge():
+    """Cones: the radius difference before the flange grows with the play, by half of 18 mm here."""
+    vehicle, curve = wagon(1.36), {"type": "CIR", "length": 400.0, "radius": -500.0}
+    plan, rows = [curve], [[0.0, 0.0, 0.0], [200.0, 0.018, 0.0]]
+    track = railsim.load_track("straight").replace(plan=plan, gauge_widening=rows)
+    profiles = {name: load_profile(name) for name in ("cone_1in40", "60E1")}
+    wheelset = vehicle.wheelsets["front"]
+    record = SimpleNamespace(
+        result=SimpleNamespace(track=lambda: track, vehicle=lambda: vehicle),
+        geometry_with=lambda widening: geometry_of(wheelset, track, profiles, widening),
+    )
+    (wide,) = steering(
+        SimpleNamespace(record=record), TestSection("3", 250.0, 350.0, -500.0, 0.1, 20.0, "")
+    ).values()
+    geometry = contact_geometry(*profiles.values(), lateral=np.arange(0.0, 9e-3, 1e-5))
+    narrow = steering_index(geometry, -500.0, 0.46)
+    play = geometry.lateral[np.abs(geometry.contact_angle).max(axis=1) > 0.5][0]
+    assert wide[0] / narrow == pytest.approx(play / (play + 0.009), rel=0.05)
