@@ -203,14 +203,14 @@ def geometry_of(
     rails = profiles[track.rail[0]], profiles[track.rail[1]]
     gauge, furthest = track.gauge + widening, LATERAL + 0.5 * max(widening, 0.0)
     return _fitting(
-        wheels, rails, wheelset.radius, gauge, track.inclination, wheelset.back_to_back, furthest
-    )
+        furthest, wheel=wheels, rail=rails, radius=wheelset.radius, gauge=gauge,
+        inclination=track.inclination, back_to_back=wheelset.back_to_back,
+    )  # fmt: skip
 
 
 @lru_cache(32)  # maps, optimisations and sections ask for the same profiles over and over
-def _fitting(*arguments: Any) -> ContactGeometry | None:
-    *given, furthest = arguments
+def _fitting(furthest: float, **given: Any) -> ContactGeometry | None:
     try:
-        return contact_geometry(*given, _positions(furthest))
+        return contact_geometry(**given, lateral=_positions(furthest))
     except InputError:
         return None
