@@ -204,7 +204,10 @@ def test_curving_over_a_grid(capsys, tmp_path):
         (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
         (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
         (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
-        (["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"], "--over: nothing"),
+        (
+            ["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"],
+            "--over: nothing",
+        ),
         (
             [
                 "critical-speed",
