@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -14,6 +14,7 @@ from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, plain, print_json, show
 from railsim.errors import Faults, InputError, input_error
 from railsim.files.access import check_file, check_folder, make_folder, whole_file, write_folder
+from railsim.files.sources import OVERRIDE
 
 if TYPE_CHECKING:
     from railsim.definitions import Settings, Track, Vehicle
@@ -244,7 +245,7 @@ class Given:
         return (*self.assignments, *load)
 
     def inputs(self, vehicle: str, track: str | None, changes: Sequence[str] = ()) -> Inputs:
-        """Load vehicle, track (by default ``straight``) and settings, with further assignments.
+        """Load vehicle, track (by default ``straight``) and settings, with assignments of --over.
 
         Raises InputError: everything that is wrong in any of them.
         """
@@ -260,6 +261,9 @@ class Given:
             rails = load_track("straight" if track is None else track, parts["track"])
         with faults.caught():
             settings = load_settings(self.settings, parts["settings"])
+        if changes:  # without them the inputs have been loaded before, free of faults
+            of_over = (replace(f, option="--over") if f.file == OVERRIDE else f for f in faults)
+            faults = Faults(of_over)
         faults.check()
         return Inputs(coach, rails, settings)
 

@@ -384,6 +384,8 @@ def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[f
     Raises InputError: one of them is no speed or out of range, or there is none.
     """
     low, high = SPEED_RANGE
+    if isinstance(speeds, str | Real):
+        raise argument_error(name, f"found {speeds!r}", "several, such as [20.0, 40.0]")
     values = [speed_in_si(speed) for speed in speeds]
     bad = [v for v in values if not (isinstance(v, Real) and low <= float(v) <= high)]
     if bad or not values:

@@ -53,7 +53,7 @@ def critical_speed(
     vehicle: Vehicle,
     track: Track | None = None,
     *,
-    methods: Sequence[str] = ("linear", "ramp"),
+    methods: str | Sequence[str] = ("linear", "ramp"),
     low: float | str = 5.0,
     high: float | str = 120.0,
     points: int = 16,
@@ -74,8 +74,8 @@ def critical_speed(
         See `load_vehicle`.
     track : Track, optional
         Whose rails, gauge, friction and support count; by default ``straight``.
-    methods : sequence of str
-        Of `METHODS`; the linear one is always used.
+    methods : str or sequence of str
+        One or several of `METHODS`; the linear one is always used.
     low, high : float or str
         Range of the search [m/s], or with units: ``"400 km/h"``.
     points : int
@@ -101,6 +101,7 @@ def critical_speed(
     ModelError
         There is no equilibrium, or no stable step.
     """
+    methods = [methods] if isinstance(methods, str) else methods
     low, high = _checked(methods, (low, high), points, excitations)
     settings, track = settings or Settings(), track or load_track("straight")
     contact, law = Contact(linearisation, amplitude, conicity), smooth_law(settings)

@@ -83,7 +83,7 @@ def test_root_locus_over_a_key(capsys):
         (["--speeds", "10:20"], "--speeds"),
         (["--speeds", "10:20:0"], "--speeds"),
         (["--speeds", "10:20:2", "--over", "track.friction=0.2:0.4:2"], "--over"),
-        (["--over", "track.nothing=0.2:0.4:2"], "nothing"),
+        (["--over", "track.nothing=0.2:0.4:2"], "--over: nothing"),
         (["--hold", "carbdy"], "carbody"),
         (["--hold", "front.outer.wheelset"], "--held"),
         (["--radius", "2"], "--radius"),

@@ -144,9 +144,12 @@ def test_speeds_are_taken_with_their_unit(coach):
     assert railsim.simulate(coach, track, speed="72 km/h", until=0.5).speed == 20.0
     assert railsim.modes(coach, speed="72 km/h").speed == 20.0
     found = railsim.critical_speed(
-        coach, methods=["linear"], low="36 km/h", high="360km/h", over_amplitude=False
+        coach, methods="linear", low="36 km/h", high="360km/h", over_amplitude=False
     )
     assert (found.low, found.high) == (10.0, 100.0)
+    for single in (30, "72 km/h"):
+        with pytest.raises(InputError, match=f"^speeds: found {single!r}; several"):
+            railsim.root_locus(coach, track, speeds=single)
     assert railsim.describe(track, ["72 km/h"]).data == railsim.describe(track, [20.0]).data
     for wrong in ("fast", "20 kN"):
         for call in (railsim.modes, railsim.simulate):

@@ -60,6 +60,7 @@ function probe(frame) {
   found.position = d.querySelector(".readings th").textContent;
   found.step = plots[0].data[0][2] - plots[0].data[0][0];
   found.axes = plots.map(u => u.axes.map(a => a.label));
+  found.labels = plots[0].axes[1].values(plots[0], [-2e-4, 0, 2e-4, 0.3], 1, 50, 2e-4);
   found.linked = plots.map(u => u.cursor.idx);
   over.dispatchEvent(new w.MouseEvent("mousedown", at(0.3)));
   d.dispatchEvent(new w.MouseEvent("mousemove", at(0.5)));
@@ -220,6 +221,7 @@ def test_page_works_in_a_browser_at_desktop_and_phone_width(html, tmp_path):
         assert found["steps"][1] < 0.7 * found["steps"][0]  # finer where it is zoomed
         assert found["axes"][0] == ["s (m)", "ΔQ/Q₀ (%)"]
         assert all(all(labels) for labels in found["axes"])
+        assert [float(text) for text in found["labels"]] == [-2e-4, 0.0, 2e-4, 0.3]
         assert found["changed"]
         assert 0.01 < found["ink"] < 0.9
 

@@ -203,9 +203,13 @@ def test_curving_over_a_grid(capsys, tmp_path):
         (["critical-speed", "coach_manchester", "--from", "60", "--to", "50"], "--from"),
         (["critical-speed", "coach_manchester", "--to", "500"], "--to"),
         (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
+        (["critical-speed", "coach_manchester", "--friction", "0,4"], "--friction: found 4; "),
         (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
         (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
-        (["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"], "nothing"),
+        (
+            ["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"],
+            "--over: nothing",
+        ),
         (
             [
                 "critical-speed",

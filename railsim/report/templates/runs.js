@@ -21,8 +21,16 @@
     select.addEventListener("change", change);
     return select;
   }
+  /* uPlot's own labels have three decimals at most: 0, 0 and -0 along an axis of small values */
+  function labels(_, splits, index, space, step) {
+    var format = new Intl.NumberFormat(navigator.language, { maximumFractionDigits: Math.min(12, Math.max(3, 1 + Math.ceil(-Math.log10(step)))) });
+    return splits.map(function (v) {
+      return v === null ? null : step < 0.001 && v !== 0 && Math.abs(v) < 0.001 ? Number(v.toPrecision(4)).toExponential() : format.format(v + 0);
+    });
+  }
   function axis(label, size) {
     return {
+      values: labels,
       label: label || undefined, labelSize: label ? 18 : 0, labelFont: "12px system-ui, sans-serif",
       font: "11px system-ui, sans-serif", size: size, gap: 3,
       stroke: function () { return colour("--soft"); },
