@@ -40,6 +40,7 @@ DRAWN = "--draw is for vehicles and tracks"
 @flag(
     "--static", "Also the vehicle at rest, in each load case: wheel loads, heights, springs, stops."
 )
+@option("--track", "Rails and gauge for --static; default straight.", "F")
 @option("--draw", "Draw a vehicle in three views, or a track.", "F.png")
 @load_option
 @set_option
@@ -48,6 +49,7 @@ def command(
     file: str,
     speeds: tuple[float, ...],
     static: bool,
+    track: str | None,
     draw: str | None,
     load: str | None,
     assignments: tuple[str, ...],
@@ -75,7 +77,7 @@ def command(
         found = describe(open_result(file))
     else:
         from railsim.definitions import Vehicle
-        from railsim.definitions.loading import load_any
+        from railsim.definitions.loading import load_any, load_track
         from railsim.description import describe
         from railsim.plottable import Plottable
 
@@ -90,7 +92,8 @@ def command(
             from railsim.description import Description
             from railsim.description.rest import describe_statics
 
-            rest = describe_statics(definition, [definition.load] if load else [])
+            rails = load_track(track) if track is not None else None
+            rest = describe_statics(definition, [definition.load] if load else [], rails)
             chosen = rest.data[definition.load or "design"]
             data = {**found.data, "static": chosen, "load_cases": rest.data}
             found = Description(data, [*found.parts, *rest.parts])

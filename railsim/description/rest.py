@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from railsim.definitions import Vehicle
+from railsim.definitions import Track, Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.description.values import Description, Parts
 from railsim.laws import permitted_part
@@ -13,10 +13,13 @@ from railsim.profiles import Profile
 from railsim.table import Column, Table
 
 
-def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Description:
+def describe_statics(
+    vehicle: Vehicle, loads: Sequence[str | None] = (), track: Track | None = None
+) -> Description:
     """Return how a vehicle stands at rest, and how its bodies oscillate, in several load cases.
 
-    `loads`: load cases, None for the design load; by default all.
+    `loads`: load cases, None for the design load; by default all; `track`: the rails,
+    by default those of `straight`.
     """
     cases = loads or (None, *vehicle.loads)
     data: dict[str, Any] = {}
@@ -24,7 +27,7 @@ def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Desc
     vehicle = permitted_part(vehicle)
     for case in cases:
         loaded = vehicle.replace(load=case)
-        found, frequencies = static_loads(loaded), rest_frequencies(loaded)
+        found, frequencies = static_loads(loaded, track), rest_frequencies(loaded, track=track)
         data[found.load] = {**found.record(), "frequencies": frequencies.records()}
         parts += ["", f"At rest, load '{found.load}'", *(f"  {words}" for words in found.displaced)]
         for table in (*found.tables, frequencies):
@@ -32,13 +35,15 @@ def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Desc
     return Description(data, parts)
 
 
-def rest_frequencies(vehicle: Vehicle, profiles: Mapping[str, Profile] | None = None) -> Table:
+def rest_frequencies(
+    vehicle: Vehicle, profiles: Mapping[str, Profile] | None = None, track: Track | None = None
+) -> Table:
     """Return natural frequencies of bounce, pitch and roll of the sprung bodies.
 
     Each is that of the mode in which the motion has the largest share of the kinetic energy, of
     the vehicle linearised at rest: friction sticks.
     """
-    found = modes(vehicle, speed=SLOW, profiles=profiles).oscillations
+    found = modes(vehicle, track, speed=SLOW, profiles=profiles).oscillations
     motions = {"bounce": "z", "pitch": "pitch", "roll": "roll"}
     rows = []
     for body in flatten(vehicle).of_kind("body"):

@@ -47,6 +47,7 @@ MOST_KEYS = 100_000  # in a file; the largest vehicles and tracks have less
 # A key of too many parts, quoted ones too: the parser's time grows with the square of the number.
 _PART = r"""(?:[\w-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*')[ \t]*\.[ \t]*"""
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}){{{DEEPEST}}}""")
+_DECIMAL_COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 LONGEST_CHAIN = 20  # files that extend each other
 
 KeyPath = tuple[str, ...]
@@ -218,6 +219,8 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
             message = str(error).replace(located.group(0), "")
             key = f"line {located.group(1)}"
             found = f"broken TOML at column {located.group(2)}: {message}"
+            if _DECIMAL_COMMA.search(text.split("\n")[int(located.group(1)) - 1]):
+                found += "; numbers have a decimal point, not a comma"
         else:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"

@@ -30,6 +30,16 @@ DAMPED = 1.5
 """Damping ratio of the lowest vertical mode; secondary dampers give 0.1 to 0.4."""
 WHEEL_LOAD = (8e3, 250e3)
 """Mean static wheel load [N]: an empty light railcar has 20 kN, an ore wagon 200 kN."""
+LONGEST = 50.0
+"""Coordinate of a part [m]: the longest vehicles measure 30 m, the origin lies along them."""
+WHEEL_RADIUS = (0.1, 1.2)
+"""Wheel radius [m]: roller wagons have 0.16 m, steam locomotives 1.1 m."""
+BACK_TO_BACK = 2.5
+"""Distance between the backs of the flanges [m]: as the widest gauge of a track."""
+REACH = 1.5
+"""Distance along the vehicle from an axle to an element that acts on it [m]: half a wheelbase."""
+INERTIA = 1.3
+"""Moment of inertia over the sum of the other two: at most 1, in published data up to 1.29."""
 SPRING_LOAD = (0.6, 1.5)
 """Static load of a spring over the load at which its length was measured."""
 SPRING_TRAVEL = 0.7
@@ -52,7 +62,8 @@ def vehicle_remarks(
     carbody: below the rails, z up to 1.8 m: z points down, a height of 1 m is z = -1
     """
     flat = flatten(vehicle) if balanced is None else balanced.flat
-    found = [*_below_the_rails(flat), *_wheel_load(flat), *_vertical_modes(flat)]
+    found = [*_below_the_rails(flat), *_lengths(flat), *_other_axles(flat), *_inertias(flat)]
+    found += [*_wheel_load(flat), *_vertical_modes(flat)]
     found += _by_text(_pulling(flat))
     return [*found, *_supports(vehicle, balanced)] if supports else found
 
@@ -65,11 +76,64 @@ def gathered(what: str, names: Sequence[str]) -> Remark:
 
 
 def _below_the_rails(flat: FlatVehicle) -> Iterator[Remark]:
-    names = [body.name for body in flat.bodies if body.kind == "body" and body.position[2] > 0.0]
+    heights = {body.name: body.position[2] for body in flat.bodies if body.kind == "body"}
+    heights |= {e.name: max(e.point1[2], e.point2[2]) for e in flat.elements}
+    names = [name for name, z in heights.items() if z > 0.0]
     if names:
-        low = max(body.position[2] for body in flat.bodies)
+        low = max(heights.values())
         text = f"below the rails, z up to {low:g} m: z points down, a height of 1 m is z = -1"
         yield gathered(text, names)
+
+
+def _lengths(flat: FlatVehicle) -> Iterator[Remark]:
+    """Remarks on lengths that are not those of a railway vehicle in metres."""
+    far = {body.name: max(map(abs, body.position)) for body in flat.bodies}
+    far |= {e.name: max(map(abs, (*e.point1, *e.point2))) for e in flat.elements}
+    names = [name for name, most in far.items() if most > LONGEST]
+    if names:
+        yield gathered(f"up to {max(far.values()):g} m from the origin: are lengths in m?", names)
+    low, high = WHEEL_RADIUS
+    usual = f"railways have {low:g} to {high:g} m"
+    texts: dict[str, list[str]] = {}
+    for body in flat.bodies:
+        if body.wheelset is None:
+            continue
+        for radius in body.wheelset.radius:
+            if not low <= radius <= high:
+                texts.setdefault(f"wheel radius {radius:g} m, {usual}", []).append(body.name)
+        backs = body.wheelset.back_to_back
+        if backs > BACK_TO_BACK:
+            text = f"back_to_back {backs:g} m, usual is at most {BACK_TO_BACK:g} m"
+            texts.setdefault(text, []).append(body.name)
+    for text, parts in texts.items():
+        yield gathered(f"{text}: is it in m?", list(dict.fromkeys(parts)))
+
+
+def _other_axles(flat: FlatVehicle) -> Iterator[Remark]:
+    """Remarks on elements that act on an axle far from them, mostly another one than meant."""
+    yield from _by_text(_far_from_axles(flat))
+
+
+def _far_from_axles(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
+    axles = {b.name: b.position[0] for b in flat.bodies if b.kind in ("wheelset", "axlebox")}
+    for element in flat.elements:
+        for body, point in ((element.body1, element.point1), (element.body2, element.point2)):
+            away = abs(point[0] - axles.get(body, point[0]))
+            if away > REACH:
+                text = (
+                    f"acts on {body} from {away:.3g} m along the vehicle: another axle's element?"
+                )
+                yield text, element
+
+
+def _inertias(flat: FlatVehicle) -> Iterator[Remark]:
+    """Remarks on moments of inertia that no distribution of mass has, as Ixx + Iyy >= Izz."""
+    names = [
+        b.name for b in flat.bodies if max(b.inertia) > INERTIA * (sum(b.inertia) - max(b.inertia))
+    ]
+    if names:
+        text = "a moment of inertia is greater than the sum of the other two, which no body has"
+        yield gathered(f"{text}: Ixx, Iyy, Izz in this order?", names)
 
 
 def _wheel_load(flat: FlatVehicle) -> Iterator[Remark]:

@@ -125,6 +125,7 @@ def _csv(file: str, lines: list[str]) -> Points:
     rows: list[Row] = []
     unit: float | None = None
     columns = (0, 1)
+    named = 0  # columns of the header
     for number, line in enumerate(lines, start=1):
         text = line.strip()
         if not text or text.startswith("#"):
@@ -133,7 +134,12 @@ def _csv(file: str, lines: list[str]) -> Points:
         if not rows and _number(cells[0]) is None:
             names = [cell.strip().strip('"').lower() for cell in cells]
             columns, unit = _header(file, number, names)
+            named = len(names)
             continue
+        if named and len(cells) == 2 * named and ";" not in text and "," in text:
+            found = f"{len(cells)} values under {named} names: {_shown(cells)}"
+            remedy = "a decimal comma needs semicolons between the columns, or give decimal points"
+            raise _fault(file, number, found, remedy)
         if len(cells) <= max(columns):
             raise _fault(file, number, f"{len(cells)} columns: {_shown(cells)}")
         rows.append(_row(file, [cells[column] for column in columns], number))

@@ -209,3 +209,17 @@ def test_result_shows_status_dimensions_and_units(capsys, tmp_path):
     data = data_of(capsys, path)
     assert data["quantities"]["sum_Y"]["dims"] == ["time", "wheelset"]
     assert "vehicle_toml" not in data["attributes"]
+
+
+def test_a_vehicle_of_another_gauge_stands_on_the_rails_of_a_track(tmp_path, capsys):
+    metre = ["--set", "assemblies.bogie.assemblies.axle.wheelsets.wheelset.back_to_back=0.925"]
+    track = tmp_path / "metre.toml"
+    track.write_text(
+        'format = "railsim-track/1"\nname = "metre gauge"\ngauge = 1.0\n'
+        'plan = [{ type = "STR", length = 100.0 }]\n'
+    )
+    asked = ["info", "wagon_y25", "--static", *metre]
+    assert cli.main(asked) == 2
+    assert "check gauge" in capsys.readouterr().err
+    assert cli.main([*asked, "--track", str(track)]) == 0
+    assert "At rest, load 'design'" in capsys.readouterr().out

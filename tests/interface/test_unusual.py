@@ -36,13 +36,13 @@ INCLINED = {  # 3 parts across, 4 down of 5
 }
 
 
-def vehicle(body=(), spring=(), **others):
+def vehicle(body=(), spring=(), axle=(), **others):
     return Vehicle.model_validate(
         {
             "format": "railsim-vehicle/1",
             "name": "half a wagon",
             "bodies": {"frame": {**BODY, **dict(body)}},
-            "wheelsets": {"axle": AXLE},
+            "wheelsets": {"axle": {**AXLE, **dict(axle)}},
             "elements": {"spring": {**SPRING, **dict(spring)}, **others},
         }
     )
@@ -56,6 +56,29 @@ def vehicle(body=(), spring=(), **others):
         (vehicle(spring={"stiffness": [2e9, 2e9, 4e8]}), "frame", "bounces at 50.3 Hz"),
         (vehicle(spring=INCLINED), "frame", "bounces at 40.3 Hz"),  # sqrt(2 0.8^2 k/m)/(2 pi)
         (vehicle(spring={"damping": [0.0, 0.0, 5e6]}), "frame", "damping ratio 62.5 of its bounce"),
+        (
+            vehicle(spring={"points": [[0.0, 1.0, 0.9], [0.0, 1.0, 0.6]]}),
+            "spring.left, spring.right",
+            "below the rails, z up to 0.9 m",
+        ),
+        (
+            vehicle(spring={"points": [[0.0, 1000.0, -900.0], [0.0, 1000.0, -600.0]]}),
+            "spring.left, spring.right",
+            "up to 1000 m from the origin: are lengths in m?",
+        ),
+        (
+            vehicle(axle={"radius": 460.0, "position": [0.0, 0.0, -460.0]}),
+            "axle",
+            "wheel radius 460 m",
+        ),
+        (vehicle(axle={"back_to_back": 1360.0}), "axle", "back_to_back 1360 m"),
+        (
+            vehicle(spring={"points": [[-6.0, 1.0, -0.9], [-6.0, 1.0, -0.6]]}),
+            "spring.left, spring.right",
+            "acts on axle from 6 m along the vehicle",
+        ),
+        # a plate, the limit, has Izz = Ixx + Iyy = 14000 kg m2
+        (vehicle(body={"inertia": [5e3, 9e3, 20e3]}), "frame", "greater than the sum of the other"),
         (vehicle(body={"mass": 8.0}), "mass", "mean static wheel load 6.42 kN"),
         (
             # it stands on a bracket in front of the axle, which would have to pull at the back

@@ -24,6 +24,11 @@ LEVEL = {"type": "CST", "length": 100.0, "cant": 0.0}
 RAMP = {"type": "LIR", "length": 50.0}
 CANTED = {"type": "CST", "length": 80.0, "cant": 0.1}
 DIP = {"type": "dip", "s": 500.0, "length": 4.0, "depth": 0.01}
+RECORDED = {
+    "type": "measured",
+    "rows": [[s, *4 * [0.0]] for s in (12000.0, 12020.0, 12040.0, 12050.0)],
+    "shift": 100.0,
+}
 RANDOM = {"type": "random", "spectrum": "erri_b176_low"}
 
 
@@ -95,6 +100,8 @@ def test_contradicting_track_is_refused(plan, cant, expected):
         ),
         ([STRAIGHT], [], {"irregularities": [DIP]}, "irregularities.0: from 498 to 502 m"),
         ([STRAIGHT], [], {"irregularities": [{**RANDOM, "begin": 100.0, "end": 200.0}]}, "beyond"),
+        # from 12100 to 12150 m with its shift of 100 m; its first row is at 12000 m
+        ([STRAIGHT], [], {"irregularities": [RECORDED]}, "shift = -12000 puts its begin at s = 0"),
     ],
 )
 def test_unusual_track_is_remarked_on(plan, cant, more, expected):

@@ -214,6 +214,7 @@ def test_file_that_extends_itself_is_refused(write):
         ("x = 1\ny = = 2\n", "line 2", "broken TOML"),
         ('x = "open', "line 1", "broken TOML"),
         ("[a]\n[a]\n", "line 2", "broken TOML"),
+        ("x = 1\nmass = 26000,5\n", "line 2", "a decimal point, not a comma"),
     ],
 )
 def test_broken_toml_is_reported_with_its_line(write, text, key, found):

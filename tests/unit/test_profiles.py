@@ -298,6 +298,7 @@ def test_rail_given_as_wheel_and_wheel_given_as_rail_are_refused(tmp_path):
         ("", "0 points"),
         ("a,b\n1,2\n", "unknown columns"),
         ("y_mm,z_mm\n1\n", "columns"),
+        ("y_mm,z_mm\n-70,0,9,5\n-69,5,9,4\n", "4 values under 2 names"),
         ("\x00\x01", "not a text file"),
     ],
 )

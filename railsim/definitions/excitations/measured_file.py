@@ -197,7 +197,7 @@ def _row_faults(
         yield k, "an absolute gauge", allowed
     largest = rails.max(axis=1)
     for k in np.flatnonzero(~absolute & (largest > LARGEST)).tolist():
-        allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
+        allowed = f"{LARGEST:g} m at most; is the column in mm? then name it so (_mm, or units)"
         yield k, f"a displacement of {largest[k]:g} m", allowed
 
 

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from railsim.definitions.base import Remark
+from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.track.alignment_rules import alignment_remarks
 from railsim.definitions.track.elements import TrackElement
 from railsim.definitions.track.section import Section
@@ -101,6 +102,10 @@ def track_remarks(track: "Track") -> list[Remark]:
         begin, end = shape.extent(track.length)
         if end <= 0.0 or begin >= track.length:  # the track sees nothing of it
             text = f"from {begin:g} to {end:g} m, beyond the track's {track.length:g} m"
+            if isinstance(shape, Measured):
+                text += (
+                    f"; is it a mileage? shift = {shape.shift - begin:g} puts its begin at s = 0"
+                )
             remarks.append(Remark(f"irregularities.{k}", text))
     return remarks
 
