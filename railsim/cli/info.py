@@ -67,6 +67,8 @@ def command(
     runs = os.path.isdir(file) or path.name in STUDY_FILES
     if draw is not None and (result or runs):
         raise click.UsageError(f"{DRAWN}; see `railsim plot`")
+    if track is not None and not static:
+        raise click.UsageError("--track goes with --static")
     remarks: list[Remark] = []
     if runs:
         found = described_runs(file)

@@ -30,8 +30,8 @@ DAMPED = 1.5
 """Damping ratio of the lowest vertical mode; secondary dampers give 0.1 to 0.4."""
 WHEEL_LOAD = (8e3, 250e3)
 """Mean static wheel load [N]: an empty light railcar has 20 kN, an ore wagon 200 kN."""
-LONGEST = 50.0
-"""Coordinate of a part [m]: the longest vehicles measure 30 m, the origin lies along them."""
+LONGEST = 500.0
+"""Coordinate of a part [m]: trains measure up to 400 m; a vehicle in mm reaches thousands."""
 WHEEL_RADIUS = (0.1, 1.2)
 """Wheel radius [m]: roller wagons have 0.16 m, steam locomotives 1.1 m."""
 BACK_TO_BACK = 2.5

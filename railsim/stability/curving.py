@@ -187,10 +187,10 @@ def curving(
     vehicle: Vehicle,
     track: Track | None = None,
     *,
-    radius: Sequence[float],
+    radius: float | Sequence[float],
     cant: float = 0.15,
-    cant_deficiency: Sequence[float] = (0.0,),
-    friction: Sequence[float] | None = None,
+    cant_deficiency: float | Sequence[float] = 0.0,
+    friction: float | Sequence[float] | None = None,
     settings: Settings | None = None,
     profiles: Mapping[str, Profile] | None = None,
     progress: Progress | None = None,
@@ -203,13 +203,13 @@ def curving(
         See `load_vehicle`.
     track : Track, optional
         Whose rails, gauge, inclination and support count; by default ``straight``.
-    radius : sequence of float
+    radius : float or sequence of float
         Radii, positive to the right [m].
     cant : float
         Of the outer rail over the inner one [m].
-    cant_deficiency : sequence of float
+    cant_deficiency : float or sequence of float
         What is missing to the balanced cant, negative for too much [m].
-    friction : sequence of float, optional
+    friction : float or sequence of float, optional
         Coefficients of friction of both rails; by default those of the track's rails at its
         beginning, of which the result holds the mean.
     settings : Settings, optional
@@ -236,22 +236,27 @@ def curving(
     """
     track = track or load_track("straight")
     both = track.friction_at(0.0)
-    mus = list(friction) if friction is not None else [float(np.mean(both))]
-    _check(radius, cant, cant_deficiency, mus)
+    radii, deficiencies = _several(radius), _several(cant_deficiency)
+    mus = _several(friction) if friction is not None else [float(np.mean(both))]
+    _check(radii, cant, deficiencies, mus)
     search = _Search(vehicle, track, cant, settings or Settings(), profiles)
     if friction is None and mus[0] > 0.0:
         search.shares = both / mus[0]
-    found = search.empty(radius, cant_deficiency, mus)
+    found = search.empty(radii, deficiencies, mus)
     # from wide to narrow, each point from its neighbour
-    order = sorted(range(len(radius)), key=lambda k: -abs(radius[k]))
+    order = sorted(range(len(radii)), key=lambda k: -abs(radii[k]))
     for m, mu in enumerate(mus):
-        for i, deficiency in enumerate(cant_deficiency):
+        for i, deficiency in enumerate(deficiencies):
             for k, r in enumerate(order):
-                search.fill(found, (r, i, m), search.point(radius[r], deficiency, mu))
+                search.fill(found, (r, i, m), search.point(radii[r], deficiency, mu))
                 if progress is not None:
-                    done = (m * len(cant_deficiency) + i) * len(radius) + k + 1
+                    done = (m * len(deficiencies) + i) * len(radii) + k + 1
                     progress(done / found.converged.size)
     return found
+
+
+def _several(values: float | Sequence[float]) -> list[float]:
+    return [float(value) for value in np.atleast_1d(values)]
 
 
 def _check(

@@ -63,7 +63,7 @@ def test_runs_on_rails_of_different_friction_are_not_pooled():
 def test_curving_is_on_the_friction_that_the_track_begins_with():
     coach = railsim.load_vehicle("coach_manchester")
     by_table = on_rails(((0.0, 0.25, 0.25), (1000.0, 0.5, 0.5)))
-    found = railsim.curving(coach, by_table, radius=[400.0])
+    found = railsim.curving(coach, by_table, radius=400.0)
     expected = railsim.curving(coach, track(STRAIGHT), radius=[400.0], friction=[0.25])
     assert found.friction.tolist() == [0.25]
     np.testing.assert_allclose(found.Y, expected.Y, rtol=1e-6)

@@ -121,6 +121,11 @@ def test_vehicles_and_tracks_can_be_drawn(capsys, tmp_path, name):
     assert "--overwrite" in capsys.readouterr().err
 
 
+def test_a_track_without_the_forces_at_rest_is_refused(capsys):
+    assert cli.main(["info", "coach_manchester", "--track", "straight"]) == 2
+    assert "--track goes with --static" in capsys.readouterr().err
+
+
 def test_drawing_of_a_spring_is_refused(capsys, tmp_path):
     path = tmp_path / "drawing.png"
     assert cli.main(["info", "turasas_axlebox", "--draw", str(path)]) == 2
