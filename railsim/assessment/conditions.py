@@ -2,7 +2,7 @@
 
 What is compared: sections (number, mean radius, both hands, independence, quality of the track) in
 each zone of each population; conicity, load states and friction over all runs of the vehicle.
-Of them fault modes need a section that is judged, in any zone.
+A fault mode needs only one judged section, in any zone.
 """
 
 from collections import Counter

@@ -140,12 +140,12 @@ class Unit:
         self._command()
         goes_on = run.step(step_size)
         self._look()
-        if goes_on:  # up to a thousandth of a step beside it, which the next call makes up for
-            self._time = current_time + step_size
         if not goes_on:
             ended = status.ok if self._status == "complete" else status.warning
             self.log(f"the run has ended: {self._status}, {run.status_reason}", ended)
             return outcome(ended, terminateSimulation=True)
+        # the run may be a thousandth of a step off; the next call makes up for it
+        self._time = current_time + step_size
         return outcome()
 
     def terminate(self) -> None:

@@ -16,7 +16,7 @@ continuously differentiable) and are interpolated linearly in w, whose nodes lie
 where vehicles run, and continued linearly beyond the last of them.  The contact force is the
 gradient of U = 2/5 K e^(5/2) + 1/3 K2 e^3 *through this spline*, hence conservative by
 construction, whatever the table holds.  Only the first four fields, those of the force, have
-gradients.  What has to stay above zero is continued no further than `continue_limited` lets it.
+gradients.  Stiffness and width of a patch are continued as far as `continue_limited` lets them.
 
 The first axis of the grid is s = y - shear * roll, the lateral displacement of the wheel's foot,
 see `railsim.contact.table`.
@@ -66,8 +66,8 @@ MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
 SETTLED = 1e-8
 FURTHEST_W = 2.0  # over the last node of w: as far is the table continued
-# of stiffness and width of a patch at the last node of w, as far as they are continued; root of the
-# penetration at which that is judged (m^0.5)
+# Least share of the last node's stiffness and width that a continued patch keeps; root of the
+# penetration at which stiffness is judged beside that at none [m^0.5].
 LEAST_SHARE, JUDGED_AT = 0.5, 0.01
 
 
@@ -211,10 +211,18 @@ _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_node
 
 
 @compiled(inline=True)
-def allowed_part(there, here):
-    """Part of the way from a value at the last node to its continuation that is gone."""
+def allowed_part(there, there_y, there_roll, here, here_y, here_roll):
+    """Part of the way from a value at the last node to its continuation that is gone.
+
+    With its derivatives after y and roll, from those of both values.
+    """
     least = LEAST_SHARE * there
-    return 1.0 if here >= least else (there - least) / (there - here)
+    if there <= 0.0 or here >= least:
+        return 1.0, 0.0, 0.0
+    fall = there - here
+    gain = (there - least) / (there * fall * fall)
+    part_y = gain * (there * here_y - here * there_y)
+    return (there - least) / fall, part_y, gain * (there * here_roll - here * there_roll)
 
 
 @compiled(python=False)
@@ -223,24 +231,42 @@ def continue_limited(values, start, row, slab, weights, tw, out, first):
 
     A flange that is yawed comes to touch far ahead, where stiffness and width of its patch fall
     fast: along a straight line they would become negative, and the forces no numbers.  They go no
-    further than to a share of what they are at the last node.
+    further than to a share of what they are at the last node, the stiffness at no penetration and
+    at `JUDGED_AT`; its gradients are those of what is left.
     """
     _sum_of_nodes(values, start, row, slab, weights, 1.0, out, first)
     k, k_y, k_roll = out[first + K], out[first + K_Y], out[first + K_ROLL]
     k2, k2_y, k2_roll = out[first + K2], out[first + K2_Y], out[first + K2_ROLL]
     a1, b1, d_b1 = out[first + A1], out[first + B1], out[first + D_B1]
     _sum_of_nodes(values, start, row, slab, weights, tw, out, first)
-    part = allowed_part(k + JUDGED_AT * k2, out[first + K] + JUDGED_AT * out[first + K2])
+    fall, fall_y, fall_roll = (
+        out[first + K] - k,
+        out[first + K_Y] - k_y,
+        out[first + K_ROLL] - k_roll,
+    )
+    fall2, fall2_y = out[first + K2] - k2, out[first + K2_Y] - k2_y
+    fall2_roll = out[first + K2_ROLL] - k2_roll
+    part, part_y, part_roll = allowed_part(
+        k, k_y, k_roll, out[first + K], out[first + K_Y], out[first + K_ROLL]
+    )
+    other, other_y, other_roll = allowed_part(
+        k + JUDGED_AT * k2, k_y + JUDGED_AT * k2_y, k_roll + JUDGED_AT * k2_roll,
+        out[first + K] + JUDGED_AT * out[first + K2],
+        out[first + K_Y] + JUDGED_AT * out[first + K2_Y],
+        out[first + K_ROLL] + JUDGED_AT * out[first + K2_ROLL],
+    )  # fmt: skip
+    if other < part:
+        part, part_y, part_roll = other, other_y, other_roll
     if part < 1.0:
-        out[first + K] = k + part * (out[first + K] - k)
-        out[first + K_Y] = k_y + part * (out[first + K_Y] - k_y)
-        out[first + K_ROLL] = k_roll + part * (out[first + K_ROLL] - k_roll)
-        out[first + K2] = k2 + part * (out[first + K2] - k2)
-        out[first + K2_Y] = k2_y + part * (out[first + K2_Y] - k2_y)
-        out[first + K2_ROLL] = k2_roll + part * (out[first + K2_ROLL] - k2_roll)
+        out[first + K] = k + part * fall
+        out[first + K_Y] = k_y + part * fall_y + part_y * fall
+        out[first + K_ROLL] = k_roll + part * fall_roll + part_roll * fall
+        out[first + K2] = k2 + part * fall2
+        out[first + K2_Y] = k2_y + part * fall2_y + part_y * fall2
+        out[first + K2_ROLL] = k2_roll + part * fall2_roll + part_roll * fall2
         out[first + K_W] = out[first + K2_W] = 0.0
     narrowest = min(out[first + B1], out[first + B1] + out[first + D_B1])
-    part = allowed_part(min(b1, b1 + d_b1), narrowest)
+    part, _, _ = allowed_part(min(b1, b1 + d_b1), 0.0, 0.0, narrowest, 0.0, 0.0)
     if part < 1.0:
         out[first + A1] = a1 + part * (out[first + A1] - a1)
         out[first + B1] = b1 + part * (out[first + B1] - b1)

@@ -57,9 +57,9 @@ def vehicle_remarks(
     Examples
     --------
     >>> from railsim.definitions.loading import load_vehicle
-    >>> coach = load_vehicle("coach_manchester", ["bodies.carbody.position.2=1.8"])
+    >>> coach = load_vehicle("coach_manchester", ["bodies.carbody.inertia.0=4e7"])
     >>> print(vehicle_remarks(coach)[0])
-    carbody: below the rails, z up to 1.8 m: z points down, a height of 1 m is z = -1
+    carbody: a moment of inertia is above the sum of the other two: Ixx, Iyy, Izz in this order?
     """
     flat = flatten(vehicle) if balanced is None else balanced.flat
     found = [*_below_the_rails(flat), *_lengths(flat), *_other_axles(flat), *_inertias(flat)]
@@ -132,7 +132,7 @@ def _inertias(flat: FlatVehicle) -> Iterator[Remark]:
         b.name for b in flat.bodies if max(b.inertia) > INERTIA * (sum(b.inertia) - max(b.inertia))
     ]
     if names:
-        text = "a moment of inertia is greater than the sum of the other two, which no body has"
+        text = "a moment of inertia is above the sum of the other two"
         yield gathered(f"{text}: Ixx, Iyy, Izz in this order?", names)
 
 

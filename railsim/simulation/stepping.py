@@ -163,7 +163,7 @@ class Simulation:
         return "" if self.running else self._verdict()["status_reason"]
 
     def _verdict(self) -> dict[str, str]:
-        """How the run has ended: by its extremes so far, which a state of before takes back."""
+        """How the run has ended, by its extremes so far; on a copy: a state may be restored."""
         run = copy(self._run)
         run.extremes = run.extremes.copy()
         if self._closed is None:

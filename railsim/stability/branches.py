@@ -57,11 +57,13 @@ def seen_at(speed: float, seen: Stretch, *, stable: bool = True) -> Point:
 class Branch:
     """One branch of a bifurcation diagram.
 
-    `direction`: how it was found; `points`: in the order in which they were found.
+    `direction`: how it was found; `points`: in the order in which they were found; `end`: of a ramp
+    the speed below which its motions only die [m/s].
     """
 
     direction: str
     points: list[Point] = field(default_factory=list)
+    end: float = 0.0
 
     def column(self, name: str) -> Floats:
         """Return one of `COLUMNS` at all points."""

@@ -44,7 +44,9 @@ LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
 NEAR = (0.8, 1.25)  # times the linear critical speed: where most speeds of a diagram stand ...
 SHARE = 0.75  # ... this share of them
-ABOVE = 1.1  # times the speed at which rest is unstable: where a second ramp begins
+# Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
+# what is left to the end of hunting; the range may be narrow.
+ONWARDS, ABOVE = (0.5, 0.1), 0.1
 AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
 OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
@@ -307,18 +309,23 @@ def _by_ramp(
     found.branches.append(branch)
     unstable = found.low if begins.already else begins.parameter
     end = found.high if lowest is None else lowest.speed
+    found.nonlinear["ramp"] = lowest
     if unstable is not None and end > _far_above(unstable):
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
-        top = min(ABOVE * unstable, 0.5 * (unstable + end))
-        below, second = ramp(motion, found.low, top, progress, excitations)
-        found.branches.append(second)
-        lowest = below or lowest
-        if below is None:
+        reach = min(ABOVE * unstable, end - unstable)
+        tops = [unstable + share * reach for share in ONWARDS]
+        for top in tops:
+            below, further = ramp(motion, found.low, top, excitations=excitations)
+            found.branches.append(further)
+            if below is not None:
+                found.nonlinear["ramp"] = lowest = below
+                break
+        else:
+            words = " and ".join(f"{top:.4g}" for top in tops)
             found.remarks.append(
-                f"ramp: rest is unstable at {unstable:.4g} m/s, but grows too slowly there for a "
-                "ramp to show what it becomes (bifurcation)"
+                f"ramp: rest is unstable at {unstable:.4g} m/s, but nothing lasts that is excited "
+                f"at {words} m/s (bifurcation)"
             )
-    found.nonlinear["ramp"] = lowest
     if lowest is None:
         found.remarks.append(f"ramp: nothing hunts from {found.low:g} to {found.high:g} m/s")
     elif lowest.speed <= found.low:
@@ -421,10 +428,9 @@ def _conclude(
     branches = [branch for branch in found.branches if branch.direction != "ramp"]
     only_ramp = not branches
     if only_ramp:
-        end = np.inf if lowest is None else lowest.speed
         branches = [
-            Branch(branch.direction, [point for point in branch.points if point.speed >= end])
-            for branch in found.branches
+            Branch(one.direction, [point for point in one.points if point.speed >= one.end])
+            for one in found.branches
         ]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.high)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.high)

@@ -5,6 +5,7 @@ at constant speed from states of the ramp decide, and the speed is bisected (Pol
 Kaiser 2012).
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -101,7 +102,8 @@ def ramp(
     begin = min(hard[0].speed, hard[-1].speed + LEAD)
     points = [point for point in hard if point.speed >= begin]
     _brake(motion, points, low, DECELERATION, lambda share: tell(0.3 + 0.4 * share))
-    return _lowest(motion, points), Branch("ramp", points)
+    lowest = _lowest(motion, points)
+    return lowest, Branch("ramp", points, math.inf if lowest is None else lowest.speed)
 
 
 def _brake(

@@ -87,7 +87,7 @@ class CriticalSpeed(Plottable):
     - `type`: whether anything hunts below the speed at which rest loses its stability, in the runs'
       own law; empty where it was not looked for, rest is unstable at the lower end already, or
       nothing was seen to hunt where it becomes so
-    - `unstable_at_low`: whether rest is unstable at the lower end of the range
+    - `unstable_at_low`: whether rest is unstable at the lower end, as linearised for `linear`
     - `onset`: how the small motions begin there, whatever else is possible
     - `amplitude_limit`, `instability_limit`: amplitude of 3 mm, and half the limit of the
       track-shifting force as rms

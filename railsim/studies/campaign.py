@@ -41,7 +41,8 @@ from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
 
-MOST, STEP = 20, 10  # seeds of a part, and between two of them: tracks of zones lie between
+MOST = 20  # seeds of a part
+STEP = 10  # between two of them: seeds of the zones' own tracks lie in between
 LATERAL, VERTICAL = ("lateral", "gauge"), ("vertical", "cross_level")
 
 

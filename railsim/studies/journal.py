@@ -17,11 +17,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Self, overload
 
-import orjson
-
 from railsim.errors import argument_error, input_error
 from railsim.files.access import locked
-from railsim.studies.records import Record, json_bytes
+from railsim.studies.records import Record, json_bytes, parsed
 
 JOURNAL = "study.journal"
 FORMAT = "railsim-study-journal/1"
@@ -108,9 +106,9 @@ class Journal:
             if line[:9] != b"%08x\t" % crc or not line.endswith(b"\n"):
                 raise ValueError
             end = line.index(b"\t", 9)
-            facts = orjson.loads(line[9:end])
+            facts = parsed(line[9:end])
             if "format" in facts:
-                self.inputs = orjson.loads(line[end + 1 :]) if facts["format"] == FORMAT else None
+                self.inputs = parsed(line[end + 1 :]) if facts["format"] == FORMAT else None
                 return
             entry = Entry(**facts, offset=offset + end + 1, length=len(line) - end - 2)
             self.entries[entry.name] = entry
@@ -221,7 +219,7 @@ class Records(Sequence[Record]):
 
     def _record(self, entry: Entry, text: bytes) -> Record:
         try:
-            record: Record = orjson.loads(text)
+            record: Record = parsed(text)
             if not record.keys() >= RECORD or not isinstance(record["labels"], dict):
                 raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
         except (ValueError, AttributeError) as error:

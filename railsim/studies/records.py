@@ -6,6 +6,8 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+import orjson
+
 from railsim.errors import input_error
 from railsim.files.access import TABLE_BYTES, make_folder, read_text, write_text
 
@@ -47,6 +49,20 @@ def finite(data: Any) -> Any:
     if isinstance(data, list | tuple):
         return [finite(value) for value in data]
     return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def parsed(text: bytes) -> Any:
+    """Return what JSON holds.
+
+    Raises ValueError: it is broken, or nested too deeply.
+    """
+    try:
+        return orjson.loads(text)
+    except orjson.JSONDecodeError:
+        try:
+            return json.loads(text)  # names of files that are no UTF-8
+        except RecursionError as error:
+            raise ValueError(str(error)) from None
 
 
 def json_bytes(data: Any) -> bytes:

@@ -191,7 +191,7 @@ def _write_rows(rows: Iterable[Row], stream: BinaryIO) -> None:
             if row.keys() != columns.keys():
                 columns.update(dict.fromkeys(row))
             cells = [row.get(name, "") for name in columns]
-            line = _csv_line([spreadsheet_cell(c) if type(c) is str else c for c in cells])
+            line = _csv_line([spreadsheet_cell(c) if isinstance(c, str) else c for c in cells])
             lines.write(line)
             sizes.append((len(line), len(columns)))
         units = {name: unit_of(name) for name in columns}

@@ -78,7 +78,7 @@ def vehicle(body=(), spring=(), axle=(), **others):
             "acts on axle from 6 m along the vehicle",
         ),
         # a plate, the limit, has Izz = Ixx + Iyy = 14000 kg m2
-        (vehicle(body={"inertia": [5e3, 9e3, 20e3]}), "frame", "greater than the sum of the other"),
+        (vehicle(body={"inertia": [5e3, 9e3, 20e3]}), "frame", "above the sum of the other"),
         (vehicle(body={"mass": 8.0}), "mass", "mean static wheel load 6.42 kN"),
         (
             # it stands on a bracket in front of the axle, which would have to pull at the back

@@ -103,6 +103,35 @@ def test_a_ramp_goes_on_where_rest_is_unstable_below_the_speed_at_which_it_dies(
     assert [branch.direction for branch in found.branches] == ["ramp", "ramp"]
 
 
+@pytest.mark.parametrize("half", [0.5, 0.8, 6.5])
+def test_a_ramp_goes_on_in_a_narrow_range_too(half):
+    """Unstable from 17 m/s over twice `half`, and above 60 m/s."""
+
+    def growth(speed):
+        return max(0.2 * (speed - 60.0), 0.5 - 0.5 * ((speed - 17.0 - half) / half) ** 2)
+
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=70.0)
+    begins = LossOfStability(17.0, False, ())
+    _by_ramp(found, Cycles(growth, 5.0), begins, (1e-3, 3e-3), lambda _: None)
+    assert found.nonlinear["ramp"].speed == pytest.approx(17.0, abs=0.3)
+    assert found.remarks == []
+
+
+def test_motions_that_die_above_a_range_of_hunting_are_no_hunting():
+    """Excited by 1 to 6 mm all dies above 35 m/s; it lasts from 17 to 30 m/s."""
+
+    def growth(speed):
+        return -0.02 if speed > 35.0 else 0.5 - 0.5 * ((speed - 23.5) / 6.5) ** 2
+
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=70.0)
+    begins, sizes = LossOfStability(17.0, False, ()), (1e-3, 3e-3, 6e-3)
+    _by_ramp(found, Cycles(growth, 5.0), begins, sizes, lambda _: None)
+    first, further = found.branches
+    assert found.lowest.speed == pytest.approx(17.0, abs=0.5)
+    assert first.end == np.inf
+    assert further.end == found.lowest.speed
+
+
 def test_where_rest_is_unstable_from_the_start_the_type_is_not_known():
     """The bifurcation lies below the range: its kind cannot be seen."""
     found = critical_speed(

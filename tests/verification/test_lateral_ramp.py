@@ -21,6 +21,8 @@ from railsim.kernels.contact_table import (
     D_B1,
     FURTHEST_W,
     K2,
+    K2_Y,
+    K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
     N_WEIGHT,
@@ -86,34 +88,55 @@ def test_smooth_and_sharp_ramps_below_60_mrad_have_no_remark():
     assert not any("contact table" in remark for remark in result.remarks)
 
 
-def looked_up_beyond(contact, shares):
-    """Stiffness at 0.1 mm and least width of all patches, at shares of the table's yaw squared.
-
-    Shape (share, y, patch), over the range of y at no roll.
-    """
-    _, _, n_w, n_roll, n_y, _ = contact.values.shape
+def looked_up(contact, patch, j, share, t=0.5):
+    """Fields of a patch in cell `j` of y at no roll, at a share of the table's last yaw squared."""
+    _, _, n_w, n_roll, _, _ = contact.values.shape
     weights, out = np.empty(N_WEIGHT), np.empty(LOOK_UP_SIZE)
-    stiffness, width = np.empty((2, len(shares), n_y - 3, N_PATCH))
-    cell_weights(contact, 0.5, 0.0, 1.0, weights)
-    for i, share in enumerate(shares):
-        tw = 1.0 + (share - 1.0) * contact.w[-1] / (contact.w[-1] - contact.w[-2])
-        for j in range(n_y - 3):
-            for patch in range(N_PATCH):
-                look_up(contact, 0, patch, j + 1, n_roll // 2, n_w - 2, tw, weights, out)
-                stiffness[i, j, patch] = out[K] + 0.01 * out[K2]
-                width[i, j, patch] = min(out[B1], out[B1] + out[D_B1])
-    return stiffness, width
+    cell_weights(contact, t, 0.0, 1.0, weights)
+    tw = 1.0 + (share - 1.0) * contact.w[-1] / (contact.w[-1] - contact.w[-2])
+    look_up(contact, 0, patch, j + 1, n_roll // 2, n_w - 2, tw, weights, out)
+    return out
 
 
-def test_patches_keep_stiffness_and_width_as_far_as_the_table_is_continued():
-    """A straight line takes those of a yawed flange below zero: the run ended as not finite."""
+def every_patch(contact):
+    """Cells of y with each patch of the wheel."""
+    return [(patch, j) for j in range(contact.values.shape[4] - 3) for patch in range(N_PATCH)]
+
+
+@pytest.fixture(scope="module")
+def contact():
     vehicle, track = load_vehicle("coach_manchester"), load_any_track("straight")
-    model = assembly.assemble(vehicle, track, Settings())
-    stiffness, width = looked_up_beyond(model.system.contact, [1.0, 1.2, 1.56, FURTHEST_W])
-    exists = (stiffness[0] > 0.0) & (width[0] > 0.0)
-    assert exists.any(axis=1).all()
-    assert np.all(stiffness[:, exists] > 0.0)
-    assert np.all(width[:, exists] > 0.0)
+    return assembly.assemble(vehicle, track, Settings()).system.contact
+
+
+@pytest.mark.parametrize("root", [0.0, 0.005, 0.01])
+def test_patches_keep_stiffness_and_width_as_far_as_the_table_is_continued(contact, root):
+    """A straight line takes those of a yawed flange below zero: the run ended as not finite.
+
+    `root`: of the penetration [m^0.5].
+    """
+    shares, patches = [1.0, 1.2, 1.56, FURTHEST_W], every_patch(contact)
+    found = np.array([[looked_up(contact, *one, share) for one in patches] for share in shares])
+    exists = (found[0, :, K] > 0.0) & (found[0, :, K] + 0.01 * found[0, :, K2] > 0.0)
+    exists &= np.minimum(found[0, :, B1], found[0, :, B1] + found[0, :, D_B1]) > 0.0
+    assert exists.sum() > 500
+    assert np.all(found[:, exists, K] + root * found[:, exists, K2] > 0.0)
+    assert np.all(np.minimum(found[..., B1], found[..., B1] + found[..., D_B1])[:, exists] > 0.0)
+
+
+def test_gradients_of_continued_patches_are_those_of_their_stiffness(contact):
+    """The force stays the gradient of an energy: difference quotients over y."""
+    step, limited = 1e-4, 0
+    for patch, j in every_patch(contact):
+        inner, found = (looked_up(contact, patch, j, share) for share in (1.0, 1.3))
+        if inner[K] < 1e8 or found[K] > 0.6 * inner[K]:
+            continue
+        before, after = (looked_up(contact, patch, j, 1.3, 0.5 + d) for d in (-step, step))
+        for field, gradient in ((K, K_Y), (K2, K2_Y)):
+            quotient = (after[field] - before[field]) / (2.0 * step * contact.dy)
+            assert found[gradient] == pytest.approx(quotient, rel=1e-4, abs=1e-6 * abs(quotient))
+        limited += 1
+    assert limited > 3
 
 
 @pytest.mark.further
