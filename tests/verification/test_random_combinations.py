@@ -53,8 +53,8 @@ KNOWN = {
 # A flange strikes the ramp's kink on rigid rails with 15 to 111 times the static wheel load, and
 # where the wheelset then goes hangs on the step: by RK4 at 1/8000, 1/16000 and 1/32000 s the root
 # mean square of Q - Q0 of seed 30 is 68, 53 and 58 kN, and seed 65 ends at the first of them; of
-# seed 73 it is 20, 11, 16 and 19 kN at 1/1000, 1/2000, 1/4000 and 1/8000 s, that of sum Y of seed 214
-# 13.2, 13.2, 13.6, 12.7 and 13.3 kN from 1/2000 to 1/32000 s.  Remarks say so.
+# seed 73 it is 20, 11, 16 and 19 kN at 1/1000, 1/2000, 1/4000 and 1/8000 s, that of sum Y of seed
+# 214 13.2, 13.2, 13.6, 12.7 and 13.3 kN from 1/2000 to 1/32000 s.  Remarks say so.
 OPEN = (30, 65, 73, 214)
 TOO_LONG = "the step is too long there"
 BEYOND = "beyond all experience"
