@@ -41,7 +41,7 @@ def rest_frequencies(
     """Return natural frequencies of bounce, pitch and roll of the sprung bodies.
 
     Each is that of the mode in which the motion has the largest share of the kinetic energy, of
-    the vehicle linearised at rest: friction sticks.
+    the vehicle linearised at rest: friction sticks. `profiles`, `track`: as of `railsim.modes`.
     """
     found = modes(vehicle, track, speed=SLOW, profiles=profiles).oscillations
     motions = {"bounce": "z", "pitch": "pitch", "roll": "roll"}

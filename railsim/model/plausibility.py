@@ -62,8 +62,8 @@ def vehicle_remarks(
     carbody: a moment of inertia is above the sum of the other two: Ixx, Iyy, Izz in this order?
     """
     flat = flatten(vehicle) if balanced is None else balanced.flat
-    found = [*_below_the_rails(flat), *_lengths(flat), *_other_axles(flat), *_inertias(flat)]
-    found += [*_wheel_load(flat), *_vertical_modes(flat)]
+    found = [*_below_the_rails(flat), *_lengths(flat), *_by_text(_far_from_axles(flat))]
+    found += [*_inertias(flat), *_wheel_load(flat), *_vertical_modes(flat)]
     found += _by_text(_pulling(flat))
     return [*found, *_supports(vehicle, balanced)] if supports else found
 
@@ -109,12 +109,8 @@ def _lengths(flat: FlatVehicle) -> Iterator[Remark]:
         yield gathered(f"{text}: is it in m?", list(dict.fromkeys(parts)))
 
 
-def _other_axles(flat: FlatVehicle) -> Iterator[Remark]:
-    """Remarks on elements that act on an axle far from them, mostly another one than meant."""
-    yield from _by_text(_far_from_axles(flat))
-
-
 def _far_from_axles(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
+    """Elements that act on an axle far from them, mostly another one than meant."""
     axles = {b.name: b.position[0] for b in flat.bodies if b.kind in ("wheelset", "axlebox")}
     for element in flat.elements:
         for body, point in ((element.body1, element.point1), (element.body2, element.point2)):

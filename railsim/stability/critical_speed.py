@@ -307,9 +307,9 @@ def _by_ramp(
 ) -> None:
     lowest, branch = ramp(motion, found.low, found.high, progress, excitations)
     found.branches.append(branch)
+    found.nonlinear["ramp"] = lowest  # kept if a further one leaves the rails
     unstable = found.low if begins.already else begins.parameter
     end = found.high if lowest is None else lowest.speed
-    found.nonlinear["ramp"] = lowest
     if unstable is not None and end > _far_above(unstable):
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
         reach = min(ABOVE * unstable, end - unstable)
