@@ -116,8 +116,8 @@ def add_slopes(work, w, side, k, across):
     add_to_row(contact, D + 3, damping * f_z, normal)
     add_to_row(contact, D, across * c, (c, -s, arm))
     add_to_row(contact, D + 3, -across * s, (c, -s, arm))
-    contact[D_Y_SLIP] += across * c * c
-    contact[D_Z_SLIP] -= across * s * c
+    contact[D_Y_SLIP] += across
+    contact[D_Z_SLIP] -= across * s / c
     contact[FOOT_Y_STIFFNESS] += stiffness * cy
     contact[FOOT_Z_STIFFNESS] += stiffness * cz
     contact[STIFFNESS] += stiffness

@@ -118,7 +118,7 @@ def motion_of_wheelsets(system, work, state, wheels):
         y - middle_y + height * lean - aside,
         z - middle_z,
         roll - lean,
-        y_rate + height * turn,
+        y_rate - speed * slope + height * turn,
         z_rate - speed * slope_z,
         roll_rate - turn,
         speed * (slope - yaw),
