@@ -40,8 +40,13 @@
     SLOPE_ACROSS,
     SECANT_ALONG,
     RISE,
-) = range(36)
-PATCH_ROWS = 36
+    FORCE_PER_Y,
+    FORCE_PER_Z,
+    FORCE_PER_ROLL,
+    TURNING,
+    SHEAR,
+) = range(41)
+PATCH_ROWS = 41
 
 # columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
 # force of check rails and its wear number

@@ -15,6 +15,15 @@ from railsim.kernels.contact_columns import (
     NORMAL,
     NORMAL_DAMPING,
     NORMAL_STIFFNESS,
+    FORCE_PER_ROLL,
+    FORCE_PER_Y,
+    FORCE_PER_Z,
+    SHEAR,
+    TURNING,
+    A,
+    B,
+    C22,
+    C23,
     NORMAL_Y,
     NORMAL_Z,
     T_Y,
@@ -94,7 +103,7 @@ def add_to_row(row, first, factor, vector):
 
 
 @compiled(python=False)
-def add_slopes(work, w, side, k, across):
+def add_slopes(work, w, side, k, across, speed):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
 
     By a motion d of the wheel at the patch, N changes by k_N n d and c_N n d', and the creep force
@@ -106,12 +115,18 @@ def add_slopes(work, w, side, k, across):
     cy, cz = patch[FOOT_Y, k], patch[FOOT_Z, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
     f_y, f_z = s + share * c, c - share * s
+    per_y, per_z, per_roll = patch[FORCE_PER_Y, k], patch[FORCE_PER_Z, k], patch[FORCE_PER_ROLL, k]
+    change = per_y, per_z, per_roll
     stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
     lever = c * cy - s * cz  # of the normal about the wheelset's centre
     arm = -c * cz - s * cy  # of the tangent
     contact, normal = work.support[w, side], (s, c, lever)
-    add_to_row(contact, K, stiffness * f_y, normal)
-    add_to_row(contact, K + 3, stiffness * f_z, normal)
+    add_to_row(contact, K, f_y / c, change)
+    add_to_row(contact, K + 3, f_z / c, change)
+    turning = patch[TURNING, k]
+    by_y = abs(s) * turning * patch[NORMAL, k] * c
+    contact[K] += by_y
+    contact[K + 2] -= patch[SHEAR, k] * by_y
     add_to_row(contact, D, damping * f_y, normal)
     add_to_row(contact, D + 3, damping * f_z, normal)
     add_to_row(contact, D, across * c, (c, -s, arm))

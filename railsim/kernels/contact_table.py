@@ -159,6 +159,21 @@ def is_far(contact, table, patch, iy, ir, iw, tr, tw, z):
 
 
 @compiled(python=False)
+def gap_curvature(contact, table, patch, iy, ir, iw, ty, tw, weights):
+    """Second derivative of a patch's gap over y [1/m], the weights from `cell_weights`."""
+    values = contact.values
+    total = 0.0
+    for row in range(4):
+        r, here, beyond = ir - 1 + row, 0.0, 0.0
+        for k in range(4):
+            weight = (1.0 - ty, 3.0 * ty - 2.0, 1.0 - 3.0 * ty, ty)[k]
+            here += weight * values[table, patch, iw, r, iy - 1 + k, 0]
+            beyond += weight * values[table, patch, iw + 1, r, iy - 1 + k, 0]
+        total += weights[8 + row] * (here + tw * (beyond - here))
+    return total / (contact.dy * contact.dy)
+
+
+@compiled(python=False)
 def spline_weights(t, per_step, weights, first):
     """Four weights of the uniform cubic B-spline at t in [0, 1), four of its derivative.
 

@@ -105,19 +105,21 @@ def motion_of_wheelsets(system, work, state, wheels):
     height = load_rows(system.bodies.row, starts(body, BODY_SIZE), Z_0, 1)[0]
     _, y, z, roll, _, yaw, _, _ = load_rows(state, own, 0, 8)
     _, y_rate, z_rate, roll_rate = load_rows(state, own, velocity_begin(n), 4)
-    middle_y, middle_z, _, slope_z, lean, _, _, lean_slope = load_rows(
+    middle_y, middle_z, _, slope_z, lean, sine, cosine, lean_slope = load_rows(
         work.plane, pair_starts(wheels, 0, PLANE_SIZE, 0), 0, 8
     )
     _, aside, _, slope = load_rows(work.rail, starts(wheels, RAIL_SIZE), 0, 4)
     turn = speed * lean_slope
+    y, z = y - middle_y, z + height - middle_z
+    y, z = cosine * y + sine * z, cosine * z - sine * y
     if system.contact.surface_of.shape[0] > 0:
         heights = pair_starts(wheels, 0, SUPPORT_STEP, 1)
         z = z + load_rows(work.support_step, heights, HEIGHTS, 1)[0]
         z_rate = z_rate + load_rows(work.support_step, heights, HEIGHTS + 2, 1)[0]
     return (
-        y - middle_y + height * lean - aside,
-        z - middle_z,
-        roll - lean,
+        y - aside,
+        z,
+        roll - lean + slope_z * yaw,
         y_rate - speed * slope + height * turn,
         z_rate - speed * slope_z,
         roll_rate - turn,

@@ -26,12 +26,17 @@ from railsim.kernels.contact_columns import (
     FOOT_X_PER_YAW,
     FOOT_Y,
     FOOT_Z,
+    FORCE_PER_ROLL,
+    FORCE_PER_Y,
+    FORCE_PER_Z,
     MU_N,
     NORMAL,
     NORMAL_DAMPING,
     NORMAL_STIFFNESS,
     PENETRATION,
     RISE,
+    SHEAR,
+    TURNING,
     W_C_Y,
     W_C_Z,
     W_LIFT,
@@ -61,6 +66,7 @@ from railsim.kernels.contact_table import (
     N_PATCH,
     cell_weights,
     coupled_approaches,
+    gap_curvature,
     is_far,
     locate,
     look_up,
@@ -257,10 +263,18 @@ def wheel_contact(system, work, w, side, state, n):
         approach[patch] = wheel.z - work.look_up[first]
         lift = min(lift, -approach[patch])
     coupled_approaches(contact.coupling, table, work.stiffness, approach)
+    for patch in range(N_PATCH):
+        if approach[patch] > 0.0:
+            work.bump[patch, 10] = gap_curvature(
+                contact, table, patch, iy, ir, iw, ty, tw, work.weights
+            )
     clear_wheel(work.wheel, w, side, lift)
+    begin = n
     for patch in range(N_PATCH):
         if approach[patch] > -NEAR:
             n = patch_contact(system, work, w, side, patch, wheel, n)
+    if n > begin + 1:
+        couple_stiffness(work, contact.coupling, table, begin, n)
     if rarely(lift > LIFT_RANGE) and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
     return RUNNING, n
@@ -317,6 +331,7 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
         stiffness = work.stiffness[2 * first : 2 * first + 2 * N_PATCH]
         coupled_approaches(contact.coupling, table, stiffness, approach[first : first + N_PATCH])
     clear_wheel(work.wheel, w, side, lift)
+    begin = n
     for patch in range(N_PATCH * count):
         p = approach[patch]
         if p > -NEAR:
@@ -325,7 +340,41 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
             along = 0.4 * p * p * sqrt(p) * bump[patch, B_K] + p * p * p / 3.0 * bump[patch, B_K2]
             work.rail_force[contact.body[w], 0] -= along
             work.rail_force[contact.body[w], 5] += lever * along
+    couple_stiffness(work, contact.coupling, table, begin, n)
     return without_rail(rails, piece, wheel, nearest) if lift > NEAR else RUNNING, n
+
+
+@compiled(python=False)
+def couple_stiffness(work, coupling, table, begin, n):
+    """Forces of patches `begin` to `n` of a wheel per motion, where they load each other's surface.
+
+    Of `coupled_approaches`, dN_i/dd = k_i (n_i - sum_j kappa_ij dN_j/dd) for the motion d.
+    """
+    patch, index = work.patch, work.patch_index
+    for i in range(begin, n):
+        if index[i, 2] % N_PATCH != 1:
+            continue
+        before = i > begin and index[i - 1, 2] == index[i, 2] - 1
+        after = i + 1 < n and index[i + 1, 2] == index[i, 2] + 1
+        k1 = patch[FORCE_PER_Z, i]
+        k0 = coupling[table, 0] * patch[FORCE_PER_Z, i - 1] if before else 0.0
+        k2 = coupling[table, 1] * patch[FORCE_PER_Z, i + 1] if after else 0.0
+        pivot = 1.0 - k1 * (
+            (coupling[table, 0] * k0 if before else 0.0)
+            + (coupling[table, 1] * k2 if after else 0.0)
+        )
+        for row in range(FORCE_PER_Y, FORCE_PER_ROLL + 1):
+            others = 0.0
+            if before:
+                others += coupling[table, 0] * patch[row, i - 1]
+            if after:
+                others += coupling[table, 1] * patch[row, i + 1]
+            own = (patch[row, i] - k1 * others) / max(pivot, 0.1)
+            patch[row, i] = own
+            if before:
+                patch[row, i - 1] -= k0 * own
+            if after:
+                patch[row, i + 1] -= k2 * own
 
 
 @compiled(inline=True)
@@ -418,7 +467,16 @@ def patch_contact(system, work, w, side, patch, wheel, n):
             column[FOOT_Z, n] = c_z + work.bump[patch, B_RADIUS]
             column[RISE, n] = work.bump[patch, B_RISE]
             column[PENETRATION, n] = p
-            column[NORMAL_STIFFNESS, n] = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) / cos_2
+            stiffness = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2])
+            stiffening = wheel.sign * p * root * (t[k + K_Y] + root * t[k + K2_Y])
+            column[NORMAL_STIFFNESS, n] = stiffness / cos_2
+            column[TURNING, n] = -work.bump[patch, 10]
+            column[SHEAR, n] = contact.shear[contact.table[w, side]]
+            column[FORCE_PER_Y, n] = stiffening - wheel.sign * stiffness * t[k + G_Y]
+            column[FORCE_PER_Z, n] = stiffness
+            column[FORCE_PER_ROLL, n] = wheel.sign * (
+                p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL]) - stiffness * t[k + G_ROLL]
+            )
             column[NORMAL_DAMPING, n] = contact.damping * fade
             work.patch_index[n, 0] = w
             work.patch_index[n, 1] = side
