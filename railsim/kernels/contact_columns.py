@@ -3,6 +3,8 @@
 # rows of Work.patch: one column per active patch.  Angle and foot are in the plane of the rails:
 # position of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal
 # and C in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
+# Derivatives of the vertical force over the wheelset's y, z and roll, and that force times the turn
+# of the contact angle's tangent over y, for elastic rails.
 (
     A,
     B,
@@ -44,9 +46,8 @@
     FORCE_PER_Z,
     FORCE_PER_ROLL,
     TURNING,
-    SHEAR,
-) = range(41)
-PATCH_ROWS = 41
+) = range(40)
+PATCH_ROWS = 40
 
 # columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
 # force of check rails and its wear number

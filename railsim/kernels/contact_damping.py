@@ -10,23 +10,18 @@ from railsim.kernels.contact_columns import (
     C_Z,
     FOOT_Y,
     FOOT_Z,
+    FORCE_PER_ROLL,
+    FORCE_PER_Y,
+    FORCE_PER_Z,
     J_NORMAL,
     J_SLIP,
     NORMAL,
     NORMAL_DAMPING,
     NORMAL_STIFFNESS,
-    FORCE_PER_ROLL,
-    FORCE_PER_Y,
-    FORCE_PER_Z,
-    SHEAR,
-    TURNING,
-    A,
-    B,
-    C22,
-    C23,
     NORMAL_Y,
     NORMAL_Z,
     T_Y,
+    TURNING,
 )
 from railsim.kernels.support import (
     D_Y_SLIP,
@@ -103,30 +98,34 @@ def add_to_row(row, first, factor, vector):
 
 
 @compiled(python=False)
-def add_slopes(work, w, side, k, across, speed):
+def add_slopes(work, w, side, k, across, shear):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
 
-    By a motion d of the wheel at the patch, N changes by k_N n d and c_N n d', and the creep force
-    with it, being nearly proportional to N; T_y by the slope of the creep law, `across`, times
-    t d'.
+    By a motion of the wheel in y, z and roll its vertical force V changes by the rows `FORCE_PER_Y`
+    to `FORCE_PER_ROLL`, and Y = V tan g + T_y cos g and Q = V - T_y sin g with it, the creep force
+    being nearly proportional to N; by d, N changes by c_N n d'; T_y by the slope of the creep law,
+    `across`, times t d'.  A wheelset that is yawed by psi against its rail slips along the inclined
+    patch, V_speed psi/cos g: its rolling circle moves across the rail, and the point of contact
+    runs ahead and along the flange.
+
+    Along y the angle of contact g turns, V d(tan g)/dy.  On the tread the creep force from spin,
+    proportional to sin g, takes nearly all of that back, on a sliding flange nothing: |sin g| of it
+    counts.  `shear`: lever of roll in the table's lateral coordinate [m].
     """
     patch = work.patch
     s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
     cy, cz = patch[FOOT_Y, k], patch[FOOT_Z, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
     f_y, f_z = s + share * c, c - share * s
-    per_y, per_z, per_roll = patch[FORCE_PER_Y, k], patch[FORCE_PER_Z, k], patch[FORCE_PER_ROLL, k]
-    change = per_y, per_z, per_roll
+    per_motion = patch[FORCE_PER_Y, k], patch[FORCE_PER_Z, k], patch[FORCE_PER_ROLL, k]
     stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
-    lever = c * cy - s * cz  # of the normal about the wheelset's centre
-    arm = -c * cz - s * cy  # of the tangent
-    contact, normal = work.support[w, side], (s, c, lever)
-    add_to_row(contact, K, f_y / c, change)
-    add_to_row(contact, K + 3, f_z / c, change)
-    turning = patch[TURNING, k]
-    by_y = abs(s) * turning * patch[NORMAL, k] * c
-    contact[K] += by_y
-    contact[K + 2] -= patch[SHEAR, k] * by_y
+    arm = -c * cz - s * cy  # of the tangent about the wheelset's centre
+    contact, normal = work.support[w, side], (s, c, c * cy - s * cz)
+    add_to_row(contact, K, f_y / c, per_motion)
+    add_to_row(contact, K + 3, f_z / c, per_motion)
+    turning = abs(s) * patch[TURNING, k]
+    contact[K] += turning
+    contact[K + 2] -= shear * turning
     add_to_row(contact, D, damping * f_y, normal)
     add_to_row(contact, D + 3, damping * f_z, normal)
     add_to_row(contact, D, across * c, (c, -s, arm))

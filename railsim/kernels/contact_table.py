@@ -46,7 +46,8 @@ _ROLL, _W = _Y + N_GRADIENT, _Y + 2 * N_GRADIENT
 G_Y, K_Y, K2_Y = _Y, _Y + 1, _Y + 2
 G_ROLL, K_ROLL, K2_ROLL = _ROLL, _ROLL + 1, _ROLL + 2
 G_W, K_W, K2_W = _W, _W + 1, _W + 2
-LOOK_UP_SIZE = N_FIELD + 3 * N_GRADIENT
+G_YY = _W + N_GRADIENT  # second derivative of the gap over y, see `gap_curvature`
+LOOK_UP_SIZE = G_YY + 8  # whole cache lines
 N_WEIGHT = 16
 
 # outside of the table
@@ -150,27 +151,26 @@ def locate(contact, table, y, roll, stretched, w):
 
 
 @compiled(python=False)
+def gap_curvature(contact, table, patch, iy, ir, iw, ty, tw, weights):
+    """Second derivative of a patch's gap over y [1/m], the weights from `cell_weights`."""
+    values = contact.values
+    second = 1.0 - ty, 3.0 * ty - 2.0, 1.0 - 3.0 * ty, ty
+    total = 0.0
+    for row in range(4):
+        for k in range(4):
+            r, y = ir - 1 + row, iy - 1 + k
+            here, yawed = values[table, patch, iw, r, y, G], values[table, patch, iw + 1, r, y, G]
+            total += weights[8 + row] * second[k] * (here + tw * (yawed - here))
+    return total / (contact.dy * contact.dy)
+
+
+@compiled(python=False)
 def is_far(contact, table, patch, iy, ir, iw, tr, tw, z):
     """Whether a patch is so far from touching that its look-up can be skipped."""
     values = contact.values
     node, following = values[table, patch, iw, ir, iy, 0], values[table, patch, iw, ir + 1, iy, 0]
     yawed = values[table, patch, iw + 1, ir, iy, 0]
     return z - node - tr * (following - node) - tw * (yawed - node) < -FAR
-
-
-@compiled(python=False)
-def gap_curvature(contact, table, patch, iy, ir, iw, ty, tw, weights):
-    """Second derivative of a patch's gap over y [1/m], the weights from `cell_weights`."""
-    values = contact.values
-    total = 0.0
-    for row in range(4):
-        r, here, beyond = ir - 1 + row, 0.0, 0.0
-        for k in range(4):
-            weight = (1.0 - ty, 3.0 * ty - 2.0, 1.0 - 3.0 * ty, ty)[k]
-            here += weight * values[table, patch, iw, r, iy - 1 + k, 0]
-            beyond += weight * values[table, patch, iw + 1, r, iy - 1 + k, 0]
-        total += weights[8 + row] * (here + tw * (beyond - here))
-    return total / (contact.dy * contact.dy)
 
 
 @compiled(python=False)
@@ -219,7 +219,7 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, offset):
         *((1.0 - tw) * part[0] + tw * part[1] for part in parts),
         (value[1] - value[0])[:N_GRADIENT],
     ]
-    out[offset : offset + LOOK_UP_SIZE] = np.concatenate(sums)
+    out[offset : offset + G_YY] = np.concatenate(sums)
 
 
 _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_nodes
@@ -303,6 +303,7 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
         continue_limited(contact.values, start, row, slab, weights, tw, out, first)
     else:
         _sum_of_nodes(contact.values, start, row, slab, weights, tw, out, first)
+    out[first + G_YY] = 0.0
     shear = contact.shear[table]
     out[first + G_ROLL] -= shear * out[first + G_Y]
     out[first + K_ROLL] -= shear * out[first + K_Y]

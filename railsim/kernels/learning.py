@@ -1,7 +1,7 @@
 """Slopes of the contact forces on elastic rails that learn from the errors of their forecasts.
 
 After each step of `support_step` the difference of the forces found and foreseen is known.  It goes
-into four numbers a wheel, part of the state, that are added to the slopes of the contact (`learn`).
+into two numbers a wheel, part of the state, that are added to the slopes of the contact (`learn`).
 Where corrections show that they are wrong they are forgotten (`relax_corrections`).
 """
 
@@ -16,34 +16,33 @@ from railsim.kernels.lanes import (
     store_rows,
     where_beyond,
 )
-from railsim.kernels.support import BEFORE, L_PATCHES, PATCHES, RELAXATION, SUPPORT_STEP
+from railsim.kernels.support import BEFORE, LEARNT_SIZE, PATCHES, RELAXATION, SUPPORT_STEP
 
-# `learn`: scales of way and slip [m, m/s] in a step of this length [s]; share of an error that is
-# learnt, what is added to the squares of way and slip, what a step forgets; share of the static
-# wheel load from which on an error is large
-WAY, SLIP, WHOLE_STEP = 5e-6, 2.5e-3, 1.25e-3
+# `learn`: scale of the way [m] in a step of this length [s]; share of an error that is learnt, what
+# is added to the square of the way, what a step forgets; share of the static wheel load from which
+# on an error is large
+WAY, WHOLE_STEP = 5e-6, 1.25e-3
 GAIN, REST, FORGOTTEN = 0.3, 0.05, 0.01
 LARGE_Y, LARGE_Z = 0.1, 0.3
 # `relax_corrections`: least relaxation; growth of the squared imbalance from which on what the
 # slopes have learnt is forgotten
 LEAST_RELAXATION, WORSE = 0.05, 4.0
-# bounds of what slopes learn [N/m, N s/m]: a rail stays damped
-LEAST_K, MOST_K, MOST_D = -2e7, 3e8, 3e5
+# bounds of what slopes learn [N/m]
+LEAST_K, MOST_K = -2e7, 3e8
 
 
 @compiled(inline=True)
 def learn(work, state, learnt, own, load, h):
     """Take the errors of the forces foreseen in the last step into the slopes at eight wheels.
 
-    Normalised least mean squares (Widrow and Hoff 1960): of an error e with the way y and the slip
-    v of the step, in units of `WAY` and `SLIP` at 1.25 ms, the slopes take gain e y/(y^2 + v^2 +
-    rest).  They are forgotten slowly, and at once where the set of patches changes, a wheel lifts
-    or the error is large: there the contact is another one.
+    Normalised least mean squares (Widrow and Hoff 1960): of an error e with the way y of the step,
+    in units of `WAY` at 1.25 ms, the slopes take gain e y/(y^2 + rest).  They are forgotten slowly,
+    and at once where the set of patches changes, a wheel lifts or the error is large: there the
+    contact is another one.
     """
     zero, one, share = spread(0.0), spread(1.0), h / WHOLE_STEP
-    per_way, per_slip = 1.0 / (WAY * share), 1.0 / (SLIP * share)
-    y_y, z_y, y_slip, z_slip, way, slip, error_y, error_z = load_rows(state, learnt, 0, 8)
-    before = load_rows(state, learnt, L_PATCHES, 1)[0]
+    per_way = 1.0 / (WAY * share)
+    y_y, z_y, way, error_y, error_z, before = load_rows(state, learnt, 0, LEARNT_SIZE)
     patches, d_y, d_z = load_rows(work.support, own, PATCHES, 3)
     # the first error of the step, also where rails have moved for it at once
     either = error_y * error_y + error_z * error_z
@@ -51,10 +50,9 @@ def learn(work, state, learnt, own, load, h):
     known = where_beyond(patches - before, 0.0, zero, where_beyond(patches, 0.0, one, zero))
     known = where_beyond(d_y / load, LARGE_Y, zero, known)
     known = where_beyond(d_z / load, LARGE_Z, zero, known)
-    y, v = per_way * way, per_slip * slip
-    gain = known * GAIN / (y * y + v * v + REST)
+    y = per_way * way
     keep = known * (1.0 - FORGOTTEN * share)
-    y, v = gain * per_way * y, gain * per_slip * v
+    y = known * GAIN / (y * y + REST) * per_way * y
     store_rows(
         state,
         learnt,
@@ -62,15 +60,12 @@ def learn(work, state, learnt, own, load, h):
         (
             bounded(keep * y_y + d_y * y, LEAST_K, MOST_K),
             bounded(keep * z_y + d_z * y, -MOST_K, MOST_K),
-            bounded(keep * y_slip + d_y * v, -MOST_D, MOST_D),
-            bounded(keep * z_slip + d_z * v, -MOST_D, MOST_D),
             way,
-            slip,
             zero,
             zero,
+            patches,
         ),
     )
-    store_rows(state, learnt, L_PATCHES, (patches,))
 
 
 @compiled(inline=True)
@@ -101,8 +96,8 @@ def relax_corrections(work, state, wheels, learnt, y, z, begins):
         zero, one = spread(0.0), spread(1.0)
         more = y * y + z * z - WORSE * (b_y * b_y + b_z * b_z)
         keep = where_beyond(larger(zero, more + beside(more)), 0.0, zero, one)
-        y_y, z_y, y_slip, z_slip = load_rows(state, learnt, 0, 4)
-        store_rows(state, learnt, 0, (keep * y_y, keep * z_y, keep * y_slip, keep * z_slip))
+        y_y, z_y = load_rows(state, learnt, 0, 2)
+        store_rows(state, learnt, 0, (keep * y_y, keep * z_y))
     store_rows(work.support_step, rails, BEFORE, (y, z))
     store_rows(work.support_step, factor, RELAXATION, (relaxation,))
     return relaxation * y, relaxation * z

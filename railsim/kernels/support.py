@@ -45,11 +45,11 @@ from railsim.kernels.state import LAST_STEP, contact_begin
 RAIL_DOF, DOF = 4, 7
 RATE, MEAN_RATE, MEAN_CHANGE, ACCELERATION = DOF, 2 * DOF, 3 * DOF, 4 * DOF
 # then what the slopes of contact forces have learnt at each wheel, see `learning`: what is added
-# to those of Y and Q over y and over the lateral slip; y and slip of the last step; error of the
-# forces foreseen where the rails have moved for it already; set of the patches, in bits
+# to those of Y and Q over y; y of the last step; error of the forces foreseen where the rails have
+# moved for it already; set of the patches, in bits
 LEARNT = 5 * DOF
-L_Y_Y, L_Z_Y, L_Y_SLIP, L_Z_SLIP, L_WAY, L_SLIP, L_ERROR_Y, L_ERROR_Z, L_PATCHES = range(9)
-LEARNT_SIZE = 9
+L_Y_Y, L_Z_Y, L_WAY, L_ERROR_Y, L_ERROR_Z, L_PATCHES = range(6)
+LEARNT_SIZE = 6
 # and the weight of the mean rate before the last step, g in `support_step`
 WEIGHT = LEARNT + 2 * LEARNT_SIZE
 SUPPORT_SIZE = WEIGHT + 1
@@ -112,8 +112,6 @@ MOVED = DOF + 10
 # heights of wheels that are not round, left and right, and their rates
 HEIGHTS = DOF + 11
 SUPPORT_STEP = 24  # whole cache lines
-# share of the creep law's slope that what is learnt may take away: a rail stays damped
-LEAST_SHARE = 0.8
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
 
@@ -413,24 +411,15 @@ def complete_slopes(system, work, state):
     for first in range(0, count, PAIRS):
         wheels = eight_in_pairs(first, count)
         own = starts(wheels, SUPPORT_COLUMNS)
-        y_y, z_y, y_slip, z_slip, _, _, _, _ = load_rows(
-            state, pair_starts(wheels, begin, SUPPORT_SIZE, LEARNT_SIZE), 0, 8
+        y_y, z_y, _, _, _, learnt = load_rows(
+            state, pair_starts(wheels, begin, SUPPORT_SIZE, LEARNT_SIZE), 0, LEARNT_SIZE
         )
-        learnt = load_rows(
-            state, pair_starts(wheels, begin, SUPPORT_SIZE, LEARNT_SIZE), L_PATCHES, 1
-        )[0]
         patches = load_rows(work.support, own, PATCHES, 1)[0]
         skip = load_rows(work.support_step, pair_starts(wheels, 0, SUPPORT_STEP, 0), SKIP, 1)[0]
         _, _, k0, k1, k2, k3, k4, k5 = load_rows(work.support, own, 0, 8)
-        d0, d1, d2, d3, d4, d5, s0, s1 = load_rows(work.support, own, D, 8)
         Q, Y = load_rows(work.wheel, starts(wheels, WHEEL_COLUMNS), W_Q, 2)
         take = where_beyond(patches - learnt, 0.0, zero, one - skip)
-        across = take * larger(-LEAST_SHARE * s0, y_slip)
-        along = take * z_slip
         store_rows(work.support, own, 0, (Y, Q, k0 + take * y_y, k1, k2, k3 + take * z_y, k4, k5))
-        store_rows(
-            work.support, own, D, (d0 + across, d1, d2, d3 + along, d4, d5, s0 + across, s1 + along)
-        )
 
 
 @compiled(python=False)

@@ -95,9 +95,9 @@ def motion_of_wheelsets(system, work, state, wheels):
     """Motion of the wheelsets of eight wheels in the planes of their rails.
 
     Lateral position less the rail's displacement aside, vertical position, with the height of a
-    wheel that is not round, and roll; their rates, that of the rail being none; speed at which the
-    wheelset, yawed against the rail, slips across it.  The lateral rate is that of the material
-    (slip); to first order in the roll of the plane.
+    wheel that is not round, and roll, all against the rails' shape; their rates against it; speed
+    at which the wheelset, yawed against the rail, slips across it.  With the rail's slope y' in the
+    lateral rate and in the slip the material's speed across, y_rate - V yaw, is their sum.
     """
     n, speed = system.bodies.kind.shape[0], state[SPEED]
     body = eight_of_pairs(system.contact.body, wheels)
@@ -220,7 +220,7 @@ def step_tracks(system, work, state, wheels, learnt, change, h, last):
         b[4],
     )
     r = solve_track(support, factors, K, D_, b, (1.0 + g) * (1.0 + g) / h, 1.0 + g, h)
-    store_rows(state, learnt, L_WAY, (y - h * r[0], v_y + slip - (1.0 + g) * r[0]))
+    store_rows(state, learnt, L_WAY, (y - h * r[0],))
     weights = pair_starts(wheels, support_begin(system) + WEIGHT, SUPPORT_SIZE, 0)
     store_rows(state, weights, 0, (spread(g),))
     after = combined(1.0 + g, r, -g, mean)

@@ -35,7 +35,6 @@ from railsim.kernels.contact_columns import (
     NORMAL_STIFFNESS,
     PENETRATION,
     RISE,
-    SHEAR,
     TURNING,
     W_C_Y,
     W_C_Z,
@@ -55,6 +54,7 @@ from railsim.kernels.contact_table import (
     G_ROLL,
     G_W,
     G_Y,
+    G_YY,
     INSIDE,
     K2_ROLL,
     K2_W,
@@ -110,6 +110,7 @@ from railsim.kernels.wheel_surface import note_surfaces
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
 STEEP = 3.0  # of a flange
+HEAVY = 4.0  # static wheel loads
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 
 
@@ -263,9 +264,10 @@ def wheel_contact(system, work, w, side, state, n):
         approach[patch] = wheel.z - work.look_up[first]
         lift = min(lift, -approach[patch])
     coupled_approaches(contact.coupling, table, work.stiffness, approach)
+    elastic = system.support.elastic
     for patch in range(N_PATCH):
-        if approach[patch] > 0.0:
-            work.bump[patch, 10] = gap_curvature(
+        if elastic and approach[patch] > 0.0:
+            work.look_up[patch * LOOK_UP_SIZE + G_YY] = gap_curvature(
                 contact, table, patch, iy, ir, iw, ty, tw, work.weights
             )
     clear_wheel(work.wheel, w, side, lift)
@@ -273,7 +275,7 @@ def wheel_contact(system, work, w, side, state, n):
     for patch in range(N_PATCH):
         if approach[patch] > -NEAR:
             n = patch_contact(system, work, w, side, patch, wheel, n)
-    if n > begin + 1:
+    if elastic and n > begin + 1:
         couple_stiffness(work, contact.coupling, table, begin, n)
     if rarely(lift > LIFT_RANGE) and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
@@ -468,15 +470,15 @@ def patch_contact(system, work, w, side, patch, wheel, n):
             column[RISE, n] = work.bump[patch, B_RISE]
             column[PENETRATION, n] = p
             stiffness = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2])
-            stiffening = wheel.sign * p * root * (t[k + K_Y] + root * t[k + K2_Y])
+            # deep in a rail the gradients of the table lead astray
+            light = min(1.0, HEAVY * contact.load[w] / vertical)
+            K_y = light * p * root * (t[k + K_Y] + root * t[k + K2_Y])
+            K_roll = light * p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL])
             column[NORMAL_STIFFNESS, n] = stiffness / cos_2
-            column[TURNING, n] = -work.bump[patch, 10]
-            column[SHEAR, n] = contact.shear[contact.table[w, side]]
-            column[FORCE_PER_Y, n] = stiffening - wheel.sign * stiffness * t[k + G_Y]
+            column[FORCE_PER_Y, n] = wheel.sign * (K_y - stiffness * t[k + G_Y])
             column[FORCE_PER_Z, n] = stiffness
-            column[FORCE_PER_ROLL, n] = wheel.sign * (
-                p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL]) - stiffness * t[k + G_ROLL]
-            )
+            column[FORCE_PER_ROLL, n] = wheel.sign * (K_roll - stiffness * t[k + G_ROLL])
+            column[TURNING, n] = -light * vertical * t[k + G_YY]
             column[NORMAL_DAMPING, n] = contact.damping * fade
             work.patch_index[n, 0] = w
             work.patch_index[n, 1] = side

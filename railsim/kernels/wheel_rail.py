@@ -122,7 +122,7 @@ def add_creep_forces(system, work, n, speed, state):
         secant, across = patch[SECANT_ALONG, k], patch[SLOPE_ACROSS, k]
         damping = patch[NORMAL_DAMPING, k]
         if system.support.elastic:
-            add_slopes(work, w, side, k, across, speed)
+            add_slopes(work, w, side, k, across, contact.shear[contact.table[w, side]])
             work.support[w, side, PATCHES] += float(1 << work.patch_index[k, 2])
             # a rail that gives way is in series with creep force and contact
             y, z, lag = work.compliance[0], work.compliance[1], work.compliance[2]

@@ -47,7 +47,7 @@ MARGIN = 2.0 ** (1.0 / 6.0)
 # of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
 PART = {FAST: 1e-4, RK4: 2.5e-4}
 # the same of the fast scheme on elastic rails, where a wheel has no such vibration
-PART_ELASTIC = 2.5e-4
+PART_ELASTIC = 1.25e-3 / 3.0
 # share of the static wheel load by which a contact force may change in a step that is not divided,
 # on rigid and on elastic rails, where no vibration follows: on smooth curves no step is
 FORCE_CHANGE, FORCE_CHANGE_ELASTIC = 0.1, 0.2
