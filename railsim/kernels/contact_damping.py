@@ -1,4 +1,4 @@
-"""How contact forces change with speeds of wheelset and rail, for the implicit part of a step."""
+"""How contact forces change with motions of wheelset and rail, for the implicit part of a step."""
 
 from math import sqrt
 
@@ -23,6 +23,7 @@ from railsim.kernels.contact_columns import (
     T_Y,
     TURNING,
 )
+from railsim.kernels.contact_table import FLANGE_ROOT, N_PATCH
 from railsim.kernels.support import (
     D_Y_SLIP,
     D_Z_SLIP,
@@ -98,6 +99,36 @@ def add_to_row(row, first, factor, vector):
 
 
 @compiled(python=False)
+def couple_stiffness(work, coupling, table, begin, n):
+    """Forces per motion of patches `begin` to `n` of a wheel, which load each other's surface.
+
+    With the approaches of `coupled_approaches`, N_i changes by n_i k_i = dN_i/de_i times the motion
+    less that part of it by which the neighbours' forces bend the surface: dN_i = k_i (n_i d - sum_j
+    kappa_ij dN_j).  The flange root has two neighbours, each of these only the root.
+    """
+    patch, index = work.patch, work.patch_index
+    for i in range(begin, n):
+        if index[i, 2] % N_PATCH != FLANGE_ROOT:
+            continue
+        a = b = 0.0
+        if i > begin and index[i - 1, 2] == index[i, 2] - 1:
+            a = coupling[table, 0]
+        if i + 1 < n and index[i + 1, 2] == index[i, 2] + 1:
+            b = coupling[table, 1]
+        before, after = max(i - 1, 0), min(i + 1, n - 1)
+        k = patch[FORCE_PER_Z, i]
+        k_a, k_b = a * patch[FORCE_PER_Z, before], b * patch[FORCE_PER_Z, after]
+        pivot = max(1.0 - k * (a * k_a + b * k_b), 0.1)
+        for row in (FORCE_PER_Y, FORCE_PER_Z, FORCE_PER_ROLL):
+            own = (patch[row, i] - k * (a * patch[row, before] + b * patch[row, after])) / pivot
+            patch[row, i] = own
+            if a > 0.0:
+                patch[row, before] -= k_a * own
+            if b > 0.0:
+                patch[row, after] -= k_b * own
+
+
+@compiled(python=False)
 def add_slopes(work, w, side, k, across, shear):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
 
@@ -105,7 +136,7 @@ def add_slopes(work, w, side, k, across, shear):
     to `FORCE_PER_ROLL`, and Y = V tan g + T_y cos g and Q = V - T_y sin g with it, the creep force
     being nearly proportional to N; by d, N changes by c_N n d'; T_y by the slope of the creep law,
     `across`, times t d'.  A wheelset that is yawed by psi against its rail slips along the inclined
-    patch, V_speed psi/cos g: its rolling circle moves across the rail, and the point of contact
+    patch, v psi/cos g: its rolling circle moves across the rail, and the point of contact
     runs ahead and along the flange.
 
     Along y the angle of contact g turns, V d(tan g)/dy.  On the tread the creep force from spin,

@@ -36,20 +36,14 @@ from railsim.kernels.contact_columns import (
     PENETRATION,
     RISE,
     TURNING,
-    W_C_Y,
-    W_C_Z,
+    W_CHECK,
     W_LIFT,
-    W_NORMAL,
-    W_PHI,
     W_Q,
-    W_T_GAMMA,
-    W_T_GAMMA_SPIN,
-    W_XI_X,
-    W_XI_Y,
     W_Y,
     A,
     B,
 )
+from railsim.kernels.contact_damping import couple_stiffness
 from railsim.kernels.contact_table import (
     G_ROLL,
     G_W,
@@ -346,39 +340,6 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     return without_rail(rails, piece, wheel, nearest) if lift > NEAR else RUNNING, n
 
 
-@compiled(python=False)
-def couple_stiffness(work, coupling, table, begin, n):
-    """Forces of patches `begin` to `n` of a wheel per motion, where they load each other's surface.
-
-    Of `coupled_approaches`, dN_i/dd = k_i (n_i - sum_j kappa_ij dN_j/dd) for the motion d.
-    """
-    patch, index = work.patch, work.patch_index
-    for i in range(begin, n):
-        if index[i, 2] % N_PATCH != 1:
-            continue
-        before = i > begin and index[i - 1, 2] == index[i, 2] - 1
-        after = i + 1 < n and index[i + 1, 2] == index[i, 2] + 1
-        k1 = patch[FORCE_PER_Z, i]
-        k0 = coupling[table, 0] * patch[FORCE_PER_Z, i - 1] if before else 0.0
-        k2 = coupling[table, 1] * patch[FORCE_PER_Z, i + 1] if after else 0.0
-        pivot = 1.0 - k1 * (
-            (coupling[table, 0] * k0 if before else 0.0)
-            + (coupling[table, 1] * k2 if after else 0.0)
-        )
-        for row in range(FORCE_PER_Y, FORCE_PER_ROLL + 1):
-            others = 0.0
-            if before:
-                others += coupling[table, 0] * patch[row, i - 1]
-            if after:
-                others += coupling[table, 1] * patch[row, i + 1]
-            own = (patch[row, i] - k1 * others) / max(pivot, 0.1)
-            patch[row, i] = own
-            if before:
-                patch[row, i - 1] -= k0 * own
-            if after:
-                patch[row, i + 1] -= k2 * own
-
-
 @compiled(inline=True)
 def raise_gap(look_up, first, bump, patch, shear):
     """Take the height of a wheel that is not round from the gap of a patch and its gradients."""
@@ -390,17 +351,9 @@ def raise_gap(look_up, first, bump, patch, shear):
 @compiled(python=False)
 def clear_wheel(wheel, w, side, lift):
     """Nothing yet acts on a wheel."""
-    wheel[w, side, W_Q] = 0.0
-    wheel[w, side, W_Y] = 0.0
-    wheel[w, side, W_NORMAL] = 0.0
-    wheel[w, side, W_XI_X] = 0.0
-    wheel[w, side, W_XI_Y] = 0.0
-    wheel[w, side, W_PHI] = 0.0
-    wheel[w, side, W_T_GAMMA] = 0.0
-    wheel[w, side, W_T_GAMMA_SPIN] = 0.0
+    for k in range(W_CHECK):
+        wheel[w, side, k] = 0.0
     wheel[w, side, W_LIFT] = lift
-    wheel[w, side, W_C_Y] = 0.0
-    wheel[w, side, W_C_Z] = 0.0
 
 
 @compiled(python=False)
