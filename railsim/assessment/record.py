@@ -148,6 +148,11 @@ class Record:
         bodies = self.result.bodies if all(name in self.result for name in MOTION) else ()
         return {name: sensor for name, sensor in known.items() if sensor.body in bodies}
 
+    @cached_property
+    def _speed(self) -> Floats:
+        """At every row [m/s]."""
+        return np.gradient(self.distance, self.time)
+
     def sensor_offset(self, sensor: str) -> float:
         """Arc length of a sensor relative to the reference body [m]."""
         return self.sensors[sensor].along
@@ -159,7 +164,7 @@ class Record:
             order = [names.index(name) for name in self.sensors]
             acceleration = self.result.part("sensor_acceleration", rows)[:, order]
             return acceleration, self.result.part("sensor_roll_rate", rows)[:, order]
-        speed = np.gradient(self.distance[rows], self.time[rows])
+        speed = self._speed[rows]
         known = self._last and self._last.part_of(rows, speed)
         if known is None:
             found = self._of_motion(rows, speed)

@@ -15,7 +15,7 @@ SHORT = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "1
 def test_check_prints_what_half_the_step_changes(tmp_path, capsys):
     assert main([*SHORT, "--out", str(tmp_path / "run.h5"), "--check-step"]) == 0
     printed = capsys.readouterr().out
-    assert "Check of the step, 1.667 ms" in printed
+    assert "Check of the step, 2.5 ms" in printed
     assert "less that at half" in printed
 
 

@@ -73,4 +73,4 @@ def test_given_step_that_is_no_longer_than_the_one_taken_without_it_is_not_refus
     assert step(usual) == usual
     assert step(0.5 * usual) == 0.5 * usual
     with pytest.raises(InputError, match=f"at most {usual:g} s"):
-        step(1.5 * usual)
+        step(2.0 * usual)

@@ -15,7 +15,7 @@ ACROSS = np.array([1.0, -1.0, 1.0])  # along, across, down
 BODY = np.concatenate((ACROSS, -ACROSS))  # angles are about those axes
 # rails left and right, y and z, then the sleeper; what slopes learn, see `railsim.kernels.support`
 TRACK, TRACK_SIGNS = (2, 3, 0, 1, 4, 5, 6), (-1, 1, -1, 1, -1, 1, -1)
-LEARNT_SIGNS = (1, -1, 1, -1, -1, -1, -1, 1, 1)
+LEARNT_SIGNS = (1, -1, -1, -1, 1, 1)
 
 
 def same_rows(rows, others):

@@ -72,7 +72,7 @@ def test_growth_does_not_depend_on_the_step_of_the_way():
     model, state, _ = rolling("power_car_china_star", track, 27.0)
     growths = [
         time_step._step_growth(
-            model, *flange.in_flange_contact(model, track, state, step), "fast", 1.8e-3
+            model, *flange.in_flange_contact(model, track, state, step), "fast", 6e-3
         )
         for step in (1.667e-3, 0.833e-3)
     ]

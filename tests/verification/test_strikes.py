@@ -49,7 +49,7 @@ def peak_values(result):
 def test_peaks_of_a_strike_are_those_of_the_reference(rail, support, vehicle):
     result = over_the_dip(rail, support, vehicle)
     reference = over_the_dip(rail, support, vehicle, scheme="rk4", step=0.125e-3, output_rate=1e3)
-    assert result.attributes["step"] == (1.25e-3 if support == "rigid" else 1.0 / 600.0)
+    assert result.attributes["step"] == (1.25e-3 if support == "rigid" else 2.5e-3)
     found, expected = peak_values(result), peak_values(reference)
     # 0.4 % of the ring's amplitude from parts of 0.1 ms; sum_Y takes the errors of both wheels
     for name, tolerance in (("Q", 0.01), ("sum_abs_Y", 0.02)):
@@ -116,7 +116,7 @@ def test_run_on_irregular_elastic_rails_goes_on_to_the_same_bytes():
     whole = simulate(coach, track, speed=SPEED, until=60.0)
     first = simulate(coach, track, speed=SPEED, until=33.0)
     state = first.groups["state"]["end"][:-N_SCALARS]
-    assert np.count_nonzero(state[-SUPPORT_SIZE:][LEARNT:WEIGHT]) > 10
+    assert np.count_nonzero(state[-SUPPORT_SIZE:][LEARNT:WEIGHT]) > 7
     second = simulate(coach, track, until=60.0, resume=first)
     np.testing.assert_array_equal(second.groups["state"]["end"], whole.groups["state"]["end"])
     for name in ("steps", "steps_divided", "evaluations", "contacts_evaluated_again"):
@@ -133,7 +133,7 @@ def test_recorded_patches_change_no_bit_of_a_run_on_elastic_rails():
         simulate(
             coach,
             track,
-            speed=SPEED,
+            speed=60.0,  # hunts
             until=40.0,
             settings=Settings(outputs={"contact_patches": patches}),
         )
@@ -148,7 +148,7 @@ def test_recorded_patches_change_no_bit_of_a_run_on_elastic_rails():
 def test_vehicles_on_irregular_elastic_rails_are_together_as_alone():
     coaches = [load_vehicle("coach_manchester"), load_vehicle("coach_flexicoil")]
     track = load_any_track("straight").replace(irregularities=IRREGULAR)
-    how = {"speed": SPEED, "until": 60.0}
+    how = {"speed": SPEED, "until": 60.0, "settings": Settings(step=1.25e-3)}
     for vehicle, result in zip(coaches, simulate_together(coaches, track, **how), strict=True):
         alone = simulate(vehicle, track, **how)
         assert result.attributes["runs_together"] == 2
