@@ -36,7 +36,7 @@ LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
 # the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
 LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 2.5e-3}
 # m of track a step, on rigid and on elastic rails: the shortest waves of irregular track, 3 m, are
-# followed in some fifty steps; on elastic rails forty are enough for a vehicle below its critical
+# followed in some fifty steps; on elastic rails thirty are enough for a vehicle below its critical
 # speed, while one above it lets errors of phase grow
 LONGEST_TRAVEL, LONGEST_TRAVEL_ELASTIC, LONGEST_TRAVEL_STABLE = 0.06, 0.067, 0.1
 SHORTEST_STEP = 1e-6  # s
