@@ -66,7 +66,7 @@ AS_GIVEN, AFTER_STEP, BALANCED = map(np.int64, range(3))
 SETTLED, BALANCE = 2e-4, 1e-2
 # share of the static wheel load, lateral and vertical, up to which the forces' slopes say how the
 # forces change as the rails are corrected; beyond it the contact is evaluated again
-BY_SLOPES_Y, BY_SLOPES_Z = 2e-3, 2e-2
+BY_SLOPES_Y, BY_SLOPES_Z = 4e-3, 2e-2
 MOST_CORRECTIONS, MOST_BALANCES = 10, 50
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
