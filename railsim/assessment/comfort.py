@@ -42,16 +42,12 @@ def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
 
 @dataclass(frozen=True)
 class MeanComfort:
-    """Mean comfort at one measuring point.
+    """Mean comfort at one measuring point."""
 
-    `N_MV`, `N_VA`, `N_VD`: Index on the floor, seated, standing [1]. `continuous` (float64[block,
-    3]): Continuous comfort: the root mean squares over 5 s with Wd, Wd, Wb along x, y, z [m/s2].
-    """
-
-    N_MV: float
-    N_VA: float
-    N_VD: float
-    continuous: Floats
+    N_MV: float  # index on the floor [1]
+    N_VA: float  # seated [1]
+    N_VD: float  # standing [1]
+    continuous: Floats  # float64[block, 3], rms over 5 s with Wd, Wd, Wb along x, y, z [m/s2]
     blocks: int  # number of blocks of 5 s; the standard requires 60
 
 
@@ -203,20 +199,15 @@ def p_de(peak_to_peak: float | Floats, mean: float | Floats, posture: str) -> Fl
 
 @dataclass(frozen=True)
 class TransitionComfort:
-    """Comfort on one curve transition.
+    """Comfort on one curve transition: P_CT [%] and its arguments."""
 
-    `begin`, `end`: Times at which the measuring point passes its beginning and end [s].
-    `acceleration`, `jerk`, `roll_rate`: Arguments of P_CT [m/s2], [m/s3], [deg/s]. `standing`,
-    `seated`: P_CT [%].
-    """
-
-    begin: float
-    end: float
-    acceleration: float
-    jerk: float
-    roll_rate: float
-    standing: float
-    seated: float
+    begin: float  # time at which the measuring point passes its beginning [s]
+    end: float  # and its end [s]
+    acceleration: float  # [m/s2]
+    jerk: float  # [m/s3]
+    roll_rate: float  # [deg/s]
+    standing: float  # [%]
+    seated: float  # [%]
 
 
 def transition_comfort(

@@ -29,16 +29,12 @@ PIECE = 60.0  # s that are read at once by default
 
 @dataclass(frozen=True)
 class _Readings:
-    """What was read last: parts of a run overlap by the margins of their filters.
-
-    `speed` (float64[row]): From which the readings were made: at the ends of a part it differs
-    [m/s]. `acceleration`, `roll`: See `Record.readings`.
-    """
+    """What was read last: parts of a run overlap by the margins of their filters."""
 
     first: int  # first row
-    speed: Floats
-    acceleration: Floats
-    roll: Floats
+    speed: Floats  # float64[row], of which they were made: at the ends of a part it differs [m/s]
+    acceleration: Floats  # see `Record.readings`
+    roll: Floats  # see `Record.readings`
 
     def part_of(self, rows: slice, speed: Floats) -> "_Readings | None":
         """Return what of these is part of other rows with their speeds, if anything is.

@@ -22,16 +22,13 @@ from railsim.notation import SIDES
 
 @dataclass(frozen=True)
 class TestSection:
-    """A section of the track that a run covers.
-
-    `begin`, `end`: Arc lengths [m].
-    """
+    """A section of the track that a run covers."""
 
     __test__ = False  # pytest: not a test
 
     zone: str  # 1 to 4; empty where no zone has this radius
-    begin: float
-    end: float
+    begin: float  # arc length [m]
+    end: float  # arc length [m]
     radius: float  # signed radius, infinite on straight track [m]
     cant_deficiency: float  # positive where the cant is too small for the speed [m]
     speed: float  # speed in the middle of the section [m/s]

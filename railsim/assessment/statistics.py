@@ -15,19 +15,16 @@ from railsim.arrays import Floats
 
 @dataclass(frozen=True)
 class Line:
-    """Regression line a + b x and its upper bound.
+    """Regression line a + b x and its upper bound."""
 
-    `level`, `slope`: a and b. `middle`, `squares`: Mean of x and sum (x - mean)^2.
-    """
-
-    level: float
-    slope: float
+    level: float  # a
+    slope: float  # b
     error: float  # standard error of the regression
     target: float  # x0, at which the bound is the estimate
     quantile: float  # one-sided quantile of Student's distribution
     N: int  # number of values
-    middle: float
-    squares: float
+    middle: float  # mean of x
+    squares: float  # sum (x - mean)^2
 
     def at(self, x: float | Floats) -> Floats:
         """Value of the line."""
@@ -41,18 +38,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of a quantity's largest value from its values in sections.
-
-    `mean`, `deviation`: Mean and standard deviation (N - 1) of the values. `method` ({'one',
-    'two', 'largest', 'smallest'}): Dimensions, or that it is no estimate but a value of the
-    sections.
-    """
+    """Estimate of a quantity's largest value from its values in sections."""
 
     N: int  # number of values
-    mean: float
-    deviation: float
+    mean: float  # of the values
+    deviation: float  # their standard deviation (N - 1)
     value: float  # estimate; nan where there are too few values
-    method: str
+    method: str  # dimensions: 'one', 'two'; 'largest', 'smallest': no estimate but a value
     line: Line | None = None  # of the two-dimensional method
 
 

@@ -26,16 +26,15 @@ DENSITY = 7850.0  # density of wheel and rail steel [kg/m3]
 class Patches:
     """Contact patches, arrays of one shape or that are broadcast to it.
 
-    `N`, `friction`, `speed`: Its normal force [N], coefficient of friction [1] and speed of travel
-    [m/s]; only laws of files need them.
+    Only laws of files need `N`, `friction` and `speed`.
     """
 
     T_gamma: Floats  # wear number of each patch [N]
     area: Floats  # its area, zero where it carries nothing [m2]
     diameter: float | Floats  # diameter of its wheel [m]
-    N: Floats | float = math.nan
-    friction: Floats | float = math.nan
-    speed: Floats | float = math.nan
+    N: Floats | float = math.nan  # normal force [N]
+    friction: Floats | float = math.nan  # coefficient [1]
+    speed: Floats | float = math.nan  # of travel [m/s]
 
 
 def _pearce_sherratt(patches: Patches) -> Floats:
@@ -88,14 +87,11 @@ def krause_poll(patches: Patches, law: FrictionWork) -> Floats:
 
 @dataclass(frozen=True)
 class WearLaw:
-    """A law for the wear of a wheel.
+    """A law for the wear of a wheel."""
 
-    `name`, `source`: As in heads of columns; authors and year. `worn_area`: Patches to the worn
-    area of the wheel profile per distance, patch by patch [m2/m].
-    """
-
-    name: str
-    source: str
+    name: str  # in heads of columns
+    source: str  # authors and year
+    # of the wheel profile per distance, patch by patch [m2/m]
     worn_area: Callable[[Patches], Floats]
     constants: str = ""  # text of its file
 

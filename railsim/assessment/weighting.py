@@ -27,23 +27,18 @@ Q1 = 1.0 / math.sqrt(2.0)
 
 @dataclass(frozen=True)
 class Weighting:
-    """Parameters of a weighting.
-
-    `f1`, `f2`: Band limits [Hz]. `f3`, `f4`, `Q2`: Transition from acceleration-proportional to
-    velocity-proportional [Hz, Hz, 1]. `f5`, `Q3`, `f6`, `Q4`: Upward step [Hz, 1, Hz, 1]; f5
-    infinite: none.
-    """
+    """A weighting: from acceleration to velocity at f3 and f4, upward step from f5 to f6."""
 
     name: str  # wb, Wc, Wd or Wk
-    f1: float
-    f2: float
-    f3: float
-    f4: float
-    Q2: float
-    f5: float = math.inf
-    Q3: float = 1.0
-    f6: float = math.inf
-    Q4: float = 1.0
+    f1: float  # lower band limit [Hz]
+    f2: float  # upper band limit [Hz]
+    f3: float  # [Hz]
+    f4: float  # [Hz]
+    Q2: float  # [1]
+    f5: float = math.inf  # infinite: no step [Hz]
+    Q3: float = 1.0  # [1]
+    f6: float = math.inf  # [Hz]
+    Q4: float = 1.0  # [1]
     K: float = 1.0  # factor of the step
 
     def response(self, f: Floats) -> Complexes:

@@ -167,13 +167,10 @@ def meanings(model: type[BaseModel]) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Remark:
-    """Something allowed that an engineer would still want to know.
+    """Something allowed that an engineer would still want to know."""
 
-    `key`: dotted path of the key within the file; `text`: what is unusual.
-    """
-
-    key: str
-    text: str
+    key: str  # dotted path of the key within the file
+    text: str  # what is unusual
 
     def __str__(self) -> str:
         return f"{self.key}: {self.text}"

@@ -41,23 +41,19 @@ STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
 class Coordinates:
     """Which entries of the state vector are coordinates of the analysis.
 
-    `names`: ``carbody.y``, of its rate ``carbody.y'``; of an internal state the element's name; of
-    the track ``front.outer.wheelset.rail.left.y``; `indices`: indices in the state vector:
-    positions and velocities of the bodies, internal states of elements, displacements of elastic
-    rails, their rates; `bodies`, `components`: body and component of positions and velocities, -1
-    of all others; `n_positions`, `n_velocities`: of the bodies; `steps`: steps of difference
-    quotients; `forceless`: rates of rails without mass: their equations say that the forces
-    balance.
+    These are positions and velocities of the bodies, internal states of elements, displacements of
+    elastic rails, their rates.
     """
 
+    # ``carbody.y``, ``carbody.y'``, name of an element, ``front.wheelset.rail.left.y``
     names: tuple[str, ...]
-    indices: Integers
-    bodies: Integers
-    components: Integers
-    n_positions: int
-    n_velocities: int
-    steps: Floats
-    forceless: Integers
+    indices: Integers  # in the state vector
+    bodies: Integers  # of positions and velocities, -1 of all others
+    components: Integers  # likewise
+    n_positions: int  # of the bodies
+    n_velocities: int  # of the bodies
+    steps: Floats  # of difference quotients
+    forceless: Integers  # rates of rails without mass: their equations say that the forces balance
 
     @property
     def positions(self) -> slice:

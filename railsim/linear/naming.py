@@ -43,10 +43,7 @@ BOGIE_NAMES = ("longitudinal", "lateral", "bounce", "roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class Parts:
-    """Which bodies are what.
-
-    `cars`, `frames`, `wheelsets`: body indices.
-    """
+    """Which bodies, by their indices, are what."""
 
     model: Model
     coordinates: Coordinates

@@ -35,16 +35,12 @@ CLOSED = 1e-3  # ... to this part of the load
 
 @dataclass(frozen=True)
 class Standing:
-    """A vehicle that stands.
-
-    `state`: its state; `Q`, `Q0`: wheel loads, and those on straight level track [N]; `Y`: guiding
-    forces of rolling wheelsets [N].
-    """
+    """A vehicle that stands."""
 
     state: Floats
-    Q: Floats
-    Q0: Floats
-    Y: Floats | None = None
+    Q: Floats  # wheel loads [N]
+    Q0: Floats  # on straight level track [N]
+    Y: Floats | None = None  # guiding forces of rolling wheelsets [N]
 
     @property
     def unloading(self) -> float:

@@ -14,16 +14,12 @@ from railsim.arrays import Floats, Integers
 
 @dataclass(frozen=True)
 class Linearisation:
-    """x' = A x about an equilibrium.
+    """x' = A x about an equilibrium."""
 
-    `names`: names of the coordinates; `matrix`: a = df/dx [1/s and mixed units]; `state`: where it
-    was formed; `parameter`: value of the parameter, mostly the speed [m/s].
-    """
-
-    names: tuple[str, ...]
-    matrix: Floats
-    state: Floats
-    parameter: float
+    names: tuple[str, ...]  # of the coordinates
+    matrix: Floats  # A = df/dx [1/s and mixed units]
+    state: Floats  # where it was formed
+    parameter: float  # mostly the speed [m/s]
 
 
 def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats) -> Floats:

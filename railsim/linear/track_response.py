@@ -50,31 +50,23 @@ TOGETHER = 4096  # wave numbers that are solved at once
 
 @dataclass(frozen=True)
 class TrackResponse:
-    """State space of a vehicle with track inputs at one speed.
+    """State space of a vehicle with track inputs u at one speed: y = C x + D u + R x'.
 
-    - `speed`: [m/s]
-    - `outputs`: readings, such as ``axlebox_1_left.z``; ``roll_rate`` instead of an axis; wheel
-      forces, such as ``Q.1.left``
-    - `offsets`: of the wheelsets from the reference body along the track [m]
-    - `A`, `C`: state matrix; output matrix apart from accelerations
-    - `B`, `D`: of the displacements of the rails, their slopes and curvatures
-    - `R`: outputs by the derivative of the state: y = C x + D u + R x'
-    - `rows`: where the accelerations of the wheelsets in y, z, roll, yaw stand in x'
-    - `own`: outputs by unknown accelerations of the wheelsets, beside R
-    - `steady`: outputs in steady rolling
+    The inputs are displacements of the rails, their slopes and curvatures.
     """
 
-    speed: float
+    speed: float  # [m/s]
+    # readings, such as ``axlebox_1_left.z``, ``floor.roll_rate``; forces, such as ``Q.1.left``
     outputs: tuple[str, ...]
-    offsets: Floats
+    offsets: Floats  # of the wheelsets from the reference body along the track [m]
     A: Floats
     B: Floats
-    C: Floats
+    C: Floats  # apart from accelerations
     D: Floats
     R: Floats
-    rows: Integers
-    own: Floats
-    steady: Floats
+    rows: Integers  # where the accelerations of the wheelsets in y, z, roll, yaw stand in x'
+    own: Floats  # outputs by unknown accelerations of the wheelsets, beside R
+    steady: Floats  # outputs in steady rolling
 
     def over(self, wave_numbers: Floats) -> Complexes:
         """Frequency response H over the angular wave number, complex128[k, output, input].

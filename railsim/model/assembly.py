@@ -58,16 +58,11 @@ _KINDS = {"body": RIGID, "wheelset": WHEELSET, "axlebox": AXLEBOX}
 
 @dataclass(frozen=True)
 class Index:
-    """Names of the model's parts in the order of the arrays.
+    """Names of the model's parts in the order of the arrays."""
 
-    `bodies`: all bodies: rigid ones, wheelsets from the leading end, axleboxes; `wheelsets`: names
-    of the wheelsets; `links`, `mounts`, `actuators`, `signals`, `controllers`: names of the rows of
-    these parts of the system.
-    """
-
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...]  # rigid ones, wheelsets from the leading end, axleboxes
     wheelsets: tuple[str, ...]
-    links: tuple[str, ...]
+    links: tuple[str, ...]  # rows of this part of the system; likewise all that follow
     mounts: tuple[str, ...]
     actuators: tuple[str, ...] = ()
     signals: tuple[str, ...] = ()
@@ -96,29 +91,19 @@ class Index:
 
 @dataclass(frozen=True)
 class Model:
-    """A vehicle on a track, ready for the kernels.
-
-    - `system`, `index`: arrays and names
-    - `flat`: the vehicle's parts with names and positions
-    - `tables`: contact tables in the order of `System.contact.values`
-    - `profiles`: profiles used, by name
-    - `design`: the vehicle in its design load, whose preloads these are, where a load case is in
-      force
-    - `wheels`: wheels that are not round, which `system` leaves out: see
-      `railsim.model.uneven_wheels`
-    - `check`: check rails, likewise
-    - `rails`: rails whose section changes, likewise
-    """
+    """A vehicle on a track, ready for the kernels."""
 
     system: System
     index: Index
-    flat: FlatVehicle
-    tables: tuple[ContactTable, ...]
-    profiles: Mapping[str, Profile]
+    flat: FlatVehicle  # the vehicle's parts with names and positions
+    tables: tuple[ContactTable, ...]  # in the order of `System.contact.values`
+    profiles: Mapping[str, Profile]  # used, by name
+    # in its design load, whose preloads these are, where a load case is in force
     design: "Model | None" = None
+    # not round, left out of `system`: see `railsim.model.uneven_wheels`
     wheels: UnevenWheels = ROUND
-    check: CheckRails = NONE
-    rails: RailRanges = PLAIN
+    check: CheckRails = NONE  # likewise
+    rails: RailRanges = PLAIN  # whose section changes, likewise
 
     @property
     def n_state(self) -> int:

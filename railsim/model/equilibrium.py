@@ -55,18 +55,13 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """The vehicle at rest and in steady rolling on straight level track.
+    """The vehicle at rest and in steady rolling on straight level track."""
 
-    `model`: the model with all preloads filled in; `state`: steady rolling at s = 0; `Q0`: static
-    wheel loads [N]; `residual`: largest remaining acceleration [m/s2, rad/s2]; `remarks`: remarks
-    for the reader of results.
-    """
-
-    model: Model
-    state: Floats
-    Q0: Floats
-    residual: float
-    remarks: tuple[str, ...] = ()
+    model: Model  # with all preloads filled in
+    state: Floats  # steady rolling at s = 0
+    Q0: Floats  # static wheel loads [N]
+    residual: float  # largest remaining acceleration [m/s2, rad/s2]
+    remarks: tuple[str, ...] = ()  # for the reader of results
 
 
 class AtRest(NamedTuple):

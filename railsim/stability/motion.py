@@ -36,17 +36,12 @@ class LeftRange(ModelError):
 
 @dataclass(frozen=True)
 class Stretch:
-    """What a system did for a while.
+    """What a system did for a while."""
 
-    `state`: at the end; `time`: from the beginning of the stretch [s]; `lateral`: lateral
-    displacements of the wheelsets from the middle of their rails [m]; `sum_Y`: lateral forces of
-    the wheelsets on the track [N]; zero where a system has none.
-    """
-
-    state: Floats
-    time: Floats
-    lateral: Floats
-    sum_Y: Floats
+    state: Floats  # at the end
+    time: Floats  # from the beginning of the stretch [s]
+    lateral: Floats  # displacements of the wheelsets from the middle of their rails [m]
+    sum_Y: Floats  # lateral forces of the wheelsets on the track [N]; zero where a system has none
 
     @property
     def amplitude(self) -> float:

@@ -48,24 +48,16 @@ class Flow(Protocol):
 
 @dataclass(frozen=True)
 class PeriodicMotion:
-    """One periodic motion.
+    """One periodic motion."""
 
-    - `state`: a state that it passes through
-    - `period`, `speed`: [s], [m/s]
-    - `amplitude`: half the largest lateral travel of a wheelset [m]
-    - `multipliers`: Floquet multipliers without the trivial one
-    - `tangent`: direction of the branch in the scaled u
-    - `along`: direction of the motion itself at `state`, scaled
-    - `matrix`: Jacobian of the residual there, with which the search for the next one begins
-    """
-
-    state: Floats
-    period: float
-    speed: float
-    amplitude: float
-    multipliers: Complexes
-    tangent: Floats
-    along: Floats
+    state: Floats  # one that it passes through
+    period: float  # [s]
+    speed: float  # [m/s]
+    amplitude: float  # half the largest lateral travel of a wheelset [m]
+    multipliers: Complexes  # of Floquet, without the trivial one
+    tangent: Floats  # direction of the branch in the scaled u
+    along: Floats  # direction of the motion itself at `state`, scaled
+    # Jacobian of the residual there, with which the search for the next one begins
     matrix: Floats | None = None
 
     @property

@@ -57,20 +57,16 @@ UNCHECKED = "The limits of EN 13848-5 are from memory, not compared with the pri
 
 @dataclass(frozen=True)
 class Place:
-    """A place at which a vehicle exceeds the share of a limit.
-
-    `speed`: [m/s]; `quantity`: of `QUANTITIES`; `where`: wheel, wheelset or point; `s`: of that
-    wheelset or point [m]; `value`, `limit`: [SI]; `shape`: the defect there in words.
-    """
+    """A place at which a vehicle exceeds the share of a limit."""
 
     vehicle: str
-    speed: float
-    quantity: str
-    where: str
-    s: float
-    value: float
-    limit: float
-    shape: str
+    speed: float  # [m/s]
+    quantity: str  # of `QUANTITIES`
+    where: str  # wheel, wheelset or point
+    s: float  # of that wheelset or point [m]
+    value: float  # [SI]
+    limit: float  # [SI]
+    shape: str  # the defect there in words
 
 
 class _Run(NamedTuple):

@@ -50,22 +50,16 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A case and the paths of its files.
-
-    `path`, `picture`: files of result and figure; existing ones are replaced; `function`: function
-    for user-defined quantities, see `railsim.studies.user_function`; `keep`, `storage`: quantities
-    of the result that are kept, see `railsim.studies.spec.kept_quantities`, compression and
-    precision of its file; `exists`: whether the run exists, and only its analyses are to be
-    computed.
-    """
+    """A case and the paths of its files; existing ones are replaced."""
 
     case: Case
     path: Path
     picture: Path | None = None
-    function: str | None = None
+    function: str | None = None  # for user-defined quantities, see `railsim.studies.user_function`
+    # quantities of the result, see `railsim.studies.spec.kept_quantities`
     keep: tuple[str, ...] = ("*",)
-    storage: Storage = PLAIN
-    exists: bool = False
+    storage: Storage = PLAIN  # compression and precision of its file
+    exists: bool = False  # the run exists, only its analyses are to be computed
 
 
 Batch = tuple[Job, ...]

@@ -42,18 +42,13 @@ REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Inputs of one run, before its definitions are loaded.
+    """Inputs of one run, before its definitions are loaded."""
 
-    `name`: name of the run; `run`: the run, with its speed at the start; `labels`: labels of the
-    run; `key`: hash of all inputs; empty if a file cannot be read; `has_run`: whether a run in the
-    time domain belongs to it, with a result file.
-    """
-
-    name: str
-    run: RunSpec
-    labels: Mapping[str, str | float]
-    key: str
-    has_run: bool = True
+    name: str  # of the run
+    run: RunSpec  # with its speed at the start
+    labels: Mapping[str, str | float]  # of the run
+    key: str  # hash of all inputs; empty if a file cannot be read
+    has_run: bool = True  # in the time domain, with a result file
 
 
 class Plan:

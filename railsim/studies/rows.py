@@ -17,15 +17,11 @@ PERMITTED = "permitted"  # as a speed: the lower of the speeds of vehicle and tr
 
 @dataclass(frozen=True)
 class Row:
-    """Values of the varied keys of one run.
+    """Values of the varied keys of one run."""
 
-    `values`: texts as in `key=value`, by the paths of the keys; `suffix`: suffix to the name of the
-    run; `speed`: speed of the run if the row varies it [m/s].
-    """
-
-    values: Mapping[str, str]
-    suffix: str
-    speed: float | None = None
+    values: Mapping[str, str]  # texts as in `key=value`, by the paths of the keys
+    suffix: str  # to the name of the run
+    speed: float | None = None  # of the run if the row varies it [m/s]
 
 
 def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list[Row]:

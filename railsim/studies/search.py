@@ -44,19 +44,15 @@ Evaluate = Callable[[Floats], Values]
 
 @dataclass(frozen=True)
 class Task:
-    """Task of a search.
+    """Task of a search."""
 
-    `evaluate`: takes designs, float64[design, variable] between 0 and 1; returns the values of all
-    designs so far; `variables`, `objectives`, `constraints`: numbers of variables, objectives and
-    constraints; `number`, `batch`: number of designs in total, and at a time.
-    """
-
+    # designs, float64[design, variable] from 0 to 1, to the values of all designs so far
     evaluate: Evaluate
     variables: int
     objectives: int
     constraints: int
-    number: int
-    batch: int
+    number: int  # of designs in total
+    batch: int  # designs at a time
     seed: int
 
 

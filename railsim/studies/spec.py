@@ -28,21 +28,16 @@ MOST_FAULTS = 20
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run.
+    """One run."""
 
-    `vehicle`, `track`: file, or name of a shipped one; `speed`: speed [m/s]; not needed where the
-    settings have a speed table; `settings`: settings file; `start`: distance at which the reference
-    body starts [m]; `duration`, `until`: end of the run: time [s] or distance [m]; `assignments`:
-    ``key.path=value``, the paths beginning with ``vehicle.``, ``track.`` or ``settings.``.
-    """
-
-    vehicle: str | Path
-    track: str | Path
-    speed: float | None
-    settings: str | Path | None = None
-    start: float = 0.0
-    duration: float | None = None
-    until: float | None = None
+    vehicle: str | Path  # file, or name of a shipped one
+    track: str | Path  # likewise
+    speed: float | None  # [m/s]; not needed where the settings have a speed table
+    settings: str | Path | None = None  # file
+    start: float = 0.0  # distance of the reference body at the start [m]
+    duration: float | None = None  # until its end [s]
+    until: float | None = None  # distance of its end [m]
+    # ``key.path=value`` with ``vehicle.``, ``track.`` or ``settings.`` first
     assignments: tuple[str, ...] = ()
 
 

@@ -160,22 +160,18 @@ def wear_loop(
 
 @dataclass(frozen=True)
 class Wearing:
-    """What wears.
-
-    `new`: profiles at the beginning; `names`: names by which vehicle or track call them; `depths`:
-    a result and a law to the depth of each profile per distance or tonnage; `ended`: worn profiles
-    to the sentence why the loop ends; empty while it goes on; `outputs`: what the runs put out;
-    `unit`, `scale`: in which messages give distance or tonnage, and its factor from SI.
-    """
+    """What wears."""
 
     runs: Sequence[Run]
-    new: Mapping[str, Profile]
-    names: Mapping[str, str]
+    new: Mapping[str, Profile]  # profiles at the beginning
+    names: Mapping[str, str]  # by which vehicle or track call them
+    # a result and a law to the depth of each profile per distance or tonnage
     depths: Callable[[Result, WearLaw], dict[str, Floats]]
+    # worn profiles to the sentence why the loop ends; empty while it goes on
     ended: Callable[[Mapping[str, Profile]], str] = lambda _: ""
-    outputs: Sequence[str] = ("contact_patches",)
-    unit: str = "km"
-    scale: float = 1e-3
+    outputs: Sequence[str] = ("contact_patches",)  # of the runs
+    unit: str = "km"  # of distance or tonnage in messages
+    scale: float = 1e-3  # its factor from SI
 
     def amount(self, at: float) -> str:
         """Return a distance or tonnage as messages give it."""

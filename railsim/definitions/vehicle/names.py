@@ -26,15 +26,11 @@ DEEPEST_ASSEMBLY = 10
 
 @dataclass(frozen=True)
 class Group:
-    """One standing assembly, or the vehicle itself.
+    """One standing assembly, or the vehicle itself."""
 
-    `parts`: its table: bodies, wheelsets, axleboxes, elements; `scope`: names of the placements
-    that lead to it; `path`: keys that lead to its table in the file.
-    """
-
-    parts: Mapping[str, Any]
-    scope: Scope
-    path: tuple[str, ...]
+    parts: Mapping[str, Any]  # its table: bodies, wheelsets, axleboxes, elements
+    scope: Scope  # names of the placements that lead to it
+    path: tuple[str, ...]  # keys that lead to its table in the file
 
     def table(self, key: str) -> dict[str, Mapping[str, Any]]:
         """Return the well-formed members of one of its tables."""
