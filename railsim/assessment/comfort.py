@@ -155,8 +155,6 @@ def motion_sickness_dose(a: Floats, rate: float) -> float:
     `a` (float64[time]): Vertical acceleration [m/s2]. `rate`: Samples per second [1/s]. Returns:
     [m/s1.5].
 
-    Examples
-    --------
     >>> t = np.arange(0.0, 1000.0, 0.05)
     >>> dose = motion_sickness_dose(np.sin(2.0 * np.pi * 0.2 * t), 20.0)
     >>> round(dose / 500.0**0.5, 2)
@@ -174,8 +172,6 @@ def p_ct(acceleration: float, jerk: float, roll_rate: float, posture: str) -> fl
     [m/s3]. `roll_rate`: Largest roll velocity [deg/s]. `posture` ({'standing', 'seated'}).
     Returns: [%].
 
-    Examples
-    --------
     >>> round(p_ct(1.0, 0.5, 2.0, "standing"), 2)
     28.69
     """
@@ -188,8 +184,6 @@ def p_de(peak_to_peak: float | Floats, mean: float | Floats, posture: str) -> Fl
 
     P_DE = max(a yp + b ym - c, 0), yp and ym over 2 s.
 
-    Examples
-    --------
     >>> round(float(p_de(1.2, 1.0, "seated")), 2)
     1.5
     """

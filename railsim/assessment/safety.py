@@ -24,8 +24,6 @@ def nadal(flange_angle: float, mu: ArrayLike) -> Floats:
 
     `flange_angle`: Largest contact angle of the flange [rad]. `mu`: Coefficient of friction [1].
 
-    Examples
-    --------
     >>> round(float(nadal(math.radians(70.0), 0.36)), 3)
     1.2
     """
@@ -73,8 +71,6 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float | Floats, height: F
     friction varies along the track [1]. `height` (float64[time]): Height of the wheel above its
     rail [m].
 
-    Examples
-    --------
     >>> s = np.arange(6.0)
     >>> climb_distance(s, np.array([0.5, 1.3, 1.4, 1.3, 0.9, 0.2]), 1.2, 1e-3 * s)
     Climb(length=2.0, begin=1.0, rise=0.002)

@@ -58,8 +58,6 @@ def outer_deficiency(speed: float, radius: float, cant: float) -> float:
     `speed`: [m/s]. `radius`, `cant`: Signed: positive to the right, positive = left rail higher
     [m].
 
-    Examples
-    --------
     >>> round(outer_deficiency(20.0, -250.0, -0.15), 4)
     0.0946
     """

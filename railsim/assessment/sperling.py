@@ -57,8 +57,6 @@ def sperling_weighted(a: Floats, rate: float, direction: Direction) -> Floats:
 def index_of_rms(a_w: float) -> float:
     """Wz of a weighted root mean square [m/s2].
 
-    Examples
-    --------
     >>> B = float(sperling_gain(np.array(5.0), "vertical"))
     >>> round(index_of_rms(0.5 / np.sqrt(2.0) * B), 3)
     3.039

@@ -55,8 +55,6 @@ def quality_class(speed: float, alignment: float, level: float) -> str:
     `speed`: Admissible speed of the line [m/s]. `alignment`, `level`: Standard deviations in D1
     [m].
 
-    Examples
-    --------
     >>> quality_class(40.0, 0.71e-3, 0.98e-3), quality_class(40.0, 1.21e-3, 1.61e-3)
     ('better than QN1', 'between QN1 and QN2')
     """

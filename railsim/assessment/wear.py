@@ -134,8 +134,6 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:
     `T_gamma`: Wear number [N]. `diameter`: Wheel diameter [m]. Returns: Worn area per distance
     [m2/m].
 
-    Examples
-    --------
     >>> worn = pearce_sherratt_1991(np.array([50.0, 150.0, 250.0]), 0.92)
     >>> (1e9 * worn).round(5).tolist()  # mm2/km
     [0.01359, 0.02717, 0.15598]
@@ -156,8 +154,6 @@ def usfd(T_gamma_over_A: Floats) -> Floats:
     `T_gamma_over_A`: Wear number over the area of the patch [N/m2]. Returns: Mass loss per metre
     rolled and square metre of contact patch [kg/m/m2].
 
-    Examples
-    --------
     >>> (1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0]))).round(1).tolist()  # ug/(m mm2)
     [26.5, 55.0, 1466.3]
     """
@@ -184,8 +180,6 @@ class WholeLifeRailModel:
     def __call__(self, T_gamma: Floats) -> Floats:
         """Damage of one passing axle [1].
 
-        Examples
-        --------
         >>> (1e6 * WholeLifeRailModel()(np.array([10.0, 40.0, 65.0, 120.0, 230.0]))).tolist()
         [0.0, 5.0, 10.0, 5.0, -5.0]
         """

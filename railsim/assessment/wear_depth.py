@@ -224,8 +224,6 @@ class WheelDimensions:
 def wheel_dimensions(profile: Profile) -> WheelDimensions:
     """Dimensions of a wheel profile; z = 0 need not be on the rolling circle.
 
-    Examples
-    --------
     >>> from railsim.profiles import load_profile
     >>> found = wheel_dimensions(load_profile("S1002"))
     >>> [round(1e3 * v, 1) for v in (found.flange_height, found.flange_thickness)]

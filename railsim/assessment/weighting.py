@@ -58,8 +58,6 @@ class Weighting:
     def gain(self, f: Floats) -> Floats:
         """Magnitude of the response.
 
-        Examples
-        --------
         >>> WD.gain(np.array([1.0, 4.0])).round(3).tolist()
         [1.011, 0.512]
         """

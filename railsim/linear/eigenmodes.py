@@ -66,8 +66,6 @@ class Eigenmodes:
 def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     """Eigenmodes of a linearisation, by rising |lambda|.
 
-    Examples
-    --------
     >>> oscillator = Linearisation(("x", "v"), np.array([[0.0, 1.0], [-4.0, -0.4]]), np.zeros(2), 1)
     >>> modes = eigenmodes(oscillator)
     >>> modes.natural_frequencies.round(4), modes.damping_ratios.round(4)

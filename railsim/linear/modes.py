@@ -248,8 +248,6 @@ class RootLocus(Plottable):
 def numbered(names: Sequence[str]) -> list[str]:
     """Names with a number from the second of the same on.
 
-    Examples
-    --------
     >>> numbered(["front hunting", "bogie roll", "front hunting"])
     ['front hunting', 'bogie roll', 'front hunting 2']
     """

@@ -28,8 +28,6 @@ def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats)
     `function`: of many states at once, float64[k, n] to float64[k, m]; `state`, `steps`: where, and
     with which steps.
 
-    Examples
-    --------
     >>> product = lambda rows: rows[:, :1] * rows[:, 1:]
     >>> jacobian(product, np.array([2.0, 3.0]), np.full(2, 1e-3))
     array([[3., 2.]])

@@ -99,8 +99,6 @@ def dot(a: Any, b: Any) -> Any:
 def folded(angle: Any) -> Any:
     """Angle between lines without direction, from 0 to pi/2 [rad].
 
-    Examples
-    --------
     >>> [round(float(np.degrees(folded(np.radians(x)))), 9) for x in (30.0, 140.0, -100.0, 200.0)]
     [30.0, 40.0, 80.0, 20.0]
     """

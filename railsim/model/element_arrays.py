@@ -76,8 +76,6 @@ def rotation_potential(stiffness: Sequence[float]) -> Triple:
 
     `stiffness`: k_x, k_y, k_z [N m/rad]. Returns: K_d [N m]; entries may be negative.
 
-    Examples
-    --------
     >>> rotation_potential((4.0, 2.0, 0.0))
     (-1.0, 1.0, 3.0)
     """

@@ -54,8 +54,6 @@ def vehicle_remarks(
     `balanced`: its model with preloads, where there is one; `supports`: whether the weight on each
     support is computed too; it needs the compiler's import.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_vehicle
     >>> coach = load_vehicle("coach_manchester", ["bodies.carbody.inertia.0=4e7"])
     >>> print(vehicle_remarks(coach)[0])

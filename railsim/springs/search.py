@@ -96,10 +96,8 @@ class SearchResult:
 def search(suspension: TrailingArmSuspension) -> SearchResult:
     """Search the feasible nests of a suspension file.
 
-    Raises
-    ------
-    InputError : a table that the search needs is missing, or no nest keeps all limits: which
-        limits stand in the way, and how to loosen them.
+    Raises InputError: a table that the search needs is missing, or no nest keeps all limits: which
+    limits stand in the way, and how to loosen them.
     """
     task = many.task_of(suspension)
     sample = candidates(task.limits, task.wires)

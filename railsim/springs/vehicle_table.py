@@ -44,8 +44,6 @@ class VehiclePart:
 def axlebox_load(vehicle: FlatVehicle) -> float:
     """Return the static load of an axlebox, all bodies but the wheelsets shared by all of them [N].
 
-    Examples
-    --------
     >>> from railsim.definitions.vehicle.flatten import flatten
     >>> from railsim.definitions.loading import load_vehicle
     >>> round(axlebox_load(flatten(load_vehicle("coach_manchester"))))
@@ -60,9 +58,7 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
 
     The springs are taken at a named load, by default that of the table `[vehicle]`.
 
-    Raises
-    ------
-    InputError : no table `[vehicle]`, or a load that the nest cannot carry.
+    Raises InputError: no table `[vehicle]`, or a load that the nest cannot carry.
     """
     table = suspension.vehicle
     if table is None:

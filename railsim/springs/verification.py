@@ -155,13 +155,8 @@ def load_cases(
 def verify(suspension: TrailingArmSuspension) -> Verification:
     """Verify a suspension under all its loads.
 
-    Raises
-    ------
-    InputError
-        A wire diameter or number of coils is missing, or a load cannot be carried.
+    Raises InputError: A wire diameter or number of coils is missing, or a load cannot be carried.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_spring
     >>> result = verify(load_spring("turasas_axlebox"))
     >>> {case.name: round(case.K_sys / 9810, 3) for case in result.cases}["T.I."]
@@ -174,13 +169,8 @@ def verify(suspension: TrailingArmSuspension) -> Verification:
 def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     """Fatigue of each spring between the lowest and the highest dynamic load.
 
-    Raises
-    ------
-    InputError
-        No table `[fatigue]`, or a dynamic load that cannot be carried.
+    Raises InputError: no table `[fatigue]`, or a dynamic load that cannot be carried.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_spring
     >>> margins = fatigue(load_spring("turasas_axlebox"))
     >>> round(margins["outer"].margin, 3)

@@ -218,9 +218,7 @@ class State:
         self.to_be_analysed: set[str] = set()
         waiting = [point for point in points if not self._is_done(point)]
         self._waiting = dict(zip(waiting, load(waiting), strict=True))
-        faults = [
-            fault for point, case in self._waiting.items() for fault in self._faults_of(point, case)
-        ]
+        faults = [fault for one in self._waiting.items() for fault in self._faults_of(*one)]
         if faults and not execution.resume:
             raise InputError(faults)
         found = {point for point, _ in self.found}
@@ -275,13 +273,8 @@ class State:
         for path, words in self._damaged.items():
             old = _moved_aside(path)
             remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
-        lost = [
-            case.name
-            for case in self.cases
-            if self._entries.get(case.name)
-            and case.file_name not in self._files
-            and self._entries[case.name].size
-        ]
+        gone = [case.name for case in self.cases if case.file_name not in self._files]
+        lost = [name for name in gone if name in self._entries and self._entries[name].size]
         for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
             if names:
                 number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
@@ -291,13 +284,9 @@ class State:
     def records(self, journal: Journal) -> Records:
         """Return the records of all runs, done or waiting, in the order of the combinations."""
         waiting = {point.name: case for point, case in self._waiting.items()}
-        return Records(
-            journal.path,
-            [
-                journal.entries.get(point.name) or waiting_record(waiting[point.name])
-                for point in self._points
-            ],
-        )
+        names = [point.name for point in self._points]
+        found = [journal.entries.get(name) or waiting_record(waiting[name]) for name in names]
+        return Records(journal.path, found)
 
 
 def _moved_aside(path: Path) -> Path:

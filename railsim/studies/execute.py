@@ -367,16 +367,13 @@ def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, byte
     if all((job.path.parent / mark).is_file() for job in batch):
         return perform(batch), {}
     with tempfile.TemporaryDirectory(prefix="railsim-") as folder:
-        here = tuple(
-            replace(
-                job,
-                path=Path(folder) / job.path.name,
-                picture=job.picture and Path(folder) / job.picture.name,
-            )
-            for job in batch
-        )
-        records = perform(here)
-        return records, {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+        there = Path(folder)
+        here = []
+        for job in batch:
+            picture = job.picture and there / job.picture.name
+            here.append(replace(job, path=there / job.path.name, picture=picture))
+        records = perform(tuple(here))
+        return records, {path.name: path.read_bytes() for path in there.iterdir()}
 
 
 def _taken(future: Any, batch: Batch) -> list[Record]:

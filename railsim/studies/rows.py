@@ -28,9 +28,8 @@ def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list
     """Return all combinations: the grid outermost, then linked keys, then the sample."""
     combined = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     for table in linked:
-        together = [
-            dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)
-        ]
+        each = zip(*table.values(), strict=True)
+        together = [dict(zip(table, values, strict=True)) for values in each]
         combined = [{**row, **more} for row in combined for more in together]
     members = [("", dict[str, str]())]
     if sample is not None:
@@ -85,8 +84,6 @@ def sampled(sample: Sample) -> list[dict[str, str]]:
 def quantile(spread: Spread, share: float) -> float:
     """Return the value of a parameter below which `share` of its values lie.
 
-    Examples
-    --------
     >>> quantile(Spread(low=1.0, high=100.0, scale="log"), 0.5)
     10.0
     >>> quantile(Spread(nominal=200.0, tolerance=0.1), 0.75)
@@ -110,8 +107,6 @@ def quantile(spread: Spread, share: float) -> float:
 def suffix(point: Mapping[str, str]) -> str:
     """Return the suffix of a point of the grid to the name of its run.
 
-    Examples
-    --------
     >>> suffix({"track.friction": "0.3", "settings.drive.speed_table.0.1": "12"})
     '_friction=0.3_speed_table.0.1=12'
     """
@@ -124,8 +119,6 @@ def suffix(point: Mapping[str, str]) -> str:
 def in_a_name(text: str) -> str:
     """Return a text in a form for file names, which cannot point to another folder.
 
-    Examples
-    --------
     >>> in_a_name("[10, 20]"), in_a_name("../other")
     ('10-20', '..-other')
     """

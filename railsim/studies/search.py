@@ -278,8 +278,6 @@ def non_dominated(values: Floats) -> Flags:
 
     Of equal rows only the first is non-dominated; rows with NaN are dominated.
 
-    Examples
-    --------
     >>> non_dominated(np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 3.0], [np.nan, 0.0]])).tolist()
     [True, True, False, False]
     """
@@ -300,8 +298,6 @@ def hypervolume(values: Floats, reference: Floats) -> float:
     reference point.  Computed in slices along the last objective; the time grows with the number of
     rows to the power of the number of objectives.
 
-    Examples
-    --------
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """
@@ -322,8 +318,6 @@ def hypervolume(values: Floats, reference: Floats) -> float:
 def knee(front: Floats) -> int:
     """Return the row nearest to the best value of each objective, scaled by its range.
 
-    Examples
-    --------
     >>> knee(np.array([[0.0, 1.0], [0.2, 0.2], [1.0, 0.0]]))
     1
     """

@@ -175,11 +175,10 @@ def kept_quantities(keep: str) -> tuple[str, ...]:
     known = [*QUANTITIES, *REQUESTED]
     wrong = [name for name in names if not any(fnmatchcase(one, name) for one in known)]
     if wrong or not names:
+        known = ["all", "summary", *known]
+        words = "no such quantity"
         raise InputError(
-            argument_fault(
-                "keep", name, "no such quantity", nearest(name, ["all", "summary", *known])
-            )
-            for name in wrong or [keep]
+            argument_fault("keep", n, words, nearest(n, known)) for n in wrong or [keep]
         )
     return names
 

@@ -246,24 +246,16 @@ def as_files(inputs: Any, folder: Path) -> list[str]:
         name = next(name for name in names if texts.get(name, text) == text)
         texts[name] = text
         path = (folder / INPUTS / f"{name}.toml").absolute()
-        if not _holds(path, text.encode()):
+        if not (path.is_file() and path.read_bytes() == text.encode()):
             make_folder(path.parent)
             write_text(path, text)
         found.append(str(path))
     return found
 
 
-def _holds(path: Path, data: bytes) -> bool:
-    if not path.is_file() or path.stat().st_size != len(data):
-        return False
-    return path.read_bytes() == data
-
-
 def _slug(name: str) -> str:
     """Return a name in a form suitable for a file.
 
-    Examples
-    --------
     >>> _slug("Passenger coach, soft primary")
     'passenger_coach_soft_primary'
     """

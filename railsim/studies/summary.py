@@ -43,14 +43,8 @@ FORMAT = "railsim-study-result/1"
 
 def waiting_record(case: Case) -> Record:
     """Return the record of a run that has not been done yet."""
-    return {
-        "name": case.name,
-        "file": case.file_name,
-        "labels": dict(case.labels),
-        "inputs_hash": case.key,
-        "status": "waiting",
-        "status_reason": "",
-    }
+    about = {"name": case.name, "file": case.file_name, "labels": dict(case.labels)}
+    return {**about, "inputs_hash": case.key, "status": "waiting", "status_reason": ""}
 
 
 def finished_record(case: Case, result: Result, function: str | None = None) -> Record:
@@ -169,9 +163,8 @@ def check_index(path: Path) -> Index:
         if Path(run.file).name != run.file:
             faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
         elif not is_file(path.parent / run.file):
-            faults.append(
-                Fault(str(path), run.file, "the result is missing", allowed, option=str(path))
-            )
+            found = "the result is missing"
+            faults.append(Fault(str(path), run.file, found, allowed, option=str(path)))
     faults.check()
     return index
 
@@ -221,8 +214,6 @@ def _checked_row(record: Record) -> dict[str, Any]:
 def unit_of(column: str) -> str:
     """Return the unit of a column of the summary, empty if it has none.
 
-    Examples
-    --------
     >>> [unit_of(name) for name in ("Q_peak", "Q_peak_time", "wheelset_yaw_mid2", "Q_peak_side")]
     ['N', 's', 'rad', '']
     """

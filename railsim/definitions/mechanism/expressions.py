@@ -148,8 +148,6 @@ def evaluate(expression: Expression, values: Mapping[str, Any]) -> Any:
     `expression`: what to evaluate; `values`: parameters by name. Raises ValueError: a division by
     zero, a function outside its domain, an overflow.
 
-    Examples
-    --------
     >>> float(evaluate(Expression("hypot(a, 4) * cos(0)"), {"a": 3.0}))
     5.0
     """
