@@ -190,15 +190,20 @@ EMPTY_TABLE: Any = Field(default_factory=dict)
 """Default of a table that a file may leave out."""
 
 
-def rises(what: str) -> AfterValidator:
-    """Return the check that the first column of rows, called `what`, increases strictly."""
+def holds(condition: Callable[[Any], bool], otherwise: str) -> AfterValidator:
+    """Return the check that a condition holds of a value; `otherwise` says what is allowed."""
 
-    def check(rows: Any) -> Any:
-        if not rising(rows):
-            raise ValueError(f"the {what} must increase from row to row")
-        return rows
+    def check(value: Any) -> Any:
+        if not condition(value):
+            raise ValueError(otherwise)
+        return value
 
     return AfterValidator(check)
+
+
+def rises(what: str) -> AfterValidator:
+    """Return the check that the first column of rows, called `what`, increases strictly."""
+    return holds(rising, f"the {what} must increase from row to row")
 
 
 def rising(rows: Sequence[Sequence[float]]) -> bool:

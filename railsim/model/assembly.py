@@ -227,27 +227,12 @@ def support_arrays(definition: SupportDefinition, rail_base: float) -> Support:
     variation = np.array(definition.variation or (), dtype=float).reshape(-1, 3)
     if values is None:
         return Support(0, 0, 0, np.zeros(SUPPORT_ROW), variation)
-    (k_y, c_y), (k_z, c_z) = values.pad_lateral, values.pad_vertical
-    ballast_y, ballast_z = values.ballast_lateral or (0.0, 0.0), values.ballast_vertical
-    k_side, c_side = ballast_z or (0.0, 0.0)
-    square = values.ballast_base**2
-    row = np.array(
-        [
-            values.rail_mass,
-            values.sleeper_mass,
-            values.sleeper_inertia,
-            k_y,
-            c_y,
-            k_z,
-            c_z,
-            *ballast_y,
-            2.0 * k_side,
-            2.0 * c_side,
-            2.0 * square * k_side,
-            2.0 * square * c_side,
-            0.5 * rail_base,
-        ]
-    )
+    masses = values.rail_mass, values.sleeper_mass, values.sleeper_inertia
+    across = values.ballast_lateral or (0.0, 0.0)
+    both = 2.0 * np.array(values.ballast_vertical or (0.0, 0.0))  # halves of the sleeper
+    pads = *values.pad_lateral, *values.pad_vertical
+    ballast = *across, *both, *(values.ballast_base**2 * both)
+    row = np.array([*masses, *pads, *ballast, 0.5 * rail_base])
     return Support(1, int(values.has_sleeper), int(values.massless), row, variation)
 
 
@@ -271,16 +256,12 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     origin = flat.body(flat.reference).position[0]
     positions = [round(body.position[0] - origin, 9) for body in flat.bodies]
     offsets = sorted(set(positions))
-    kinds = np.array(
-        [FIXED if body.fixed else _KINDS[body.kind] for body in flat.bodies], dtype=np.int64
-    )
+    kinds = np.array([FIXED if b.fixed else _KINDS[b.kind] for b in flat.bodies], dtype=np.int64)
+    parents = [names.index(body.parent) if body.parent else -1 for body in flat.bodies]
     bodies = Bodies(
         kind=kinds,
         frame=np.array([offsets.index(position) for position in positions], dtype=np.int64),
-        parent=np.array(
-            [names.index(body.parent) if body.parent else -1 for body in flat.bodies],
-            dtype=np.int64,
-        ),
+        parent=np.array(parents, dtype=np.int64),
         row=aligned(np.array([_body_row(body) for body in flat.bodies])),
         whole=np.flatnonzero(kinds != AXLEBOX),
         axleboxes=np.flatnonzero(kinds == AXLEBOX),
@@ -293,14 +274,8 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
 def _body_row(body: FlatBody) -> tuple[float, ...]:
     inertia = (1.0, body.pitch_inertia, 1.0) if body.kind == "axlebox" else body.inertia
     radius = 0.5 * sum(body.wheelset.radius) if body.wheelset else 1.0
-    return (
-        max(body.mass, 1e-9),
-        *inertia,
-        body.position[1],
-        body.position[2],
-        radius,
-        float(body.wheelset is not None),
-    )
+    _, y, z = body.position
+    return max(body.mass, 1e-9), *inertia, y, z, radius, float(body.wheelset is not None)
 
 
 def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]:
@@ -309,10 +284,8 @@ def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]
     first = max(round(t.y0 / dy) for t in tables)
     last = min(round(t.y0 / dy) + t.values.shape[3] for t in tables)
     starts = [first - round(t.y0 / dy) for t in tables]
-    parts = [
-        t.values[..., start : start + last - first, :]
-        for t, start in zip(tables, starts, strict=True)
-    ]
+    each = zip(tables, starts, strict=True)
+    parts = [t.values[..., start : start + last - first, :] for t, start in each]
     return tables[starts.index(0)].y0, parts
 
 

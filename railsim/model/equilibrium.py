@@ -159,11 +159,8 @@ def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:
         level = level_track(released.system)
         balance = _Balance(released, level, speed=1.0, rolling=False)
         guess = balance.solve(_first_guess(released, level))
-        return (
-            replace(released, system=released.system._replace(bodies=model.system.bodies)),
-            guess,
-            (),
-        )
+        system = released.system._replace(bodies=model.system.bodies)
+        return replace(released, system=system), guess, ()
     except ModelError:
         model = with_preloads(model)
         names = ", ".join(model.index.bodies[b] for b in fixed)

@@ -75,10 +75,7 @@ class Motion(Protocol):
     def stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
         """Move for `duration` [s] while the speed goes evenly from `begin` to `end` [m/s].
 
-        Raises
-        ------
-        LeftRange
-            The motion leaves the range of the model.
+        Raises LeftRange: the motion leaves the range of the model.
         """
 
 
@@ -163,17 +160,9 @@ class VehicleMotion:
 
         Raises LeftRange: the motion leaves the range of the model.
         """
-        status, where, _, rows = time_loop(
-            system,
-            self._work,
-            state,
-            self._derivative,
-            self._stages,
-            self._recorder,
-            SCHEMES[self._scheme],
-            step,
-            chunk,
-        )
+        arrays = self._work, state, self._derivative, self._stages, self._recorder
+        scheme = SCHEMES[self._scheme]
+        status, where, _, rows = time_loop(system, *arrays, scheme, step, chunk)
         if status != RUNNING:
             raise LeftRange(self.model.index.sentence(status, where))
         if not np.isfinite(state).all():

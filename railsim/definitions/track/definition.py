@@ -8,7 +8,7 @@ cant and gradient are piecewise linear in the arc length and rounded over `round
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE, NORMAL_GAUGE
@@ -26,6 +26,7 @@ from railsim.definitions.base import (
     Text,
     TextPair,
     both_sides,
+    holds,
     one_or_two,
     pair,
     rises,
@@ -47,12 +48,7 @@ ArcLength = TypeVar("ArcLength", float, Any)
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
 
-def _softer_in_slip(factors: tuple[float, float]) -> tuple[float, float]:
-    if factors[1] > factors[0]:
-        raise ValueError("the factor of the slip area is at most that of the adhesion area")
-    return factors
-
-
+SOFTER = "the factor of the slip area is at most that of the adhesion area"
 Widening = Annotated[Finite, Field(ge=-0.05, le=0.1)]
 FrictionRows = Annotated[
     tuple[tuple[Finite, NonNegative, NonNegative], ...],
@@ -63,7 +59,7 @@ FrictionRows = Annotated[
 ]
 ThirdBody = Annotated[
     tuple[Share, Share],
-    AfterValidator(_softer_in_slip),
+    holds(lambda factors: factors[1] <= factors[0], SOFTER),
     BeforeValidator(pair),
     one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
 ]

@@ -134,9 +134,8 @@ class Support(Definition):
 
     @check
     def _complete(self) -> None:
-        given = [
-            name for name in SupportValues.__dataclass_fields__ if getattr(self, name) is not None
-        ]
+        names = SupportValues.__dataclass_fields__
+        given = [name for name in names if getattr(self, name) is not None]
         base = PRESETS[self.preset]
         if base is None:
             if given or self.variation:
@@ -154,19 +153,11 @@ class Support(Definition):
                 raise ValueError(
                     "'rail_mass', 'sleeper_mass' and 'sleeper_inertia' are all 0 or all positive"
                 )
-        elif any(
-            getattr(self, name) is not None
-            for name in ("sleeper_mass", "sleeper_inertia", "ballast_base")
-        ):
+        elif {"sleeper_mass", "sleeper_inertia", "ballast_base"} & {*given}:
             raise ValueError("a sleeper needs 'ballast_vertical' and 'ballast_lateral'")
-        if values.massless and not self._damped(values):
+        springs = [values.pad_vertical, values.pad_lateral, *sleeper]
+        if values.massless and any(spring[1] == 0.0 for spring in springs if spring is not None):
             raise ValueError("without masses every spring needs a damping above 0")
-
-    @staticmethod
-    def _damped(values: SupportValues) -> bool:
-        pads, ballast = values.pad_vertical, values.ballast_vertical
-        parts = [pads, values.pad_lateral, ballast, values.ballast_lateral]
-        return all(part[1] > 0.0 for part in parts if part is not None)
 
     @property
     def values(self) -> SupportValues | None:

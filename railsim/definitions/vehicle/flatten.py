@@ -6,7 +6,7 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -216,17 +216,12 @@ def _elements(group: Group, frame: _Frame, positions: dict[str, Vector]) -> Iter
                 at = (frame.point(points[0], side), frame.point(points[1], side))
             definition = element.mirrored(frame.signs(side)).with_known_preload(*at)
             body2 = ends[1] if len(ends) == 2 else ""
-            full, signs = frame.full(sided), frame.signs(side)
-            parts = definition.parts()
+            full, parts = frame.full(sided), definition.parts()
             for suffix, offset, part in parts:
-                there = _sum(at[0], tuple(s * d for s, d in zip(signs, offset, strict=True)))
+                there = replace(frame, origin=at[0]).point(offset, side)
                 yield FlatElement(f"{full}.{suffix}", ends[0], body2, there, there, part)
             if not parts:
                 yield FlatElement(full, ends[0], body2, at[0], at[1], definition)
-
-
-def _sum(one: Sequence[float], two: Sequence[float]) -> Vector:
-    return (one[0] + two[0], one[1] + two[1], one[2] + two[2])
 
 
 def position_faults(vehicle: "Vehicle") -> list[Fault]:
