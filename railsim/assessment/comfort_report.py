@@ -173,8 +173,5 @@ def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
 def short_of_blocks(points: list[PointComfort]) -> str:
     """Sentence if there are fewer blocks than the standard requires; otherwise empty."""
     blocks = points[0].mean.blocks
-    return (
-        ""
-        if blocks >= comfort.BLOCKS
-        else f"{blocks} blocks of 5 s, EN 12299 requires {comfort.BLOCKS}"
-    )
+    few = f"{blocks} blocks of 5 s, EN 12299 requires {comfort.BLOCKS}"
+    return few if blocks < comfort.BLOCKS else ""

@@ -108,20 +108,17 @@ def largest_overturning(Q: Floats) -> float:
 class WheelSafety:
     """Nadal's limit and climb distance of one wheel.
 
-    `limit`: Nadal's limit of Y/Q for the flange angle of the profile and the friction of the rail,
-    where Y/Q comes nearest to it [1]. `Y_over_Q`: Derailment quotient there, unfiltered: the
-    largest where the friction does not vary [1]; nan where the wheel never carried load. `lifted`:
-    Whether it was without load, where Y/Q has no value. `climb_distance`, `climb_begin`, `rise`:
-    Longest distance above the limit, position of its beginning, rise of the wheel on it [m].
+    The limit is taken where Y/Q, unfiltered, comes nearest to it: at its largest value where the
+    friction does not vary.
     """
 
     place: str  # wheelset, from 1, and side
-    limit: float
-    Y_over_Q: float
-    climb_distance: float
-    climb_begin: float
-    rise: float
-    lifted: bool
+    limit: float  # for the flange angle of the profile and the friction of the rail [1]
+    Y_over_Q: float  # there [1]; nan where the wheel never carried load
+    climb_distance: float  # longest one above the limit [m]
+    climb_begin: float  # where it begins [m]
+    rise: float  # of the wheel on it [m]
+    lifted: bool  # whether it was without load, where Y/Q has no value
 
 
 @dataclass(frozen=True)

@@ -61,11 +61,8 @@ def all_verdicts(
     for name in VERDICTS:
         exceeded = [why for report in reports for why in _exceeded(report, name)]
         rows = [(r.title, row) for r in reports for row in r.rows if row.criterion.group == name]
-        few = [
-            f"{title}: {row.criterion.words}, {row.place}"
-            for title, row in rows
-            if math.isnan(row.share)
-        ]
+        empty = [(title, row) for title, row in rows if math.isnan(row.share)]
+        few = [f"{title}: {row.criterion.words}, {row.place}" for title, row in empty]
         unknown = [f"{where}: too few values for an estimate" for where in few]
         incomplete = [*stopped, *unknown, *missing]
         if derailed and name == SAFETY:

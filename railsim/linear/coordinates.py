@@ -25,15 +25,8 @@ from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
 
-TRACK_PARTS = (
-    "rail.left.y",
-    "rail.left.z",
-    "rail.right.y",
-    "rail.right.z",
-    "sleeper.y",
-    "sleeper.z",
-    "sleeper.roll",
-)
+OF_RAILS = ("rail.left.y", "rail.left.z", "rail.right.y", "rail.right.z")
+TRACK_PARTS = (*OF_RAILS, "sleeper.y", "sleeper.z", "sleeper.roll")
 STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
 
 
@@ -130,14 +123,9 @@ def track_indices(model: Model) -> tuple[list[int], list[str]]:
         return [], []
     first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(model.index.wheelsets)
     moving = DOF if support.sleeper else RAIL_DOF
-    indices = [
-        first + SUPPORT_SIZE * w + k
-        for w in range(len(model.index.wheelsets))
-        for k in range(moving)
-    ]
-    return indices, [
-        f"{wheelset}.{part}" for wheelset in model.index.wheelsets for part in TRACK_PARTS[:moving]
-    ]
+    wheelsets, parts = model.index.wheelsets, TRACK_PARTS[:moving]
+    indices = [first + SUPPORT_SIZE * w + k for w in range(len(wheelsets)) for k in range(moving)]
+    return indices, [f"{wheelset}.{part}" for wheelset in wheelsets for part in parts]
 
 
 def _internal_names(model: Model) -> list[str]:

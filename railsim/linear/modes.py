@@ -31,18 +31,13 @@ DAMPING = Column("damping_ratio", "damping", "%", ".2f")
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of a vehicle.
+    """One mode of a vehicle; with an empty name and NaN where a root locus has no such mode."""
 
-    `name`: after the field, see `railsim.linear.naming`; empty, and NaN values, where a root locus
-    has no such mode; `eigenvalue`: lambda [1/s]; `participation`: share of the kinetic energy by
-    ``body.component``, largest first; `shape`: displacements by ``body.component``, the largest 1
-    [m, rad].
-    """
-
-    name: str
-    eigenvalue: complex
+    name: str  # after the field, see `railsim.linear.naming`
+    eigenvalue: complex  # lambda [1/s]
+    # share of the kinetic energy by ``body.component``, largest first
     participation: dict[str, float]
-    shape: dict[str, complex]
+    shape: dict[str, complex]  # displacements by ``body.component``, the largest 1 [m, rad]
 
     @property
     def frequency(self) -> float:
@@ -72,11 +67,9 @@ class Mode:
 
     def record(self) -> dict[str, Any]:
         """Return the mode as plain data."""
+        names = ("name", "frequency", "natural_frequency", "damping_ratio")
         return {
-            "name": self.name,
-            "frequency": self.frequency,
-            "natural_frequency": self.natural_frequency,
-            "damping_ratio": self.damping_ratio,
+            **{name: getattr(self, name) for name in names},
             "eigenvalue": [self.eigenvalue.real, self.eigenvalue.imag],
             "participation": self.participation,
             "shape": {name: [value.real, value.imag] for name, value in self.shape.items()},
@@ -170,14 +163,11 @@ class Modes(Plottable):
 
 @dataclass(frozen=True, repr=False)
 class RootLocus(Plottable):
-    """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
+    """Oscillations of a vehicle over a parameter, each at the same index throughout."""
 
-    `key`: ``speed`` or the key of the parameter; `values`: its values; `sets`: one for each value.
-    """
-
-    key: str
-    values: tuple[float, ...]
-    sets: tuple[Modes, ...]
+    key: str  # ``speed`` or the key of the parameter
+    values: tuple[float, ...]  # of it
+    sets: tuple[Modes, ...]  # one for each value
 
     @property
     def eigenvalues(self) -> Complexes:
@@ -369,10 +359,8 @@ def parameter_locus(
     (speed,) = checked_speeds([speed])
     of = cache(prepared)
     sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
-    named = [
-        _named(of(value), found, speed, (key, value))
-        for found, value in zip(sets, values, strict=True)
-    ]
+    each = zip(sets, values, strict=True)
+    named = [_named(of(value), found, speed, (key, value)) for found, value in each]
     return RootLocus(key, tuple(values), tuple(named))
 
 
@@ -400,10 +388,8 @@ def _named(
     parameter: tuple[str, float] | None = None,
 ) -> Modes:
     c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
-    names = [
-        "" if np.isnan(value) else mode_name(parts, found, k)
-        for k, value in enumerate(found.eigenvalues)
-    ]
+    there = ~np.isnan(found.eigenvalues)
+    names = [mode_name(parts, found, k) if one else "" for k, one in enumerate(there)]
     listed = []
     for name, value, shape in zip(numbered(names), found.eigenvalues, found.shapes, strict=True):
         if np.isnan(value):

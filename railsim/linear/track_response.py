@@ -21,6 +21,7 @@ of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belon
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.linalg import schur
@@ -33,6 +34,7 @@ from railsim.linear.circle import POSITION
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.system import jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
+from railsim.notation import SIDES
 from railsim.result.sensors import Sensor
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
@@ -166,12 +168,8 @@ def track_response(
 
 def _of_wheelsets(count: int) -> list[str]:
     """Names of the outputs Q, Y, sum of Y and lateral displacement."""
-    names = [
-        f"{force}.{w + 1}.{side}"
-        for force in FORCES
-        for w in range(count)
-        for side in ("left", "right")
-    ]
+    wheels = product(FORCES, range(1, count + 1), SIDES)
+    names = [f"{force}.{number}.{side}" for force, number, side in wheels]
     return names + [f"{name}.{w + 1}" for name in ("sum_Y", "lateral") for w in range(count)]
 
 

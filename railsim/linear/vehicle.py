@@ -227,16 +227,12 @@ class LinearVehicle:
 
 def _check_hold(model: Model, hold: Sequence[str]) -> None:
     """Refuse to hold parts that are not bodies, or all bodies."""
-    rigid = [
-        name
-        for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)
-        if kind in (RIGID, FIXED)
-    ]
+    kinds = zip(model.index.bodies, model.system.bodies.kind, strict=True)
+    rigid = [name for name, kind in kinds if kind in (RIGID, FIXED)]
     wrong = [name for name in hold if name not in rigid]
     if wrong:
-        raise argument_error(
-            "hold", "no such body; `held` holds the wheelsets", ", ".join(rigid), key=wrong[0]
-        )
+        found = "no such body; `held` holds the wheelsets"
+        raise argument_error("hold", found, ", ".join(rigid), key=wrong[0])
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

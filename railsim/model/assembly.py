@@ -345,6 +345,13 @@ def _contact(
         return used[name]
 
     wheelsets = flat.of_kind("wheelset")
+    alike: dict[str, Any] = {
+        "gauge": track.gauge,
+        "inclination": track.inclination,
+        "G": settings.shear_modulus,
+        "nu": settings.poisson,
+        "normal": settings.normal_contact,
+    }
     keys: dict[tuple[Any, ...], int] = {}
     tables: list[ContactTable] = []
     which = np.zeros((len(wheelsets), 2), dtype=np.int64)
@@ -352,30 +359,16 @@ def _contact(
         wheelset = body.wheelset
         assert wheelset is not None
         for side in range(2):
-            key = (
-                wheelset.profile[side],
-                track.rail[side],
-                wheelset.radius[side],
-                -body.position[2],
-                wheelset.back_to_back,
-                wheelset.tape_circle_distance,
-            )
-            wheel = profile(wheelset.profile[side], "wheel")
-            rail = profile(track.rail[side], "rail")
-            table = shared.contact_table(
-                key,
-                wheel,
-                rail,
-                radius=wheelset.radius[side],
-                gauge=track.gauge,
-                inclination=track.inclination,
-                back_to_back=wheelset.back_to_back,
-                tape_circle_distance=wheelset.tape_circle_distance,
-                G=settings.shear_modulus,
-                nu=settings.poisson,
-                centre_height=-body.position[2],
-                normal=settings.normal_contact,
-            )
+            own = {
+                "radius": wheelset.radius[side],
+                "centre_height": -body.position[2],
+                "back_to_back": wheelset.back_to_back,
+                "tape_circle_distance": wheelset.tape_circle_distance,
+            }
+            of_wheel, of_rail = wheelset.profile[side], track.rail[side]
+            wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")
+            key = (of_wheel, of_rail, *own.values())
+            table = shared.contact_table(key, wheel, rail, **own, **alike)
             if key not in keys:
                 keys[key] = len(tables)
                 tables.append(table)

@@ -265,12 +265,10 @@ def _check(
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
-        faults.require(
-            math.isfinite(value) and all(low <= v <= high for v in speeds),
-            "cant_deficiency",
-            f"found {value:g} m with a cant of {cant:g} m",
-            f"a sum that gives speeds of {low:g} to {high:g} m/s",
-        )
+        fine = math.isfinite(value) and all(low <= v <= high for v in speeds)
+        found = f"found {value:g} m with a cant of {cant:g} m"
+        allowed = f"a sum that gives speeds of {low:g} to {high:g} m/s"
+        faults.require(fine, "cant_deficiency", found, allowed)
     for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
         faults.require(len(values), name, "no value", "one at least")
     faults.check()

@@ -108,12 +108,9 @@ class VehicleMotion:
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
         if number not in self._steps:
             states = [self.prepared.steady(SPEED_CLASS**end) for end in (number, number + 1)]
-            self._steps[number] = min(
-                Stability(self.model, self.system, state, self._scheme, lambda _: ()).choose(
-                    1.0 / OUTPUT_RATE
-                )
-                for state in states
-            )
+            of = self.model, self.system
+            judged = (Stability(*of, state, self._scheme, lambda _: ()) for state in states)
+            self._steps[number] = min(one.choose(1.0 / OUTPUT_RATE) for one in judged)
         return self._steps[number]
 
     def rest(self, speed: float, amplitude: float) -> Floats:
@@ -132,11 +129,8 @@ class VehicleMotion:
             v0, v1 = (begin + (end - begin) * t / duration for t in (done, done + length))
             parts.append(self._part(parts[-1].state if parts else state, v0, v1, length, done))
             done += length
-        time, lateral, sum_Y = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("time", "lateral", "sum_Y")
-        )
-        return Stretch(parts[-1].state, time, lateral, sum_Y)
+        columns = ([getattr(part, name) for part in parts] for name in ("time", "lateral", "sum_Y"))
+        return Stretch(parts[-1].state, *map(np.concatenate, columns))
 
     def _part(
         self, before: Floats, begin: float, end: float, duration: float, offset: float

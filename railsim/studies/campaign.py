@@ -48,16 +48,12 @@ LATERAL, VERTICAL = ("lateral", "gauge"), ("vertical", "cross_level")
 
 @dataclass(frozen=True)
 class Campaign:
-    """Results of a campaign in its folder.
-
-    `assessments`: one for each vehicle; `results`: results by the names of their runs; `computed`:
-    number of runs that were computed by this call; the others existed.
-    """
+    """Results of a campaign in its folder."""
 
     folder: Path
-    assessments: tuple[Assessment, ...]
-    results: dict[str, Result]
-    computed: int
+    assessments: tuple[Assessment, ...]  # one for each vehicle
+    results: dict[str, Result]  # by the names of their runs
+    computed: int  # number of runs that were computed by this call; the others existed
 
 
 def campaign(
@@ -239,12 +235,10 @@ def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
         return track
     as_drawn = _speed_in_curve(speed, service)
     factor = (speed.admissible * service.admissible_speed / as_drawn) ** 2
-    plan = [
-        element.model_copy(update={"radius": factor * element.radius})
-        if isinstance(element, Circle)
-        else element
-        for element in track.plan
-    ]
+    plan = list(track.plan)
+    for k, element in enumerate(plan):
+        if isinstance(element, Circle):
+            plan[k] = element.model_copy(update={"radius": factor * element.radius})
     return track.model_copy(update={"plan": tuple(plan)})
 
 

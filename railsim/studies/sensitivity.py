@@ -73,14 +73,8 @@ def sensitivities(
         first[varied] = np.reshape(indices.first_order, (len(varied), count))
         total[varied] = np.reshape(indices.total_order, (len(varied), count))
     errors = model.errors()
-    return [
-        Sensitivity(
-            quantity,
-            named(low[:, k]),
-            named(high[:, k]),
-            named(first[k]),
-            named(total[k]),
-            float(errors[k]),
-        )
-        for k, quantity in enumerate(quantities)
-    ]
+    found = []
+    for k, quantity in enumerate(quantities):
+        tornado, sobol = (named(low[:, k]), named(high[:, k])), (named(first[k]), named(total[k]))
+        found.append(Sensitivity(quantity, *tornado, *sobol, float(errors[k])))
+    return found

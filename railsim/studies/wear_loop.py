@@ -62,18 +62,16 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class WearStep:
-    """One step of the wear loop.
+    """One step of the wear loop; of rails distances are tonnages [kg].
 
-    `distance`, `length`: distance run before the step, and in the step [m]; of rails the tonnage
-    [kg]; `profiles`, `worn_profiles`: by side of the rail, or ``wheel``: in this step, and after
-    it; `depths`: depth of wear per distance or tonnage, mean of all wheels, tracks or vehicles and
-    over the step, on `wear_depth.grid` [m/m] or [m/kg].
+    `depths`: of wear per distance or tonnage, mean of all wheels, tracks or vehicles and over the
+    step, on `wear_depth.grid` [m/m] or [m/kg].
     """
 
-    distance: float
-    length: float
-    profiles: Mapping[str, Profile]
-    worn_profiles: Mapping[str, Profile]
+    distance: float  # before the step [m]
+    length: float  # in the step [m]
+    profiles: Mapping[str, Profile]  # by side of the rail, or ``wheel``
+    worn_profiles: Mapping[str, Profile]  # after the step
     depths: Mapping[str, Floats]
 
     @property
