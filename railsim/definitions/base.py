@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, Literal, NoReturn, Self
+from typing import Annotated, Any, Literal, NoReturn, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -78,7 +78,7 @@ def both_sides(share: float = 1.0) -> BeforeValidator:
 
 
 NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 2}
-SIDED_ROWS = WithJsonSchema({"type": "array", "minItems": 1, "items": {**NUMBERS, "maxItems": 3}})
+
 
 PositivePair = Annotated[
     tuple[Positive, Positive],
@@ -209,3 +209,14 @@ def rises(what: str) -> AfterValidator:
 def rising(rows: Sequence[Sequence[float]]) -> bool:
     """Whether the first column increases strictly."""
     return all(after[0] > before[0] for before, after in pairwise(rows))
+
+
+T = TypeVar("T")
+SidedRows = Annotated[
+    tuple[tuple[Finite, T, T], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(),
+    WithJsonSchema({"type": "array", "minItems": 1, "items": {**NUMBERS, "maxItems": 3}}),
+]
+"""Rows [s, value] or [s, left, right] [m]"""

@@ -194,6 +194,7 @@ class Identified:
 
     def record(self) -> dict[str, Any]:
         """Return everything but the series as plain values."""
+        arrays = ("covariance", "correlation", "singular_values", "combinations")
         return {
             "vehicle": self.vehicle.name,
             "parameters": [
@@ -210,10 +211,7 @@ class Identified:
                 )
             ],
             "values": dict(self._values),
-            "covariance": self.covariance.tolist(),
-            "correlation": self.correlation.tolist(),
-            "singular_values": self.singular_values.tolist(),
-            "combinations": self.combinations.tolist(),
+            **{name: getattr(self, name).tolist() for name in arrays},
             "unidentified": list(self.unidentified),
             "channels": [
                 {

@@ -49,18 +49,11 @@ def _key(model: Model) -> bytes:
     """Hash of all that the preloads of a model follow from."""
     system, index = model.system, model.index
     bodies, links, mounts = system.bodies, system.links, system.mounts
-    facts = [
-        (
-            element.name,
-            element.body1,
-            element.body2,
-            element.definition.given_preload,
-            element.definition.vertical_stiffness,
-            element.definition.has_free_length,
-            element.definition.has_levelling,
-        )
-        for element in model.flat.elements
-    ]
+    facts = []
+    for e in model.flat.elements:
+        law = e.definition
+        preload = law.given_preload, law.vertical_stiffness, law.has_free_length
+        facts.append((e.name, e.body1, e.body2, *preload, law.has_levelling))
     names = index.bodies, index.links, index.mounts
     digest = hashlib.sha256(repr((names, facts, system.gravity)).encode())
     for array in (*bodies, system.frame_offset, links.body, links.row, mounts.body, mounts.row):

@@ -33,15 +33,12 @@ def _quantity(value: Any) -> float | str:
     return float(value)
 
 
-Quantity = Annotated[
-    float | str,
-    PlainValidator(_quantity),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
-]
+_NUMBER_OR_TEXT = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
+Quantity = Annotated[float | str, PlainValidator(_quantity), _NUMBER_OR_TEXT]
 QuantityOrAuto = Annotated[
     float | str,
     PlainValidator(lambda value: AUTO if value == AUTO else _quantity(value)),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
+    _NUMBER_OR_TEXT,
 ]
 
 

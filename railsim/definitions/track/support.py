@@ -20,31 +20,12 @@ slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema
+from pydantic import WithJsonSchema
 
-from railsim.definitions.base import (
-    NUMBERS,
-    SIDED_ROWS,
-    Definition,
-    Finite,
-    NonNegative,
-    Positive,
-    both_sides,
-    check,
-    rises,
-)
+from railsim.definitions.base import NUMBERS, Definition, NonNegative, Positive, SidedRows, check
 
 SpringDamper = Annotated[tuple[Positive, NonNegative], WithJsonSchema({**NUMBERS, "maxItems": 2})]
 Preset = Literal["rigid", "ballasted", "co-running", "p2", "slab"]
-
-
-FactorRows = Annotated[
-    tuple[tuple[Finite, Positive, Positive], ...],
-    Field(min_length=1),
-    rises("arc length"),
-    both_sides(),
-    SIDED_ROWS,
-]
 
 
 @dataclass(frozen=True)
@@ -128,7 +109,7 @@ class Support(Definition):
     """Lateral [stiffness N/m, damping N s/m] of the whole sleeper"""
     ballast_base: Positive | None = None
     """Lateral distance of the ballast's vertical springs from the track's middle [m]"""
-    variation: FactorRows | None = None
+    variation: SidedRows[Positive] | None = None
     """Rows [s, factor] or [s, pads, ballast]: factors of stiffness and damping along the track,
     linear in between, constant beyond [m, 1]"""
 
