@@ -28,13 +28,9 @@ EVENT_WINDOW = 2.0  # s
 ALL = slice(None)
 
 
-def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
-    """Root mean squares of consecutive complete blocks.
-
-    `a` (float64[time, ...]): Weighted acceleration [m/s2]. `rate`: Samples per second [1/s].
-    `length`: Length of a block [s]. Returns float64[block, ...].
-    """
-    size = round(length * rate)
+def block_rms(a: Floats, rate: float) -> Floats:
+    """Root mean squares of consecutive complete blocks of 5 s, float64[block, ...]."""
+    size = round(BLOCK * rate)
     whole = len(a) // size
     parts = a[: whole * size].reshape(whole, size, *a.shape[1:])
     return np.asarray(np.sqrt(np.mean(parts**2, axis=1)))
@@ -80,11 +76,7 @@ def _along_axes(a: Floats, rate: float, vertical: Weighting) -> Floats:
 
 
 def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
-    """Indices from the root mean squares of blocks, see `en12299_mean_comfort`.
-
-    `rms` (float64[block, 3]): On the floor, weighted [m/s2]. `back` (float64[block]): Along x with
-    Wc [m/s2].
-    """
+    """Indices from weighted rms of blocks, on the floor [block, 3] and along x with Wc [m/s2]."""
     if not len(rms):
         return MeanComfort(math.nan, math.nan, math.nan, rms, 0)
     x95, y95, z95 = np.percentile(rms, 95.0, axis=0)

@@ -159,10 +159,7 @@ def instability(signals: Signals, section: TestSection) -> Values:
 
 
 def steering(signals: Signals, section: TestSection) -> Values:
-    """Steering index of the leading wheelset in a curve, see `steering_index`.
-
-    With the widening of the gauge in the middle of the section.
-    """
+    """Steering index of the leading wheelset, with the gauge in the middle of a curve's section."""
     if not section.turn:
         return {}
     rows = np.array(signals.record.result.track().gauge_widening or [[0.0, 0.0, 0.0]])

@@ -101,10 +101,7 @@ class Record:
 
     @cached_property
     def geometry(self) -> ContactGeometry | None:
-        """Contact functions of the leading wheelset on rigid rails.
-
-        None where the profiles are not kept or do not fit.
-        """
+        """Contact functions of the leading wheelset, rigid rails; None: profiles do not fit."""
         return self.geometry_with(0.0)
 
     def geometry_with(self, widening: float) -> ContactGeometry | None:

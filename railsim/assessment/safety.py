@@ -85,22 +85,14 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float | Floats, height: F
 
 
 def overturning(Q: Floats) -> Floats:
-    """Overturning coefficient of a bogie, (sum Q_left - sum Q_right)/(sum Q) [1].
-
-    `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
-    """
+    """Overturning coefficient of a bogie, (sum Q_left - sum Q_right)/(sum Q) [1]."""
     left, right = np.sum(Q[..., 0], axis=-1), np.sum(Q[..., 1], axis=-1)
     with np.errstate(invalid="ignore"):  # without load, 0/0: nan
         return np.asarray((left - right) / (left + right))
 
 
 def largest_overturning(Q: Floats) -> float:
-    """Largest magnitude of the overturning coefficient of a bogie [1].
-
-    Instants at which the whole bogie is without load have no coefficient and do not count.
-
-    `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
-    """
+    """Largest magnitude of the coefficient over all instants at which the bogie is loaded [1]."""
     return float(np.fmax.reduce(np.abs(overturning(Q))))
 
 
@@ -123,12 +115,10 @@ class WheelSafety:
 
 @dataclass(frozen=True)
 class SafetyReport:
-    """Derailment and overturning of a run.
-
-    `overturning`: Largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1].
-    """
+    """Derailment and overturning of a run."""
 
     wheels: tuple[WheelSafety, ...]
+    # largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1]
     overturning: dict[str, float]
 
     def record(self) -> dict[str, Any]:
@@ -137,10 +127,7 @@ class SafetyReport:
 
 
 def safety_report(record: Record) -> SafetyReport:
-    """Nadal, climb distance and overturning over a run.
-
-    `record`: Run with Q, Y_over_Q, wheelset_distance and body_position.
-    """
+    """Nadal, climb distance and overturning of a run with Q, Y_over_Q and positions."""
     needed = ["Q", "Y_over_Q", "wheelset_distance"]
     record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
     result = record.result
@@ -164,10 +151,7 @@ def safety_report(record: Record) -> SafetyReport:
 
 
 def _height(record: Record, w: int, side: int) -> np.ndarray:
-    """Height of a wheel above its rail, from position and roll of the wheelset [m].
-
-    Above the rail as it lies, irregular but not deflected; nan where the result has no positions.
-    """
+    """Height of a wheel above its irregular, not deflected rail [m]; nan without positions."""
     result, track = record.result, record.result.track()
     if "body_position" not in result:
         return np.full(len(record.time), np.nan)

@@ -137,10 +137,7 @@ def _joined(sections: Sequence[Section]) -> list[Section]:
 
 
 def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
-    """Zone of a radius; empty where there is none.
-
-    Very large radii with small cant deficiency belong to zone 1.
-    """
+    """Zone of a radius, if any; very large ones of small cant deficiency belong to zone 1."""
     straight = next((n for n, z in limits.zones.items() if z.radius is None), "")
     if math.isinf(radius):
         return straight

@@ -130,9 +130,6 @@ def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | No
 
 
 def extreme(x: Floats, method: str) -> Estimate:
-    """Largest or smallest value, with mean and deviation beside it; no estimate.
-
-    `x` (float64[section]). `method` ({'largest', 'smallest'}).
-    """
+    """Largest or smallest value, with mean and deviation beside it; no estimate."""
     value = float(np.max(x) if method == "largest" else np.min(x))
     return replace(one_dimensional(x, 0.0), value=value, method=method)

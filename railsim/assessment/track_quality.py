@@ -26,10 +26,7 @@ QN = (
 
 
 class TrackQuality:
-    """Standard deviations over any part of a track.
-
-    `begin`, `end`: Part of the track that is evaluated [m].
-    """
+    """Standard deviations over any part of a track between `begin` and `end` [m]."""
 
     def __init__(self, track: Track, begin: float, end: float) -> None:
         short, long = D1

@@ -50,10 +50,7 @@ def overall(verdicts: Mapping[str, Verdict], deciding: Sequence[str]) -> str:
 def all_verdicts(
     runs: Mapping[str, Result], reports: Sequence[ZoneReport], conditions: Sequence[Condition]
 ) -> dict[str, Verdict]:
-    """Return the verdicts by criterion.
-
-    `runs`: All runs of the vehicle, also those that did not reach their end.
-    """
+    """Return the verdicts by criterion, on all runs, also those that did not reach their end."""
     derailed = [_ended(n, r) for n, r in runs.items() if r.status == "derailed"]
     stopped = [f"{_ended(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
     missing = [condition.sentence for condition in conditions if condition.state != MET]

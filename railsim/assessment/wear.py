@@ -168,11 +168,9 @@ class WholeLifeRailModel:
 
     Zero up to `threshold`, linear to 10e-6 at 65 N, linear to 0 at 175 N and, on the same line,
     negative above: there wear is faster than crack growth.
-
-    `threshold`: Wear number below which there is no damage [N]: 15 (from memory), 20 in later use.
     """
 
-    threshold: float = 15.0
+    threshold: float = 15.0  # wear number [N]; from memory, 20 in later use
     peak: float = 65.0
     balance: float = 175.0
     damage: float = 10e-6

@@ -64,10 +64,7 @@ class Weighting:
         return np.asarray(np.abs(self.response(f)), dtype=np.float64)
 
     def weighted(self, a: Floats, rate: float) -> Floats:
-        """Weighted acceleration.
-
-        `a` (float64[time, ...]): Acceleration [m/s2]. `rate`: Samples per second [1/s].
-        """
+        """Weighted accelerations, float64[time, ...], at a rate [1/s]."""
         return filtered(a, rate, self.response, 4.0 / self.f1)
 
 

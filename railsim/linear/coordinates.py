@@ -187,10 +187,7 @@ class FreeVehicle:
         return self.state[self.coordinates.indices].copy()
 
     def tangent(self) -> Floats:
-        """Jacobian of `rate` at the state of steady rolling, float64[n, n].
-
-        Raises ModelError: it is not finite.
-        """
+        """Jacobian of `rate` in steady rolling, float64[n, n]; ModelError: it is not finite."""
         matrix = jacobian(self.rates, self.x, self.coordinates.steps)
         if not np.isfinite(matrix).all():
             raise ModelError("the vehicle cannot be linearised: a derivative is not finite")

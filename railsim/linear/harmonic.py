@@ -30,10 +30,7 @@ STEP = 1e-8  # m and rad
 
 
 class ContactPath:
-    """Wheelsets moved along their contact path by one amplitude.
-
-    `amplitude`: a [m].
-    """
+    """Wheelsets moved along their contact path by one amplitude [m]."""
 
     def __init__(self, amplitude: float) -> None:
         self.amplitude = amplitude

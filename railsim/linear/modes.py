@@ -351,10 +351,9 @@ def _prepared(
 def parameter_locus(
     prepared: Callable[[float], LinearVehicle], key: str, values: Sequence[float], speed: float
 ) -> RootLocus:
-    """Return the modes of a vehicle over any parameter of its files.
+    """Return the modes of a vehicle over any parameter of its files, called `key`, at a speed.
 
-    `prepared`: value of the parameter to the vehicle; `key`: what the parameter is called; `speed`:
-    [m/s].
+    `prepared`: value of the parameter to the vehicle.
     """
     (speed,) = checked_speeds([speed])
     of = cache(prepared)
@@ -365,10 +364,7 @@ def parameter_locus(
 
 
 def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[float]:
-    """Return speeds, which may be texts with units [m/s].
-
-    Raises InputError: one of them is no speed or out of range, or there is none.
-    """
+    """Return speeds, perhaps texts with units [m/s]; raises InputError: out of range, or none."""
     low, high = SPEED_RANGE
     if isinstance(speeds, str | Real):
         raise argument_error(name, f"found {speeds!r}", "several, such as [20.0, 40.0]")

@@ -43,8 +43,7 @@ class NotConverged(ModelError):
 class SteadyRolling:
     """Newton's method for one vehicle on one track of constant curvature and cant.
 
-    `model`: with preloads; `system`: the model on that track; `held`: whether the wheelsets stay
-    where the guess has them.
+    `held`: whether the wheelsets stay where the guess has them.
     """
 
     def __init__(self, model: Model, system: System, *, held: bool = False) -> None:

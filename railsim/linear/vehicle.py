@@ -182,10 +182,7 @@ class LinearVehicle:
         return f"{shape}, rails {where['rails']}, friction {where['friction']}"
 
     def steady(self, speed: float) -> Floats:
-        """Return the state of steady rolling at a speed [m/s].
-
-        Raises ModelError: there is none.
-        """
+        """Return the state of steady rolling at a speed [m/s]; raises ModelError: there is none."""
         solver = SteadyRolling(self.model, self.system, held=self.held)
         if speed not in self._known and self._known:
             near = min(self._known, key=lambda v: abs(v - speed))

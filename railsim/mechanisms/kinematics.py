@@ -193,10 +193,7 @@ def driver_words(model: Model, value: float) -> str:
 
 
 def check_freedom(model: Model) -> None:
-    """Refuse joints that hold the same freedom twice at the start.
-
-    Raises InputError: the joints concerned, and the degrees of freedom that are left.
-    """
+    """Refuse, by InputError, joints that hold the same freedom twice at the start."""
     arcs = model.linkage.joint[:, 4].copy()
     lost: InputError | None = None
     try:

@@ -219,10 +219,7 @@ def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> Non
 
 
 def support_arrays(definition: SupportDefinition, rail_base: float) -> Support:
-    """Arrays of the moving track model; the track's elastic parts as they follow from the file.
-
-    `rail_base`: distance of the rails, under which the pads stand on the sleeper [m].
-    """
+    """Arrays of the moving track model; `rail_base`: distance of the rails on the sleeper [m]."""
     values = definition.values
     variation = np.array(definition.variation or (), dtype=float).reshape(-1, 3)
     if values is None:
@@ -299,11 +296,7 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
 
 
 class SharedTables:
-    """Tables of the track and of the contacts that several models on one track share.
-
-    `track`: once the first model is there; `contact`: contact tables by what they depend on beside
-    track and settings.
-    """
+    """Tables of a track, once it is known, and of contacts by what they depend on beside it."""
 
     def __init__(self) -> None:
         self.track: TrackTables | None = None

@@ -121,12 +121,9 @@ class LawBlocks:
 
 @dataclass
 class ElementArrays:
-    """Collects elements row by row until the arrays are made.
+    """Collects elements row by row until the arrays are made."""
 
-    `bodies`: all bodies by name, in the order of their indices.
-    """
-
-    bodies: Mapping[str, FlatBody]
+    bodies: Mapping[str, FlatBody]  # all, by name, in the order of their indices
     link_rows: list[dict[str, Any]] = field(default_factory=list)
     mount_rows: list[dict[str, Any]] = field(default_factory=list)
     load_rows: list[dict[str, Any]] = field(default_factory=list)

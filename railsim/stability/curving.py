@@ -282,10 +282,7 @@ Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
 
 
 class _Search:
-    """Steady states of one vehicle, each sought from the nearest known one.
-
-    `shares` (float64[side]): Friction of the left and right rail over that of the point.
-    """
+    """Steady states from the nearest known one; `shares`: friction of the rails over the given."""
 
     def __init__(
         self,

@@ -198,10 +198,7 @@ class Shooting:
         raise ModelError("the search for a periodic motion does not converge")
 
     def fold(self, before: PeriodicMotion, after: PeriodicMotion, length: float) -> PeriodicMotion:
-        """Return the motion where the branch turns back in speed between two of its motions.
-
-        `length`: arc length from `before` to `after`, or somewhat more.
-        """
+        """Return the motion where the branch turns back between two, some `length` of arc apart."""
         found = {}
 
         def forward(share: float) -> float:

@@ -104,10 +104,7 @@ def campaign(
 def scenario_cases(
     scenario: Scenario, vehicles: Sequence[str | Path], assignments: Sequence[str] = ()
 ) -> list[Case]:
-    """Return all runs of a scenario: vehicles, then parts, then the grid.
-
-    Raises InputError: all faults of all runs.
-    """
+    """Return all runs: vehicles, then parts, then the grid; raises InputError: all their faults."""
     faults = Faults()
     cases: list[Case] = []
     conditions = _conditions(scenario)

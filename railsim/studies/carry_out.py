@@ -47,10 +47,7 @@ Load = Callable[[Sequence[Point]], list[Case]]
 
 
 def carry_out_cases(cases: Sequence[Case], spec: StudySpec, folder: Path, **how: Any) -> Outcome:
-    """Compute the missing runs of cases that are loaded, the longest first.
-
-    `how`: fields of `Execution`. Raises InputError: as `carry_out`; equal names.
-    """
+    """Compute the missing runs of loaded cases, the longest first; `how`: fields of `Execution`."""
     points = [
         Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
         for c in cases

@@ -157,10 +157,7 @@ class Loader:
 
 
 def load_case(run: RunSpec) -> Case:
-    """Load the inputs of one run.
-
-    Raises InputError: everything that is wrong in any of them.
-    """
+    """Load the inputs of one run; raises InputError: everything that is wrong in any of them."""
     loader = Loader()
     loader.overrides(run.assignments)  # its faults come first
     run = replace(run, speed=loader.first_speed(run))

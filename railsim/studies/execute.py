@@ -206,10 +206,7 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
 
 
 class _Pool:
-    """One pool of processes, until all batches are done or a process dies.
-
-    `lost`: batches that were running in a process that died.
-    """
+    """One pool of processes, until all batches are done or one dies, whose batches are `lost`."""
 
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
         context: Any = worker_context()
@@ -284,10 +281,7 @@ def _shares(batches: Sequence[Batch]) -> list[float]:
 
 
 def cluster(address: str) -> Any:
-    """Return a client of the dask scheduler at an address.
-
-    Raises InputError: dask is not installed, or no scheduler answers.
-    """
+    """Return a client of a dask scheduler; raises InputError: no dask, or none that answers."""
     try:
         from distributed import Client
     except ImportError:
@@ -360,10 +354,7 @@ def _marks(folders: set[Path]) -> Iterator[str]:
 
 
 def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, bytes]]:
-    """Carry out the jobs of a batch on a machine that may lack access to the folder of the study.
-
-    Returns: `records`; `files`: files written by the jobs, if the folder is not accessible.
-    """
+    """Carry out a batch, perhaps without access to the folder; then the files it wrote come too."""
     if all((job.path.parent / mark).is_file() for job in batch):
         return perform(batch), {}
     with tempfile.TemporaryDirectory(prefix="railsim-") as folder:

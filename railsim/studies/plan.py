@@ -214,10 +214,7 @@ def check_number(number: int, cores: int, seconds: Callable[[], float]) -> None:
 
 
 def check_names(points: Sequence[Point]) -> None:
-    """Refuse names of runs that are equal, or too long for a file.
-
-    Raises InputError: all of them.
-    """
+    """Refuse, by InputError, names of runs that are equal, or too long for a file."""
     counts = Counter(point.name for point in points)
     faults = Faults(
         Fault("study", name, f"{count} runs of this name", "give files with different names")

@@ -50,10 +50,7 @@ SPEEDS = "such as 20 or 72km/h"
 
 
 def speed_of(text: str) -> float:
-    """Return the speed of a text, which may have a unit [m/s].
-
-    Raises InputError: the text is not a number.
-    """
+    """Return the speed of a text, perhaps with a unit [m/s]; raises InputError: it is no number."""
     found = speed_in_si(text)
     if isinstance(found, str):
         raise argument_error("speeds", f"'{text}' is not a speed", SPEEDS)

@@ -136,10 +136,7 @@ def _at_bounds(points: Floats, rng: np.random.Generator) -> Floats:
 
 
 class _Gain:
-    """Dominated volume that candidates would add, estimated with random points.
-
-    `front`: known feasible designs; `predicted`: predicted objectives.
-    """
+    """Dominated volume that candidates would add to a front, estimated with random points."""
 
     def __init__(self, front: Floats, predicted: Floats, rng: np.random.Generator) -> None:
         from scipy.stats import qmc

@@ -184,10 +184,7 @@ def kept_quantities(keep: str) -> tuple[str, ...]:
 
 
 def checked(model: type[M], data: Any, file: str) -> M:
-    """Return data as a model.
-
-    Raises InputError: all faults of the data.
-    """
+    """Return data as a model; raises InputError: all faults of the data."""
     try:
         return model.model_validate(data)
     except ValidationError as error:

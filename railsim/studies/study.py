@@ -180,11 +180,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
 
 
 def _draw(outcome: Outcome) -> None:
-    """Draw the runs whose picture is missing or out of date, and comparisons of the vehicles.
-
-    Runs that differ only in the vehicle are drawn into one picture,
-    ``compare_TRACK_SPEED.png``.
-    """
+    """Draw runs whose picture is missing or old, and those of several vehicles into one."""
     from railsim.plot.histories import histories
     from railsim.plot.overlay import overlay
     from railsim.plot.style import save
@@ -207,10 +203,7 @@ def _draw(outcome: Outcome) -> None:
 
 
 def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
-    """Return the study in a folder, and the folder of its relative file names.
-
-    Raises InputError: there is no study, or its inputs cannot be read.
-    """
+    """Return the study in a folder, and the folder of its relative names; raises InputError."""
     data: Any = None
     if is_file(folder / JOURNAL):
         with Journal(folder) as journal:

@@ -48,10 +48,7 @@ def waiting_record(case: Case) -> Record:
 
 
 def finished_record(case: Case, result: Result, function: str | None = None) -> Record:
-    """Return the record of a run with a result, with user-defined quantities and analyses.
-
-    Raises RailsimError: one of these fails.
-    """
+    """Return the record of a run with its own quantities and analyses; RailsimError: one fails."""
     numbers, said = analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
     facts["remarks"] = [*facts["remarks"], *said]
@@ -114,10 +111,7 @@ class Index(BaseModel):
 
 
 def read_index(path: Path) -> Index:
-    """Return the content of a ``study.json``.
-
-    Raises InputError: the file cannot be read, or is not the index of a study.
-    """
+    """Return the content of a ``study.json``; raises InputError: it cannot be read, or is none."""
     text = read_text(path, INDEX_BYTES)
     # each takes some hundred bytes of memory when it is read
     if max(text.count(","), 5 * text.count("{"), 5 * text.count("[")) > MOST_VALUES:
@@ -135,10 +129,7 @@ def read_index(path: Path) -> Index:
 
 
 def refuse_too_many(inputs: Any, file: str) -> None:
-    """Refuse stored inputs with more values than a study can have: each may become a fault.
-
-    Raises InputError: there are more.
-    """
+    """Refuse, by InputError, stored inputs with more values than a study can have: each a fault."""
     nodes, number = [inputs], 0
     while nodes and number <= MOST_INPUTS:
         node = nodes.pop()
@@ -150,10 +141,7 @@ def refuse_too_many(inputs: Any, file: str) -> None:
 
 
 def check_index(path: Path) -> Index:
-    """Return the content of a ``study.json``; every finished run must have its result.
-
-    Raises InputError: as `read_index`, or results are missing.
-    """
+    """Return the index of a study; raises InputError, also where the result of a run is missing."""
     index = read_index(path)
     allowed = "the same study with `resume` computes it again"
     faults = Faults()

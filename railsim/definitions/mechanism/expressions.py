@@ -64,10 +64,7 @@ class Expression(str):
     names: frozenset[str]
 
     def __new__(cls, text: str) -> "Expression":
-        """Parse a text.
-
-        Raises ValueError: it is no arithmetic.
-        """
+        """Parse a text; raises ValueError: it is no arithmetic."""
         made = super().__new__(cls, text)
         made.tree = _parsed(text)
         made.code = _compiled(made.tree)
