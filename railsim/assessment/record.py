@@ -85,10 +85,7 @@ class Record:
         return InputError([Fault(self.name, key, found, allowed, option=self.name)])
 
     def need(self, names: Sequence[str], output: str) -> None:
-        """Refuse a result that lacks quantities.
-
-        Raises InputError: some of `names` are missing; the message names the `output` to request.
-        """
+        """Refuse a result that lacks some of `names`; InputError names the `output` to request."""
         missing = [name for name in names if name not in self.result]
         if missing:
             words = "is not in the result", f"run it with {output}"

@@ -24,10 +24,7 @@ DENSITY = 7850.0  # density of wheel and rail steel [kg/m3]
 
 @dataclass(frozen=True)
 class Patches:
-    """Contact patches, arrays of one shape or that are broadcast to it.
-
-    Only laws of files need `N`, `friction` and `speed`.
-    """
+    """Contact patches, arrays alike or broadcast; only laws of files need N, friction and speed."""
 
     T_gamma: Floats  # wear number of each patch [N]
     area: Floats  # its area, zero where it carries nothing [m2]

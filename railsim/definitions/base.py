@@ -133,10 +133,7 @@ class Definition(BaseModel):
         return sorted(set(super().__dir__()) - set(dir(BaseModel)))
 
     def __copy__(self) -> Self:
-        """Return a copy without what was worked out from the values: those of the copy may differ.
-
-        `model_copy` changes values of such a copy.
-        """
+        """Return a copy without what was worked out: `model_copy` changes values of such a copy."""
         copied = super().__copy__()
         for name in set(copied.__dict__) - set(type(self).model_fields):
             del copied.__dict__[name]

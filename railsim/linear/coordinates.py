@@ -205,10 +205,7 @@ class FreeVehicle:
         return Linearisation(names, matrix, self.x[kept], float(self.state[SPEED]))
 
     def evaluate(self, state: Floats) -> Floats:
-        """Derivative of a whole state as the kernels give it; leaves forces in `work`.
-
-        Raises ModelError: the state lies outside the range of the model.
-        """
+        """Derivative of a whole state, forces left in `work`; ModelError: it is out of range."""
         return np.asarray(self._evaluated(state[None])[0])
 
     def _evaluated(self, states: Floats) -> Floats:

@@ -78,20 +78,15 @@ class Mode:
 
 @dataclass(frozen=True, repr=False)
 class Modes(Plottable):
-    """Modes of a vehicle at one speed.
+    """Modes of a vehicle at one speed."""
 
-    `speed`: [m/s]; `contact`: how the contact was linearised; `modes`: by rising |lambda|, or in
-    the order of the root locus; `remarks`: remarks for the reader; `parameter`: key and value of
-    another parameter than the speed; `vehicle`, `place`: name of the vehicle; the track in words.
-    """
-
-    speed: float
-    contact: Contact
-    modes: tuple[Mode, ...]
+    speed: float  # [m/s]
+    contact: Contact  # how it was linearised
+    modes: tuple[Mode, ...]  # by rising |lambda|, or in the order of the root locus
     remarks: tuple[str, ...] = ()
-    parameter: tuple[str, float] | None = None
-    vehicle: str = ""
-    place: str = ""
+    parameter: tuple[str, float] | None = None  # key and value of another one than the speed
+    vehicle: str = ""  # its name
+    place: str = ""  # the track in words
 
     def __iter__(self) -> Any:
         return iter(self.modes)

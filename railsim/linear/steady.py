@@ -76,10 +76,7 @@ class SteadyRolling:
         return state
 
     def evaluate(self, state: Floats) -> Floats:
-        """Derivative of a state, forces into `work`.
-
-        Raises NotConverged: the state lies outside the range of the model.
-        """
+        """Derivative of a state, forces into `work`; NotConverged: the state is out of range."""
         return np.asarray(self._evaluated(state[None])[0])
 
     def _evaluated(self, states: Floats) -> Floats:

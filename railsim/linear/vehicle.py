@@ -61,16 +61,11 @@ def conditions(track: Track, settings: Settings) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Contact:
-    """How the contact of wheel and rail is linearised.
+    """How the contact of wheel and rail is linearised."""
 
-    `linearisation`: the derivative at the steady state, or the first harmonic for an amplitude;
-    `amplitude`: of the harmonic linearisation [m]; `conicity`: wheels replaced by straight cones of
-    this slope [1].
-    """
-
-    linearisation: str = "tangent"
-    amplitude: float = AMPLITUDE
-    conicity: float | None = None
+    linearisation: str = "tangent"  # ``tangent`` in the steady state, or ``harmonic``
+    amplitude: float = AMPLITUDE  # of the harmonic linearisation [m]
+    conicity: float | None = None  # of straight cones instead of the wheels [1]
 
     def faults(self) -> Faults:
         """Return what is wrong with it."""

@@ -80,10 +80,7 @@ class Motion:
         return length, rate, (dot(d1, d1) + dot(d, d2) - rate * rate) / length
 
     def angle(self, name: str) -> Any:
-        """Angle of the first line less that of the second, plus the offset, from -pi to pi [rad].
-
-        Of shape (..., position), not folded.
-        """
+        """Angle of the first line less that of the second, plus offset, -pi to pi [rad]."""
         angle = self.model.definition.angles[name]
         lines = (self.point(second)[0] - self.point(first)[0] for first, second in angle.between)
         (a, b), (c, d) = (np.moveaxis(line, -1, 0) for line in lines)

@@ -115,10 +115,7 @@ def _at_rest(model: Model) -> AtRest:
 
 
 def stored_equilibrium(model: Model, speed: float, inputs: str) -> Equilibrium:
-    """As `equilibrium`, from the disk where it was found before.
-
-    `inputs`: hash of all that the model was made of, but for the friction of its track.
-    """
+    """As `equilibrium`, from the disk where it was found before; `inputs` as there."""
     friction = model.system.track.rail[:, MU_LEFT : MU_LEFT + 2, 0]
     digest = hashlib.sha256(f"{inputs} {speed!r} {model.system.contact.values.shape}".encode())
     digest.update(np.ascontiguousarray(friction).data)

@@ -98,10 +98,7 @@ def allowable_stress(table: Table, d: Values) -> Values:
 
 
 def mass(d: Values, D: Values, n_t: Values, density: float) -> Values:
-    """Mass of a spring, `rho pi d^2/4 * pi D n_t` [kg].
-
-    The helix angle (about 1 % more) and the ground-off ends (less) are left out.
-    """
+    """Mass of a spring, `rho pi d^2/4 * pi D n_t` [kg], but for its helix and its ground ends."""
     return density * 0.25 * np.pi * d**2 * (np.pi * D * n_t)
 
 

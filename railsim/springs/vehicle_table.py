@@ -80,8 +80,7 @@ def vehicle_text(
 ) -> str:
     """Return the text of a vehicle file that replaces the primary suspension of another one.
 
-    The vehicle file that it extends, and the parts of it to remove, are by default those of the
-    table `[vehicle]`.
+    File and parts to remove are by default those of the table `[vehicle]`.
     """
     table = suspension.vehicle
     if table is None:

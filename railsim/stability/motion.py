@@ -150,10 +150,7 @@ class VehicleMotion:
         return Stretch(state, time, self.lateral(rows), wheel.sum(axis=2))
 
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
-        """Move a state of the time loop by a chunk of steps; number of records.
-
-        Raises LeftRange: the motion leaves the range of the model.
-        """
+        """Move a state by a chunk of steps; number of records; LeftRange: it leaves the model."""
         arrays = self._work, state, self._derivative, self._stages, self._recorder
         scheme = SCHEMES[self._scheme]
         status, where, _, rows = time_loop(system, *arrays, scheme, step, chunk)

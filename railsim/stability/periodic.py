@@ -128,10 +128,7 @@ class Shooting:
                 length = min(step, 1.5 * length)
 
     def ahead(self, now: PeriodicMotion, length: float) -> tuple[PeriodicMotion, int]:
-        """Return the motion one arc length further, and the number of iterations.
-
-        Raises ModelError: Newton's method does not converge.
-        """
+        """Return the motion one arc length further, and iterations; ModelError: none is found."""
         return self._solved(now, now.tangent, length)
 
     def nearest(self, state: Floats, period: float, speed: float) -> PeriodicMotion:

@@ -34,10 +34,7 @@ class LinearLoss:
 
 @dataclass(frozen=True)
 class OverAmplitude:
-    """Linear critical speed over the amplitude for which the contact is linearised.
-
-    None where the vehicle is stable throughout the range.
-    """
+    """Linear critical speed over the amplitude of the contact; None where the vehicle is stable."""
 
     amplitude: list[float] = field(default_factory=list)  # [m]
     speed: list[float | None] = field(default_factory=list)  # [m/s]

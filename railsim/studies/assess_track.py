@@ -234,10 +234,7 @@ def _lifting(unloaded: Mapping[tuple[str, float], Sequence[float]]) -> list[str]
 
 
 def recorded(recording: str | Path) -> Track:
-    """Return a track with a recording; of a CSV, on straight track as long as it is.
-
-    Raises InputError: no measured irregularity.
-    """
+    """Return a track with a recording, straight for a CSV; raises InputError: it has none."""
     if str(recording).lower().endswith(".csv"):
         irregular = [{"type": "measured", "file": str(Path(recording).resolve())}]
         data: dict[str, Any] = {"irregularities": irregular}

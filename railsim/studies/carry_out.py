@@ -19,16 +19,8 @@ from railsim.laws.permission import check_laws
 from railsim.processes import available_cores
 from railsim.result import open_result
 from railsim.result.hdf5 import Storage
+from railsim.studies import execute
 from railsim.studies.case import Case
-from railsim.studies.execute import (
-    Job,
-    batches,
-    cluster,
-    compile_on_cluster,
-    in_processes,
-    in_this_process,
-    on_cluster,
-)
 from railsim.studies.journal import JOURNAL, Journal, Records
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Point, check_names
@@ -80,7 +72,7 @@ def carry_out(
         if known is None and not execution.overwrite:
             _refuse_files_of_others(folder)
         state = State(folder, points, load, spec, known, execution)
-        client = None if execution.scheduler is None else cluster(execution.scheduler)
+        client = None if execution.scheduler is None else execute.cluster(execution.scheduler)
         make_folder(folder)
         sweep(folder)
         journal = known or stack.enter_context(Journal(folder))
@@ -116,31 +108,37 @@ def carry_out(
 
 def _jobs(
     state: "State", spec: StudySpec, keep: tuple[str, ...], folder: Path, execution: Execution
-) -> list[Job]:
+) -> list[execute.Job]:
     storage = Storage(compress=spec.compress, single=spec.single)
     jobs = []
     for case in state.cases:
         path = (folder / f"{case.name}.h5").resolve()
         picture = path.with_suffix(".png") if execution.plots and case.file_name else None
         exists = case.name in state.to_be_analysed
-        jobs.append(Job(case, path, picture, spec.quantities, keep, storage, exists))
+        jobs.append(execute.Job(case, path, picture, spec.quantities, keep, storage, exists))
     if execution.longest_first:
         jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
     return jobs
 
 
 def _computed(
-    jobs: Sequence[Job], client: Any, execution: Execution, remark: Callable[[str], None]
+    jobs: Sequence[execute.Job], client: Any, execution: Execution, remark: Callable[[str], None]
 ) -> Iterable[Record]:
     progress = execution.progress or (lambda _: None)
     if client is not None:
         threads = sum(client.nthreads().values())
-        compile_on_cluster(client, remark)
-        return on_cluster(batches(jobs, execution.together, max(1, threads)), client, progress)
+        execute.compile_on_cluster(client, remark)
+        return execute.on_cluster(
+            execute.batches(jobs, execution.together, max(1, threads)), client, progress
+        )
     workers = execution.workers or available_cores()
-    work = batches(jobs, execution.together, workers)
+    work = execute.batches(jobs, execution.together, workers)
     workers = min(workers, len(work))
-    return in_processes(work, workers, progress) if workers > 1 else in_this_process(work, progress)
+    return (
+        execute.in_processes(work, workers, progress)
+        if workers > 1
+        else execute.in_this_process(work, progress)
+    )
 
 
 def _refuse_another_study(

@@ -162,11 +162,7 @@ class Journal:
 
 
 class Records(Sequence[Record]):
-    """Records of runs, each read from the journal on access.
-
-    `path`: the journal; `entries`: entry of each record, or the record itself of a run that has not
-    been done.
-    """
+    """Records of runs from a journal, each read on access; of a run not done the record itself."""
 
     def __init__(self, path: Path, entries: Sequence[Entry | Record]) -> None:
         self._path = path

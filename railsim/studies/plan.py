@@ -100,10 +100,7 @@ class Plan:
         return Point(run_name(run) + row.suffix, run, labels, key, has_run)
 
     def cases(self, points: Sequence[Point] | None = None) -> list[Case]:
-        """Load the inputs of the runs of some points, by default of all.
-
-        Raises InputError: everything that is wrong in any of them.
-        """
+        """Load the inputs of some points, by default all; raises InputError: all their faults."""
         wanted = self.points if points is None else points
         found = [self._loader.case(point.name, point.run, point.labels) for point in wanted]
         self._loader.check()

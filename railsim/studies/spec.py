@@ -92,21 +92,15 @@ class StudySpec(BaseModel):
     """A study: everything that its numbers and its files depend on; see `railsim.study`.
 
     Single values, ranges and numbers are taken too, and held as lists of texts.
-
-    `name`, `purpose`: what a study file or a scenario calls it, and what it is for; no number
-    depends on them; `folder`: folder that relative file names refer to, from the folder of the
-    study; `scenario`: scenario of a campaign, which has tracks and speeds of its own; `quantities`:
-    ``FILE.py:FUNCTION``, see `railsim.studies.user_function`; `keep`, `compress`, `single`: parts
-    of each result that are kept, see `kept_quantities`, and how they are stored.
     """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
     railsim_version: str = __version__
-    name: str | None = None
-    purpose: str | None = None
-    folder: str = "."
-    scenario: str | None = None
+    name: str | None = None  # in a study file or scenario; no number depends on it
+    purpose: str | None = None  # likewise
+    folder: str = "."  # that relative file names refer to, from the folder of the study
+    scenario: str | None = None  # of a campaign, which has tracks and speeds of its own
     vehicles: Annotated[list[str], BeforeValidator(_file_names)]
     tracks: Annotated[list[str], BeforeValidator(_file_names)]
     speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
@@ -115,9 +109,9 @@ class StudySpec(BaseModel):
         Annotated[dict[str, list[str]], BeforeValidator(partial(_table, option="linked"))]
     ] = []
     sample: Annotated[Sample | None, PlainSerializer(_stored)] = None
-    quantities: str | None = None
+    quantities: str | None = None  # ``FILE.py:FUNCTION``, see `railsim.studies.user_function`
     analyses: Annotated[dict[Name, Analysis], PlainSerializer(_stored)] = {}
-    keep: str = "all"
+    keep: str = "all"  # of each result, see `kept_quantities`
     compress: bool = False
     single: bool = False
     settings: Annotated[str | None, BeforeValidator(lambda v: v if v is None else str(v))] = None
@@ -143,13 +137,7 @@ class StudySpec(BaseModel):
 
 @dataclass(frozen=True)
 class Execution:
-    """How the runs of a study are carried out; the numbers do not depend on it.
-
-    Attributes as the arguments of `railsim.study`, and
-
-    longest_first : bool
-        Begin with the longest runs, to balance the load of the cores.
-    """
+    """How the runs of a study are carried out, see `railsim.study`; no number depends on it."""
 
     workers: int | None = None
     together: int = 1
@@ -157,7 +145,7 @@ class Execution:
     resume: bool = False
     overwrite: bool = False
     plots: bool = False
-    longest_first: bool = False
+    longest_first: bool = False  # to balance the load of the cores
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None
