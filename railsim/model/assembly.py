@@ -250,8 +250,7 @@ def _names(bodies: Sequence[FlatBody]) -> list[str]:
 def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     """Arrays of the bodies, and the arc length of each track frame from the reference body."""
     names = _names(flat.bodies)
-    origin = flat.body(flat.reference).position[0]
-    positions = [round(body.position[0] - origin, 9) for body in flat.bodies]
+    positions = [round(x, 9) for x in flat.along(flat.bodies)]
     offsets = sorted(set(positions))
     kinds = np.array([FIXED if b.fixed else _KINDS[b.kind] for b in flat.bodies], dtype=np.int64)
     parents = [names.index(body.parent) if body.parent else -1 for body in flat.bodies]

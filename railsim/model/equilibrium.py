@@ -308,7 +308,8 @@ class _Balance:
             self.residual = float(np.max(np.abs(rest)))
             if self.residual < RESIDUAL:
                 break
-            change = least_squares(self._jacobian(state, rest), -rest, 1e-13)
+            jacobian = difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
+            change = least_squares(jacobian, -rest, 1e-13)
             state, rest, shorter = self._line_search(state, rest, change, 2)
             if not shorter:
                 state, rest, shorter = self._over_kinks(state, rest, change)
@@ -366,9 +367,6 @@ class _Balance:
         if status != RUNNING:
             raise ModelError(f"no static equilibrium: {self.model.index.sentence(status, where)}")
         return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
-
-    def _jacobian(self, state: Floats, rest: Floats) -> Floats:
-        return difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
 
     def _line_search(
         self, state: Floats, rest: Floats, change: Floats, trials: int

@@ -16,7 +16,7 @@ from railsim.definitions.elements.base import FreeLength
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
-from railsim.errors import ModelError
+from railsim.errors import ModelError, listed
 
 if TYPE_CHECKING:
     from railsim.model.assembly import Model
@@ -68,9 +68,7 @@ def vehicle_remarks(
 
 def gathered(what: str, names: Sequence[str]) -> Remark:
     """Return one remark for several parts with the same finding, the first ones by name."""
-    first = ", ".join(names[:3])
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return Remark(first + more, what)
+    return Remark(listed(names), what)
 
 
 def _below_the_rails(flat: FlatVehicle) -> Iterator[Remark]:

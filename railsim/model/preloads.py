@@ -174,7 +174,8 @@ def _with_solved_preloads(
     What only presses does not pull: it carries nothing, and the others are solved without it.
     """
     system, support = model.system, dict(support)
-    loads = np.array([_load(system, body, component) for body, component in conditions])
+    weights = system.bodies.mass * system.gravity
+    loads = np.array([weights[body] if axis == 2 else 0.0 for body, axis in conditions])
     unit_links, unit_mounts = _copies(system)
     unit_links.spring[:, 2] = 1.0
     unit_mounts.preload[:] = 0.0, 0.0, 1.0
@@ -277,11 +278,6 @@ def _conditions(system: System) -> list[tuple[int, int]]:
         elif kind == AXLEBOX:
             rows.append((body, 4))
     return rows
-
-
-def _load(system: System, body: int, component: int) -> float:
-    weight = system.bodies.mass[body] * system.gravity
-    return float(weight) if component == 2 else 0.0
 
 
 def _preload_forces(

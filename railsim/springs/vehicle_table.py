@@ -69,7 +69,12 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
     _, (case,) = load_cases(suspension, {name: suspension.loads[name]})
     nest, remarks = _nest(suspension, table, case)
     elements = {"arm_bush": _bush(suspension, table, case), "coil_nest": nest}
-    return VehiclePart(table.assembly, {"arm": _axlebox(table)}, elements, case, remarks)
+    axlebox = {
+        "wheelset": table.wheelset,
+        "position": _rounded([0.0, table.lateral_position, -table.wheel_radius]),
+        "pitch_inertia": table.pitch_inertia, "sides": "both",
+    }  # fmt: skip
+    return VehiclePart(table.assembly, {"arm": axlebox}, elements, case, remarks)
 
 
 def vehicle_text(
@@ -105,12 +110,6 @@ def vehicle_text(
     notes = "".join(f"# {remark}\n" for remark in part.remarks)
     text: str = tomli_w.dumps(head) + "\n" + tomli_w.dumps(tables)
     return heading + notes + _INNERMOST_ARRAY.sub(_on_one_line, text)
-
-
-def _axlebox(table: VehicleTable) -> dict[str, Any]:
-    position = _rounded([0.0, table.lateral_position, -table.wheel_radius])
-    return {"wheelset": table.wheelset, "position": position,
-                    "pitch_inertia": table.pitch_inertia, "sides": "both"}  # fmt: skip
 
 
 def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) -> dict[str, Any]:

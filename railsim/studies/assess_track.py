@@ -257,8 +257,7 @@ def recorded(recording: str | Path) -> Track:
 def _behind(vehicle: Vehicle) -> float:
     """Distance of the last wheelset or floor point behind the reference body [m]."""
     flat, placed = flatten(vehicle), sensors(vehicle)
-    origin = flat.body(flat.reference).position[0]
-    wheelsets = [body.position[0] - origin for body in flat.of_kind("wheelset")]
+    wheelsets = flat.along(flat.of_kind("wheelset"))
     return -min(0.0, *wheelsets, *(placed[point].along for point in POINTS))
 
 

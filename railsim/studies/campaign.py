@@ -7,7 +7,7 @@ independent seeds of its track, scaled to the target quality.
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -107,7 +107,8 @@ def scenario_cases(
     """Return all runs: vehicles, then parts, then the grid; raises InputError: all their faults."""
     faults = Faults()
     cases: list[Case] = []
-    conditions = _conditions(scenario)
+    named: Iterable[tuple[str, TestCondition | None]] = scenario.conditions.items() or [("", None)]
+    conditions = [(k, name, one) for k, (name, one) in enumerate(named)]
     axes = (vehicles, conditions, scenario.parts, *scenario.grid.values())
     check_number(math.prod(map(len, axes)), available_cores(), lambda: ROUGH_DURATION)
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
@@ -158,13 +159,6 @@ def scenario_cases(
             cases += repeated(case, limits, service, number) if limits else [case]
     Faults(dict.fromkeys(faults)).check()
     return cases
-
-
-def _conditions(scenario: Scenario) -> list[tuple[int, str, TestCondition | None]]:
-    """Number, name and contents of each condition; one without name where there are none."""
-    if not scenario.conditions:
-        return [(0, "", None)]
-    return [(k, name, one) for k, (name, one) in enumerate(scenario.conditions.items())]
 
 
 def part_speed(speed: Speed, service: Service) -> float:
@@ -271,9 +265,7 @@ def counting_sections(
     """Sections that count, of the zone with most of them, at constant speed."""
     vehicle = case.vehicle
     flat = flatten(vehicle)
-    origin = flat.body(flat.reference).position[0]
-    x = [b.position[0] - origin for b in flat.of_kind("wheelset")]
-    x += [sensor.along for sensor in sensors(vehicle).values()]
+    x = flat.along(flat.of_kind("wheelset")) + [one.along for one in sensors(vehicle).values()]
     ahead, behind = max(0.0, *x), min(0.0, *x)
     begin = case.start + max(START * case.speed, ahead - behind) + ahead
     end = (case.until or track.length) + behind - 1.0

@@ -13,7 +13,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, argument_error, argument_fault
+from railsim.errors import Fault, InputError, argument_error, argument_fault, listed
 from railsim.files.access import is_file, make_folder, sweep
 from railsim.laws.permission import check_laws
 from railsim.processes import available_cores
@@ -273,7 +273,7 @@ class State:
         for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
             if names:
                 number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
-                remarks.append(f"{number} {words} and computed again: {_listed(names)}")
+                remarks.append(f"{number} {words} and computed again: {listed(names)}")
         return remarks
 
     def records(self, journal: Journal) -> Records:
@@ -299,8 +299,3 @@ def _files(folder: Path) -> dict[str, os.stat_result]:
             return {entry.name: entry.stat() for entry in entries if entry.name.endswith(".h5")}
     except OSError:  # missing, or not a folder
         return {}
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more

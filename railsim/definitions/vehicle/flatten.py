@@ -5,7 +5,7 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 (preloads, forces) turn with them, stiffness and damping do not.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -82,6 +82,11 @@ class FlatVehicle:
     def of_kind(self, kind: str) -> tuple[FlatBody, ...]:
         """Return the bodies of one kind, in their order."""
         return tuple(body for body in self.bodies if body.kind == kind)
+
+    def along(self, bodies: Iterable[FlatBody]) -> list[float]:
+        """Where bodies stand along the vehicle, from its reference body [m]."""
+        origin = self.body(self.reference).position[0]
+        return [body.position[0] - origin for body in bodies]
 
     @property
     def mass(self) -> float:
