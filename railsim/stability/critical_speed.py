@@ -198,9 +198,7 @@ def _loss_of_hunting(
     Friction that sticks damps nothing: the sway of such a vehicle is undamped at speeds at which
     friction, once it slides, damps it.
     """
-    counts = None
-    if prepared.sticking:
-        counts = _hunts(prepared)
+    counts = _hunts(prepared) if prepared.sticking else None
     return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
 
 
