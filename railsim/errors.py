@@ -7,7 +7,7 @@ range of validity.
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -225,6 +225,12 @@ LONGEST_NAME = 200
 MOST_NAMES = 100  # in a message
 
 
+def listed(names: Sequence[str], most: int = 3) -> str:
+    """Return the first names of a list, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Return ``did you mean 'x'?`` or the list of valid names, for the end of a message."""
     names = sorted(valid)
@@ -232,5 +238,4 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     close = get_close_matches(name, names, n=1, cutoff=0.6) if len(name) < LONGEST_NAME else ()
     if close:
         return f"did you mean '{close[0]}'?"
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return "allowed: " + ", ".join(names[:MOST_NAMES]) + more
+    return f"allowed: {listed(names, MOST_NAMES)}"

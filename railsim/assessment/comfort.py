@@ -28,13 +28,9 @@ EVENT_WINDOW = 2.0  # s
 ALL = slice(None)
 
 
-def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
-    """Root mean squares of consecutive complete blocks.
-
-    `a` (float64[time, ...]): Weighted acceleration [m/s2]. `rate`: Samples per second [1/s].
-    `length`: Length of a block [s]. Returns float64[block, ...].
-    """
-    size = round(length * rate)
+def block_rms(a: Floats, rate: float) -> Floats:
+    """Root mean squares of consecutive complete blocks of 5 s, float64[block, ...]."""
+    size = round(BLOCK * rate)
     whole = len(a) // size
     parts = a[: whole * size].reshape(whole, size, *a.shape[1:])
     return np.asarray(np.sqrt(np.mean(parts**2, axis=1)))
@@ -42,16 +38,12 @@ def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
 
 @dataclass(frozen=True)
 class MeanComfort:
-    """Mean comfort at one measuring point.
+    """Mean comfort at one measuring point."""
 
-    `N_MV`, `N_VA`, `N_VD`: Index on the floor, seated, standing [1]. `continuous` (float64[block,
-    3]): Continuous comfort: the root mean squares over 5 s with Wd, Wd, Wb along x, y, z [m/s2].
-    """
-
-    N_MV: float
-    N_VA: float
-    N_VD: float
-    continuous: Floats
+    N_MV: float  # index on the floor [1]
+    N_VA: float  # seated [1]
+    N_VD: float  # standing [1]
+    continuous: Floats  # float64[block, 3], rms over 5 s with Wd, Wd, Wb along x, y, z [m/s2]
     blocks: int  # number of blocks of 5 s; the standard requires 60
 
 
@@ -84,11 +76,7 @@ def _along_axes(a: Floats, rate: float, vertical: Weighting) -> Floats:
 
 
 def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
-    """Indices from the root mean squares of blocks, see `en12299_mean_comfort`.
-
-    `rms` (float64[block, 3]): On the floor, weighted [m/s2]. `back` (float64[block]): Along x with
-    Wc [m/s2].
-    """
+    """Indices from weighted rms of blocks, on the floor [block, 3] and along x with Wc [m/s2]."""
     if not len(rms):
         return MeanComfort(math.nan, math.nan, math.nan, rms, 0)
     x95, y95, z95 = np.percentile(rms, 95.0, axis=0)
@@ -159,8 +147,6 @@ def motion_sickness_dose(a: Floats, rate: float) -> float:
     `a` (float64[time]): Vertical acceleration [m/s2]. `rate`: Samples per second [1/s]. Returns:
     [m/s1.5].
 
-    Examples
-    --------
     >>> t = np.arange(0.0, 1000.0, 0.05)
     >>> dose = motion_sickness_dose(np.sin(2.0 * np.pi * 0.2 * t), 20.0)
     >>> round(dose / 500.0**0.5, 2)
@@ -178,8 +164,6 @@ def p_ct(acceleration: float, jerk: float, roll_rate: float, posture: str) -> fl
     [m/s3]. `roll_rate`: Largest roll velocity [deg/s]. `posture` ({'standing', 'seated'}).
     Returns: [%].
 
-    Examples
-    --------
     >>> round(p_ct(1.0, 0.5, 2.0, "standing"), 2)
     28.69
     """
@@ -192,8 +176,6 @@ def p_de(peak_to_peak: float | Floats, mean: float | Floats, posture: str) -> Fl
 
     P_DE = max(a yp + b ym - c, 0), yp and ym over 2 s.
 
-    Examples
-    --------
     >>> round(float(p_de(1.2, 1.0, "seated")), 2)
     1.5
     """
@@ -203,20 +185,15 @@ def p_de(peak_to_peak: float | Floats, mean: float | Floats, posture: str) -> Fl
 
 @dataclass(frozen=True)
 class TransitionComfort:
-    """Comfort on one curve transition.
+    """Comfort on one curve transition: P_CT [%] and its arguments."""
 
-    `begin`, `end`: Times at which the measuring point passes its beginning and end [s].
-    `acceleration`, `jerk`, `roll_rate`: Arguments of P_CT [m/s2], [m/s3], [deg/s]. `standing`,
-    `seated`: P_CT [%].
-    """
-
-    begin: float
-    end: float
-    acceleration: float
-    jerk: float
-    roll_rate: float
-    standing: float
-    seated: float
+    begin: float  # time at which the measuring point passes its beginning [s]
+    end: float  # and its end [s]
+    acceleration: float  # [m/s2]
+    jerk: float  # [m/s3]
+    roll_rate: float  # [deg/s]
+    standing: float  # [%]
+    seated: float  # [%]
 
 
 def transition_comfort(

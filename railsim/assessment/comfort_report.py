@@ -20,11 +20,7 @@ MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz 
 
 @dataclass(frozen=True)
 class PointComfort:
-    """Comfort at one point.
-
-    `hunting`: Share that the vehicle's hunting has in the mean square of the weighted lateral
-    acceleration; 0 where it does not hunt.
-    """
+    """Comfort at one point."""
 
     sensor: str
     place: float  # along the vehicle, from the reference body forwards [m]
@@ -33,6 +29,7 @@ class PointComfort:
     sperling: dict[str, float]  # wz ``lateral`` and ``vertical``
     transitions: tuple[comfort.TransitionComfort, ...]
     events: dict[str, float]  # largest P_DE by posture [%]
+    # its share in the mean square of the weighted lateral acceleration; 0: none
     hunting: float = 0.0
 
     def record(self, limits: ComfortLimits) -> dict[str, object]:
@@ -96,10 +93,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
 
 
 class _Gathered:
-    """Sums and blocks of one measuring point over the parts of a run.
-
-    `frequency`: At which the vehicle hunts; 0: it does not [Hz].
-    """
+    """Sums and blocks of one point over the parts of a run that hunts at `frequency`, or 0 [Hz]."""
 
     def __init__(self, frequency: float) -> None:
         self.frequency = frequency
@@ -173,8 +167,5 @@ def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
 def short_of_blocks(points: list[PointComfort]) -> str:
     """Sentence if there are fewer blocks than the standard requires; otherwise empty."""
     blocks = points[0].mean.blocks
-    return (
-        ""
-        if blocks >= comfort.BLOCKS
-        else f"{blocks} blocks of 5 s, EN 12299 requires {comfort.BLOCKS}"
-    )
+    few = f"{blocks} blocks of 5 s, EN 12299 requires {comfort.BLOCKS}"
+    return few if blocks < comfort.BLOCKS else ""

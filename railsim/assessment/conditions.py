@@ -23,17 +23,13 @@ SHARE = 90.0  # per cent of the sections, of the track's quality
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition of the test.
-
-    `name`, `place`: What it is about; zone and population, empty for the whole test. `found`,
-    `required`: In words.
-    """
+    """A condition of the test."""
 
     name: str
-    place: str
+    place: str  # zone and population, empty for the whole test
     state: str  # ``met``, ``not met`` or ``not checked``
-    found: str
-    required: str
+    found: str  # in words
+    required: str  # in words
     source: str = ""  # source of the requirement
     checked: bool = False  # whether it has been compared with the printed standard
 
@@ -50,19 +46,15 @@ class Condition:
 
 @dataclass(frozen=True)
 class SectionRow:
-    """A section of a run, for the list of sections.
-
-    `alignment`, `level`: Standard deviations in D1 [m]. `conicity`: Equivalent conicity of the
-    leading wheelset for 3 mm; nan where it is not known [1].
-    """
+    """A section of a run, for the list of sections."""
 
     run: str
     population: str
     section: TestSection
-    alignment: float
-    level: float
+    alignment: float  # standard deviation in D1 [m]
+    level: float  # likewise [m]
     quality: str  # class after UIC 518
-    conicity: float
+    conicity: float  # equivalent, of the leading wheelset for 3 mm; nan where it is not known [1]
     realisation: str  # what the track's irregularities are, seed included
     counts: bool
 

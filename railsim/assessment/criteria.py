@@ -109,15 +109,12 @@ def transferred(x: Floats, turn: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Measured:
-    """What is measured of a signal in a section.
+    """What is measured of a signal in a section."""
 
-    `signal`: Forms the signal of the filtered quantities, see `railsim.assessment.signals`.
-    `value`: Values over time in a section, 1 in a right-hand curve, -1 in a left-hand one and 0 on
-    straight track, to the values of the section.
-    """
-
+    # of the filtered quantities, see `railsim.assessment.signals`
     signal: Callable[[Signals, Band | None], Signal | None]
     band: Band | None  # filter [Hz]
+    # of a section: from the values over time and its turn (1 right, -1 left, 0 straight)
     value: Callable[[Floats, int], list[float]]
     window: float = 0.0  # means over this length are taken before [m]; 0: none
     wheels: tuple[str, ...] = OUTER  # wheels that are assessed
@@ -162,10 +159,7 @@ def instability(signals: Signals, section: TestSection) -> Values:
 
 
 def steering(signals: Signals, section: TestSection) -> Values:
-    """Steering index of the leading wheelset in a curve, see `steering_index`.
-
-    With the widening of the gauge in the middle of the section.
-    """
+    """Steering index of the leading wheelset, with the gauge in the middle of a curve's section."""
     if not section.turn:
         return {}
     rows = np.array(signals.record.result.track().gauge_widening or [[0.0, 0.0, 0.0]])
@@ -204,21 +198,16 @@ def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: flo
 
 @dataclass(frozen=True)
 class Criterion:
-    """An assessed quantity.
-
-    `words`, `unit`: Name and unit in tables. `group`: ``safety``, ``loading`` or ``ride``: the
-    verdict to which it belongs; ``information``: none. `kind`: Statistics of the limits file;
-    ``largest`` and ``smallest``: no estimate, the extreme value. `measure`: Signals of a part and
-    a section to values by place. `methods`: ``normal``, with wheel forces, and ``simplified``,
-    with accelerations.
-    """
+    """An assessed quantity."""
 
     name: str  # key of its limit in the limits file
-    words: str
-    unit: str
-    group: str
-    kind: str
+    words: str  # in tables
+    unit: str  # in tables
+    group: str  # verdict: ``safety``, ``loading`` or ``ride``; ``information``: none
+    kind: str  # statistics of the limits file; ``largest``, ``smallest``: the extreme value
+    # signals of a part and a section to values by place
     measure: Callable[[Signals, TestSection], Values]
+    # ``normal``: with wheel forces; ``simplified``: with accelerations
     methods: tuple[str, ...] = ("normal",)
     meaning: str = ""  # what its limit is about
 

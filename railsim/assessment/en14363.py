@@ -25,13 +25,11 @@ NEEDED = ("Q", "Y", "wheelset_distance")
 
 @dataclass
 class SectionValues:
-    """Values of one section.
-
-    `values`: By quantity and wheelset, wheel or sensor: one value, or both percentiles on straight
-    track [SI].
-    """
+    """Values of one section."""
 
     section: TestSection
+    # by quantity and wheelset, wheel or sensor: one value, or both percentiles on straight track
+    # [SI]
     values: dict[tuple[str, str], list[float]] = field(default_factory=dict)
     lifted: dict[str, float] = field(default_factory=dict)  # length without load by wheel [m]
 
@@ -110,9 +108,6 @@ def hunting_spectrum(record: Record, sections: Sequence[TestSection]) -> Floats:
 
 
 def hunting_frequency(spectra: Sequence[Floats]) -> float | None:
-    """Frequency f0 of a vehicle: the largest component of all its runs [Hz].
-
-    None where it has no sections in zones 1 and 2.
-    """
+    """Frequency f0, the largest component of all runs [Hz]; None without sections in 1 and 2."""
     power = np.sum(spectra, axis=0) if len(spectra) else np.zeros(1)
     return float(FREQUENCIES[np.argmax(power)]) if np.any(power) else None

@@ -20,15 +20,12 @@ FORCES = ("sum_Y", "Y_over_Q", "Q", "Q_qst", "Y_qst", "T_qst")
 
 @dataclass(frozen=True)
 class Influence:
-    """Regression of one quantity at one place.
-
-    `regression`: Coefficients: constant, of the cant deficiency [1/m], of the curvature [m].
-    """
+    """Regression of one quantity at one place."""
 
     population: str
     place: str
     criterion: Criterion
-    regression: Regression
+    regression: Regression  # of 1, the cant deficiency [1/m], the curvature [m]
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""

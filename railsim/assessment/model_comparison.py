@@ -21,16 +21,14 @@ def _outwards(x: Floats, turn: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Compared:
-    """A quantity that is compared.
-
-    `value`: Values in a section, outwards positive in curves, to one or two.
-    """
+    """A quantity that is compared."""
 
     name: str
     words: str
     unit: str
     base: str  # ``Q``, ``Y``, ``sum_Y``, ``Y_over_Q`` or ``body``, and ``y`` or ``z`` behind it
     band: Band  # filter [Hz]
+    # values in a section, outwards positive in curves, to one or two
     value: Callable[[Floats, int], list[float]]
     curves: bool = False  # in curves only
     window: float = 0.0

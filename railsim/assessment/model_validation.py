@@ -362,15 +362,13 @@ def _ahead(result: Result, selection: str) -> float:
     """Arc length of a channel's place relative to the reference body [m]."""
     base, *labels = selection.split(":")
     if base.startswith("sensor_"):
-        sensor = all_sensors(result.vehicle())[labels[0]]
-        return sensor.along
+        return all_sensors(result.vehicle())[labels[0]].along
     names = list(result.wheelsets)
     if not labels or not (labels[0] in names or labels[0].isdecimal()):
         return 0.0
     flat = flatten(result.vehicle())
-    origin = next(body.position[0] for body in flat.bodies if body.name == flat.reference)
     k = names.index(labels[0]) if labels[0] in names else int(labels[0]) - 1
-    return float(flat.of_kind("wheelset")[k].position[0] - origin)
+    return flat.along(flat.of_kind("wheelset"))[k]
 
 
 def _placed(

@@ -29,16 +29,12 @@ PIECE = 60.0  # s that are read at once by default
 
 @dataclass(frozen=True)
 class _Readings:
-    """What was read last: parts of a run overlap by the margins of their filters.
-
-    `speed` (float64[row]): From which the readings were made: at the ends of a part it differs
-    [m/s]. `acceleration`, `roll`: See `Record.readings`.
-    """
+    """What was read last: parts of a run overlap by the margins of their filters."""
 
     first: int  # first row
-    speed: Floats
-    acceleration: Floats
-    roll: Floats
+    speed: Floats  # float64[row], of which they were made: at the ends of a part it differs [m/s]
+    acceleration: Floats  # see `Record.readings`
+    roll: Floats  # see `Record.readings`
 
     def part_of(self, rows: slice, speed: Floats) -> "_Readings | None":
         """Return what of these is part of other rows with their speeds, if anything is.
@@ -89,10 +85,7 @@ class Record:
         return InputError([Fault(self.name, key, found, allowed, option=self.name)])
 
     def need(self, names: Sequence[str], output: str) -> None:
-        """Refuse a result that lacks quantities.
-
-        Raises InputError: some of `names` are missing; the message names the `output` to request.
-        """
+        """Refuse a result that lacks some of `names`; InputError names the `output` to request."""
         missing = [name for name in names if name not in self.result]
         if missing:
             words = "is not in the result", f"run it with {output}"
@@ -105,10 +98,7 @@ class Record:
 
     @cached_property
     def geometry(self) -> ContactGeometry | None:
-        """Contact functions of the leading wheelset on rigid rails.
-
-        None where the profiles are not kept or do not fit.
-        """
+        """Contact functions of the leading wheelset, rigid rails; None: profiles do not fit."""
         return self.geometry_with(0.0)
 
     def geometry_with(self, widening: float) -> ContactGeometry | None:

@@ -179,10 +179,7 @@ def _service(runs: Mapping[str, Result]) -> Service:
 
 
 def _sections(record: Record, limits: RunningLimits, service: Service) -> list[TestSection]:
-    """Return the sections of a run that has all that is needed.
-
-    Raises InputError: it lacks a quantity.
-    """
+    """Return the sections of a run; raises InputError where it lacks a quantity."""
     record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
     if "Q0" not in record.result:
         raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")

@@ -24,8 +24,6 @@ def nadal(flange_angle: float, mu: ArrayLike) -> Floats:
 
     `flange_angle`: Largest contact angle of the flange [rad]. `mu`: Coefficient of friction [1].
 
-    Examples
-    --------
     >>> round(float(nadal(math.radians(70.0), 0.36)), 3)
     1.2
     """
@@ -73,8 +71,6 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float | Floats, height: F
     friction varies along the track [1]. `height` (float64[time]): Height of the wheel above its
     rail [m].
 
-    Examples
-    --------
     >>> s = np.arange(6.0)
     >>> climb_distance(s, np.array([0.5, 1.3, 1.4, 1.3, 0.9, 0.2]), 1.2, 1e-3 * s)
     Climb(length=2.0, begin=1.0, rise=0.002)
@@ -89,22 +85,14 @@ def climb_distance(s: Floats, Y_over_Q: Floats, limit: float | Floats, height: F
 
 
 def overturning(Q: Floats) -> Floats:
-    """Overturning coefficient of a bogie, (sum Q_left - sum Q_right)/(sum Q) [1].
-
-    `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
-    """
+    """Overturning coefficient of a bogie, (sum Q_left - sum Q_right)/(sum Q) [1]."""
     left, right = np.sum(Q[..., 0], axis=-1), np.sum(Q[..., 1], axis=-1)
     with np.errstate(invalid="ignore"):  # without load, 0/0: nan
         return np.asarray((left - right) / (left + right))
 
 
 def largest_overturning(Q: Floats) -> float:
-    """Largest magnitude of the overturning coefficient of a bogie [1].
-
-    Instants at which the whole bogie is without load have no coefficient and do not count.
-
-    `Q` (float64[time, wheelset, side]): Vertical wheel forces of the bogie [N].
-    """
+    """Largest magnitude of the coefficient over all instants at which the bogie is loaded [1]."""
     return float(np.fmax.reduce(np.abs(overturning(Q))))
 
 
@@ -112,30 +100,25 @@ def largest_overturning(Q: Floats) -> float:
 class WheelSafety:
     """Nadal's limit and climb distance of one wheel.
 
-    `limit`: Nadal's limit of Y/Q for the flange angle of the profile and the friction of the rail,
-    where Y/Q comes nearest to it [1]. `Y_over_Q`: Derailment quotient there, unfiltered: the
-    largest where the friction does not vary [1]; nan where the wheel never carried load. `lifted`:
-    Whether it was without load, where Y/Q has no value. `climb_distance`, `climb_begin`, `rise`:
-    Longest distance above the limit, position of its beginning, rise of the wheel on it [m].
+    The limit is taken where Y/Q, unfiltered, comes nearest to it: at its largest value where the
+    friction does not vary.
     """
 
     place: str  # wheelset, from 1, and side
-    limit: float
-    Y_over_Q: float
-    climb_distance: float
-    climb_begin: float
-    rise: float
-    lifted: bool
+    limit: float  # for the flange angle of the profile and the friction of the rail [1]
+    Y_over_Q: float  # there [1]; nan where the wheel never carried load
+    climb_distance: float  # longest one above the limit [m]
+    climb_begin: float  # where it begins [m]
+    rise: float  # of the wheel on it [m]
+    lifted: bool  # whether it was without load, where Y/Q has no value
 
 
 @dataclass(frozen=True)
 class SafetyReport:
-    """Derailment and overturning of a run.
-
-    `overturning`: Largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1].
-    """
+    """Derailment and overturning of a run."""
 
     wheels: tuple[WheelSafety, ...]
+    # largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1]
     overturning: dict[str, float]
 
     def record(self) -> dict[str, Any]:
@@ -144,10 +127,7 @@ class SafetyReport:
 
 
 def safety_report(record: Record) -> SafetyReport:
-    """Nadal, climb distance and overturning over a run.
-
-    `record`: Run with Q, Y_over_Q, wheelset_distance and body_position.
-    """
+    """Nadal, climb distance and overturning of a run with Q, Y_over_Q and positions."""
     needed = ["Q", "Y_over_Q", "wheelset_distance"]
     record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
     result = record.result
@@ -171,10 +151,7 @@ def safety_report(record: Record) -> SafetyReport:
 
 
 def _height(record: Record, w: int, side: int) -> np.ndarray:
-    """Height of a wheel above its rail, from position and roll of the wheelset [m].
-
-    Above the rail as it lies, irregular but not deflected; nan where the result has no positions.
-    """
+    """Height of a wheel above its irregular, not deflected rail [m]; nan without positions."""
     result, track = record.result, record.result.track()
     if "body_position" not in result:
         return np.full(len(record.time), np.nan)

@@ -22,16 +22,13 @@ from railsim.notation import SIDES
 
 @dataclass(frozen=True)
 class TestSection:
-    """A section of the track that a run covers.
-
-    `begin`, `end`: Arc lengths [m].
-    """
+    """A section of the track that a run covers."""
 
     __test__ = False  # pytest: not a test
 
     zone: str  # 1 to 4; empty where no zone has this radius
-    begin: float
-    end: float
+    begin: float  # arc length [m]
+    end: float  # arc length [m]
     radius: float  # signed radius, infinite on straight track [m]
     cant_deficiency: float  # positive where the cant is too small for the speed [m]
     speed: float  # speed in the middle of the section [m/s]
@@ -61,8 +58,6 @@ def outer_deficiency(speed: float, radius: float, cant: float) -> float:
     `speed`: [m/s]. `radius`, `cant`: Signed: positive to the right, positive = left rail higher
     [m].
 
-    Examples
-    --------
     >>> round(outer_deficiency(20.0, -250.0, -0.15), 4)
     0.0946
     """
@@ -142,10 +137,7 @@ def _joined(sections: Sequence[Section]) -> list[Section]:
 
 
 def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
-    """Zone of a radius; empty where there is none.
-
-    Very large radii with small cant deficiency belong to zone 1.
-    """
+    """Zone of a radius, if any; very large ones of small cant deficiency belong to zone 1."""
     straight = next((n for n, z in limits.zones.items() if z.radius is None), "")
     if math.isinf(radius):
         return straight

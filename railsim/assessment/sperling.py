@@ -33,19 +33,12 @@ def sperling_gain(f: Floats, direction: Direction) -> Floats:
 
 
 def sperling_index(a: Floats, rate: float, direction: Direction) -> float:
-    """Ride index of a record from 0.5 to 30 Hz.
-
-    `a` (float64[time]): Acceleration [m/s2]. `rate`: Samples per second [1/s]. `direction`
-    ({'vertical', 'lateral'}). Returns: Wz [1].
-    """
+    """Ride index Wz from 0.5 to 30 Hz [1] of accelerations [m/s2] at a rate [1/s]."""
     return index_of_rms(float(np.sqrt(np.mean(sperling_weighted(a, rate, direction) ** 2))))
 
 
 def sperling_weighted(a: Floats, rate: float, direction: Direction) -> Floats:
-    """Weighted acceleration of a record from 0.5 to 30 Hz [m/s2].
-
-    A curve in which the record ends is no vibration: the record is continued at its ends.
-    """
+    """Weighted accelerations from 0.5 to 30 Hz, as if a curve at an end went on [m/s2]."""
 
     def response(f: Floats) -> Floats:
         f = np.asarray(f, dtype=np.float64)
@@ -57,8 +50,6 @@ def sperling_weighted(a: Floats, rate: float, direction: Direction) -> Floats:
 def index_of_rms(a_w: float) -> float:
     """Wz of a weighted root mean square [m/s2].
 
-    Examples
-    --------
     >>> B = float(sperling_gain(np.array(5.0), "vertical"))
     >>> round(index_of_rms(0.5 / np.sqrt(2.0) * B), 3)
     3.039

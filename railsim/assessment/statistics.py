@@ -15,19 +15,16 @@ from railsim.arrays import Floats
 
 @dataclass(frozen=True)
 class Line:
-    """Regression line a + b x and its upper bound.
+    """Regression line a + b x and its upper bound."""
 
-    `level`, `slope`: a and b. `middle`, `squares`: Mean of x and sum (x - mean)^2.
-    """
-
-    level: float
-    slope: float
+    level: float  # a
+    slope: float  # b
     error: float  # standard error of the regression
     target: float  # x0, at which the bound is the estimate
     quantile: float  # one-sided quantile of Student's distribution
     N: int  # number of values
-    middle: float
-    squares: float
+    middle: float  # mean of x
+    squares: float  # sum (x - mean)^2
 
     def at(self, x: float | Floats) -> Floats:
         """Value of the line."""
@@ -41,18 +38,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of a quantity's largest value from its values in sections.
-
-    `mean`, `deviation`: Mean and standard deviation (N - 1) of the values. `method` ({'one',
-    'two', 'largest', 'smallest'}): Dimensions, or that it is no estimate but a value of the
-    sections.
-    """
+    """Estimate of a quantity's largest value from its values in sections."""
 
     N: int  # number of values
-    mean: float
-    deviation: float
+    mean: float  # of the values
+    deviation: float  # their standard deviation (N - 1)
     value: float  # estimate; nan where there are too few values
-    method: str
+    method: str  # dimensions: 'one', 'two'; 'largest', 'smallest': no estimate but a value
     line: Line | None = None  # of the two-dimensional method
 
 
@@ -62,8 +54,6 @@ def one_dimensional(x: Floats, k: float) -> Estimate:
     `x` (float64[section]): Values. `k`: Factor of the standard deviation: 3 for safety, 2.2 for
     track loading and ride characteristics, 0 for quasi-static quantities.
 
-    Examples
-    --------
     >>> values = np.array([31.2, 29.8, 33.5, 30.4, 32.1, 34.0, 28.9, 31.7, 30.9, 32.6])
     >>> round(one_dimensional(values, 3.0).value, 3), round(one_dimensional(values, 2.2).value, 3)
     (36.323, 35.04)
@@ -85,8 +75,6 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     `x0`: Target value of the influencing quantity. `probability`: P: 0.99 for safety, otherwise
     0.95; 0.5 gives the regression line itself.
 
-    Examples
-    --------
     >>> x = np.array([70, 85, 95, 100, 110, 120, 125, 135, 145, 150.0])
     >>> y = np.array([24.1, 26.0, 28.2, 27.5, 30.1, 31.0, 32.9, 33.1, 36.0, 35.4])
     >>> [round(two_dimensional(x, y, 150.0, P).value, 3) for P in (0.95, 0.99)]
@@ -121,8 +109,6 @@ def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | No
     `x` (float64[section, influence]). `y` (float64[section]). `target` (float64[influence]):
     Conditions at which the value is sought.
 
-    Examples
-    --------
     >>> x = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 1.0]])
     >>> found = multiple_regression(x, 1.0 + 2.0 * x[:, 0] - x[:, 1], np.array([3.0, 2.0]))
     >>> round(found.value, 9), round(found.determination, 9)
@@ -144,9 +130,6 @@ def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | No
 
 
 def extreme(x: Floats, method: str) -> Estimate:
-    """Largest or smallest value, with mean and deviation beside it; no estimate.
-
-    `x` (float64[section]). `method` ({'largest', 'smallest'}).
-    """
+    """Largest or smallest value, with mean and deviation beside it; no estimate."""
     value = float(np.max(x) if method == "largest" else np.min(x))
     return replace(one_dimensional(x, 0.0), value=value, method=method)

@@ -26,10 +26,7 @@ QN = (
 
 
 class TrackQuality:
-    """Standard deviations over any part of a track.
-
-    `begin`, `end`: Part of the track that is evaluated [m].
-    """
+    """Standard deviations over any part of a track between `begin` and `end` [m]."""
 
     def __init__(self, track: Track, begin: float, end: float) -> None:
         short, long = D1
@@ -55,8 +52,6 @@ def quality_class(speed: float, alignment: float, level: float) -> str:
     `speed`: Admissible speed of the line [m/s]. `alignment`, `level`: Standard deviations in D1
     [m].
 
-    Examples
-    --------
     >>> quality_class(40.0, 0.71e-3, 0.98e-3), quality_class(40.0, 1.21e-3, 1.61e-3)
     ('better than QN1', 'between QN1 and QN2')
     """

@@ -50,10 +50,7 @@ def overall(verdicts: Mapping[str, Verdict], deciding: Sequence[str]) -> str:
 def all_verdicts(
     runs: Mapping[str, Result], reports: Sequence[ZoneReport], conditions: Sequence[Condition]
 ) -> dict[str, Verdict]:
-    """Return the verdicts by criterion.
-
-    `runs`: All runs of the vehicle, also those that did not reach their end.
-    """
+    """Return the verdicts by criterion, on all runs, also those that did not reach their end."""
     derailed = [_ended(n, r) for n, r in runs.items() if r.status == "derailed"]
     stopped = [f"{_ended(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
     missing = [condition.sentence for condition in conditions if condition.state != MET]
@@ -61,11 +58,8 @@ def all_verdicts(
     for name in VERDICTS:
         exceeded = [why for report in reports for why in _exceeded(report, name)]
         rows = [(r.title, row) for r in reports for row in r.rows if row.criterion.group == name]
-        few = [
-            f"{title}: {row.criterion.words}, {row.place}"
-            for title, row in rows
-            if math.isnan(row.share)
-        ]
+        empty = [(title, row) for title, row in rows if math.isnan(row.share)]
+        few = [f"{title}: {row.criterion.words}, {row.place}" for title, row in empty]
         unknown = [f"{where}: too few values for an estimate" for where in few]
         incomplete = [*stopped, *unknown, *missing]
         if derailed and name == SAFETY:

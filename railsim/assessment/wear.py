@@ -24,18 +24,14 @@ DENSITY = 7850.0  # density of wheel and rail steel [kg/m3]
 
 @dataclass(frozen=True)
 class Patches:
-    """Contact patches, arrays of one shape or that are broadcast to it.
-
-    `N`, `friction`, `speed`: Its normal force [N], coefficient of friction [1] and speed of travel
-    [m/s]; only laws of files need them.
-    """
+    """Contact patches, arrays alike or broadcast; only laws of files need N, friction and speed."""
 
     T_gamma: Floats  # wear number of each patch [N]
     area: Floats  # its area, zero where it carries nothing [m2]
     diameter: float | Floats  # diameter of its wheel [m]
-    N: Floats | float = math.nan
-    friction: Floats | float = math.nan
-    speed: Floats | float = math.nan
+    N: Floats | float = math.nan  # normal force [N]
+    friction: Floats | float = math.nan  # coefficient [1]
+    speed: Floats | float = math.nan  # of travel [m/s]
 
 
 def _pearce_sherratt(patches: Patches) -> Floats:
@@ -88,14 +84,11 @@ def krause_poll(patches: Patches, law: FrictionWork) -> Floats:
 
 @dataclass(frozen=True)
 class WearLaw:
-    """A law for the wear of a wheel.
+    """A law for the wear of a wheel."""
 
-    `name`, `source`: As in heads of columns; authors and year. `worn_area`: Patches to the worn
-    area of the wheel profile per distance, patch by patch [m2/m].
-    """
-
-    name: str
-    source: str
+    name: str  # in heads of columns
+    source: str  # authors and year
+    # of the wheel profile per distance, patch by patch [m2/m]
     worn_area: Callable[[Patches], Floats]
     constants: str = ""  # text of its file
 
@@ -138,8 +131,6 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:
     `T_gamma`: Wear number [N]. `diameter`: Wheel diameter [m]. Returns: Worn area per distance
     [m2/m].
 
-    Examples
-    --------
     >>> worn = pearce_sherratt_1991(np.array([50.0, 150.0, 250.0]), 0.92)
     >>> (1e9 * worn).round(5).tolist()  # mm2/km
     [0.01359, 0.02717, 0.15598]
@@ -160,8 +151,6 @@ def usfd(T_gamma_over_A: Floats) -> Floats:
     `T_gamma_over_A`: Wear number over the area of the patch [N/m2]. Returns: Mass loss per metre
     rolled and square metre of contact patch [kg/m/m2].
 
-    Examples
-    --------
     >>> (1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0]))).round(1).tolist()  # ug/(m mm2)
     [26.5, 55.0, 1466.3]
     """
@@ -176,11 +165,9 @@ class WholeLifeRailModel:
 
     Zero up to `threshold`, linear to 10e-6 at 65 N, linear to 0 at 175 N and, on the same line,
     negative above: there wear is faster than crack growth.
-
-    `threshold`: Wear number below which there is no damage [N]: 15 (from memory), 20 in later use.
     """
 
-    threshold: float = 15.0
+    threshold: float = 15.0  # wear number [N]; from memory, 20 in later use
     peak: float = 65.0
     balance: float = 175.0
     damage: float = 10e-6
@@ -188,8 +175,6 @@ class WholeLifeRailModel:
     def __call__(self, T_gamma: Floats) -> Floats:
         """Damage of one passing axle [1].
 
-        Examples
-        --------
         >>> (1e6 * WholeLifeRailModel()(np.array([10.0, 40.0, 65.0, 120.0, 230.0]))).tolist()
         [0.0, 5.0, 10.0, 5.0, -5.0]
         """

@@ -120,10 +120,9 @@ def upper_side(profile: Profile) -> slice:
 
 
 def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
-    """Sum of half ellipses of given areas over `grid`.
+    """Sum of half ellipses of given centres, half widths [m] and areas [m2] over `grid` [m].
 
-    `centres`, `widths`, `areas`: Centres, half widths [m] and areas [m2]. Returns
-    float64[position]: Heights [m], whose integral over each cell is exact.
+    The integral over each cell is exact.
     """
     counted = areas > 0.0
     y, b, A = centres[counted], np.maximum(widths[counted], 1e-5), areas[counted]
@@ -224,8 +223,6 @@ class WheelDimensions:
 def wheel_dimensions(profile: Profile) -> WheelDimensions:
     """Dimensions of a wheel profile; z = 0 need not be on the rolling circle.
 
-    Examples
-    --------
     >>> from railsim.profiles import load_profile
     >>> found = wheel_dimensions(load_profile("S1002"))
     >>> [round(1e3 * v, 1) for v in (found.flange_height, found.flange_thickness)]

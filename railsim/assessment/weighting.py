@@ -27,23 +27,18 @@ Q1 = 1.0 / math.sqrt(2.0)
 
 @dataclass(frozen=True)
 class Weighting:
-    """Parameters of a weighting.
-
-    `f1`, `f2`: Band limits [Hz]. `f3`, `f4`, `Q2`: Transition from acceleration-proportional to
-    velocity-proportional [Hz, Hz, 1]. `f5`, `Q3`, `f6`, `Q4`: Upward step [Hz, 1, Hz, 1]; f5
-    infinite: none.
-    """
+    """A weighting: from acceleration to velocity at f3 and f4, upward step from f5 to f6."""
 
     name: str  # wb, Wc, Wd or Wk
-    f1: float
-    f2: float
-    f3: float
-    f4: float
-    Q2: float
-    f5: float = math.inf
-    Q3: float = 1.0
-    f6: float = math.inf
-    Q4: float = 1.0
+    f1: float  # lower band limit [Hz]
+    f2: float  # upper band limit [Hz]
+    f3: float  # [Hz]
+    f4: float  # [Hz]
+    Q2: float  # [1]
+    f5: float = math.inf  # infinite: no step [Hz]
+    Q3: float = 1.0  # [1]
+    f6: float = math.inf  # [Hz]
+    Q4: float = 1.0  # [1]
     K: float = 1.0  # factor of the step
 
     def response(self, f: Floats) -> Complexes:
@@ -63,18 +58,13 @@ class Weighting:
     def gain(self, f: Floats) -> Floats:
         """Magnitude of the response.
 
-        Examples
-        --------
         >>> WD.gain(np.array([1.0, 4.0])).round(3).tolist()
         [1.011, 0.512]
         """
         return np.asarray(np.abs(self.response(f)), dtype=np.float64)
 
     def weighted(self, a: Floats, rate: float) -> Floats:
-        """Weighted acceleration.
-
-        `a` (float64[time, ...]): Acceleration [m/s2]. `rate`: Samples per second [1/s].
-        """
+        """Weighted accelerations, float64[time, ...], at a rate [1/s]."""
         return filtered(a, rate, self.response, 4.0 / self.f1)
 
 

@@ -32,10 +32,7 @@ METHODS = {"one": "one-dimensional", "two": "two-dimensional", "largest": "large
 
 @dataclass(frozen=True)
 class Assessed:
-    """Estimate of one quantity at one wheelset, wheel or sensor, and its limit.
-
-    `uncorrected`: Estimate before the correction for high friction, where that was made.
-    """
+    """Estimate of one quantity at one wheelset, wheel or sensor, and its limit."""
 
     criterion: Criterion
     place: str  # wheelset, wheel or sensor; wheelsets count from 1
@@ -43,6 +40,7 @@ class Assessed:
     limit: float = math.nan  # nan for quantities without [SI]
     source: str = ""  # source of the limit
     checked: bool = False  # whether the limit has been compared with the printed standard
+    # before the correction for high friction, where that was made
     uncorrected: Estimate | None = None
 
     @property

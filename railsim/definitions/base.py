@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, Literal, NoReturn, Self
+from typing import Annotated, Any, Literal, NoReturn, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -78,7 +78,7 @@ def both_sides(share: float = 1.0) -> BeforeValidator:
 
 
 NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 2}
-SIDED_ROWS = WithJsonSchema({"type": "array", "minItems": 1, "items": {**NUMBERS, "maxItems": 3}})
+
 
 PositivePair = Annotated[
     tuple[Positive, Positive],
@@ -133,10 +133,7 @@ class Definition(BaseModel):
         return sorted(set(super().__dir__()) - set(dir(BaseModel)))
 
     def __copy__(self) -> Self:
-        """Return a copy without what was worked out from the values: those of the copy may differ.
-
-        `model_copy` changes values of such a copy.
-        """
+        """Return a copy without what was worked out: `model_copy` changes values of such a copy."""
         copied = super().__copy__()
         for name in set(copied.__dict__) - set(type(self).model_fields):
             del copied.__dict__[name]
@@ -167,13 +164,10 @@ def meanings(model: type[BaseModel]) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Remark:
-    """Something allowed that an engineer would still want to know.
+    """Something allowed that an engineer would still want to know."""
 
-    `key`: dotted path of the key within the file; `text`: what is unusual.
-    """
-
-    key: str
-    text: str
+    key: str  # dotted path of the key within the file
+    text: str  # what is unusual
 
     def __str__(self) -> str:
         return f"{self.key}: {self.text}"
@@ -193,17 +187,33 @@ EMPTY_TABLE: Any = Field(default_factory=dict)
 """Default of a table that a file may leave out."""
 
 
-def rises(what: str) -> AfterValidator:
-    """Return the check that the first column of rows, called `what`, increases strictly."""
+def holds(condition: Callable[[Any], bool], otherwise: str) -> AfterValidator:
+    """Return the check that a condition holds of a value; `otherwise` says what is allowed."""
 
-    def check(rows: Any) -> Any:
-        if not rising(rows):
-            raise ValueError(f"the {what} must increase from row to row")
-        return rows
+    def check(value: Any) -> Any:
+        if not condition(value):
+            raise ValueError(otherwise)
+        return value
 
     return AfterValidator(check)
+
+
+def rises(what: str) -> AfterValidator:
+    """Return the check that the first column of rows, called `what`, increases strictly."""
+    return holds(rising, f"the {what} must increase from row to row")
 
 
 def rising(rows: Sequence[Sequence[float]]) -> bool:
     """Whether the first column increases strictly."""
     return all(after[0] > before[0] for before, after in pairwise(rows))
+
+
+T = TypeVar("T")
+SidedRows = Annotated[
+    tuple[tuple[Finite, T, T], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(),
+    WithJsonSchema({"type": "array", "minItems": 1, "items": {**NUMBERS, "maxItems": 3}}),
+]
+"""Rows [s, value] or [s, left, right] [m]"""

@@ -6,25 +6,17 @@ from typing import TYPE_CHECKING, Literal
 
 @dataclass(frozen=True)
 class CreepLaw:
-    """What is known of a creep law.
+    """What is known of a creep law."""
 
-    - `number`: its number in `railsim.kernels.creep`
-    - `label`: how it is called in texts and pictures
-    - `colour`: its colour in pictures, an index of `railsim.plot.style.DISTINCT`
-    - `meaning`: what it is, in one line
-    - `grid`: whether it divides the patch into cells, `settings.fastsim_grid`
-    - `ratio`: range of the ratio of semi-axes: 1/ratio <= a/b <= ratio; beyond it the nearest is
-      taken, and the patch is counted
-    - `measured`: whether it needs a curve of the user's own, `settings.adhesion_curve`
-    """
-
-    number: int
-    label: str
-    colour: int
-    meaning: str
-    grid: bool = False
+    number: int  # in `railsim.kernels.creep`
+    label: str  # in texts and pictures
+    colour: int  # in pictures, an index of `railsim.plot.style.DISTINCT`
+    meaning: str  # what it is, in one line
+    grid: bool = False  # whether it divides the patch into cells, `settings.fastsim_grid`
+    # of semi-axes: 1/ratio <= a/b <= ratio; beyond it the nearest is taken, and the patch is
+    # counted
     ratio: float = 24.0
-    measured: bool = False
+    measured: bool = False  # whether it needs a curve of the user's own, `settings.adhesion_curve`
 
 
 CREEP_LAWS: dict[str, CreepLaw] = {

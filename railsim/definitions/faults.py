@@ -17,11 +17,7 @@ from railsim.text import shortened
 def validation_faults(
     error: ValidationError, source: Source, model: type[BaseModel]
 ) -> list[Fault]:
-    """Return a fault for everything that is wrong in single values.
-
-    `error`: what pydantic found; `source`: the plain tables and the files that they came from;
-    `model`: the definition that was expected.
-    """
+    """Return a fault for everything that pydantic found wrong in single values of a definition."""
     faults: list[Fault] = []
     for number, detail in enumerate(error.errors(include_url=False)):
         if detail["type"] == "too_short" and detail["ctx"]["actual_length"] < len(detail["input"]):

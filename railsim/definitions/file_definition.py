@@ -32,10 +32,7 @@ class FileDefinition(Definition):
     """Tables that an assignment makes where they are missing; their members are dotted names."""
 
     def __init__(self, /, **values: Any) -> None:
-        """Check the values.
-
-        Raises InputError: everything that is wrong in them.
-        """
+        """Check the values; raises InputError: everything that is wrong in them."""
         try:
             super().__init__(**values)
         except ValidationError as error:
@@ -157,10 +154,7 @@ class FileDefinition(Definition):
 
 
 def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:
-    """Return the definition of a source with assignments.
-
-    Raises InputError: another format, and everything that is wrong.
-    """
+    """Return the definition of a source with assignments; raises InputError: all that is wrong."""
     if source.data.get("format") != model.format_name():
         file = source.file_of(("format",))
         raise InputError([format_fault(file, source.data.get("format"), [model.format_name()])])
@@ -175,10 +169,7 @@ def _defaults(model: type[FileDefinition]) -> dict[str, Any]:
 
 
 def validated(model: type[D], source: Source) -> D:
-    """Return the definition of a source.
-
-    Raises InputError: everything that is wrong.
-    """
+    """Return the definition of a source; raises InputError: everything that is wrong."""
 
     def located(faults: Iterable[Fault]) -> list[Fault]:
         return [f if f.file else source.fault(f.key, f.found, f.allowed) for f in faults]

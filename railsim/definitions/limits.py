@@ -55,19 +55,15 @@ class Value(Sourced):
 
 @dataclass(frozen=True)
 class Situation:
-    """What a limit may depend on: one wheelset, wheel or sensor in one zone.
-
-    `zone`: 1 to 4; `radius`: mean radius of the sections [m]; `wheelset`: from 0; None for what
-    belongs to none; `Q0`: mean static load of its two wheels [N]; `limits`: all limits of the file.
-    """
+    """What a limit may depend on: one wheelset, wheel or sensor in one zone."""
 
     vehicle: Vehicle
     service: Service
-    zone: str
-    radius: float
-    wheelset: int | None
-    Q0: float
-    limits: "Mapping[str, LimitLaw]"
+    zone: str  # 1 to 4
+    radius: float  # mean radius of the sections [m]
+    wheelset: int | None  # from 0; None for what belongs to none
+    Q0: float  # mean static load of its two wheels [N]
+    limits: "Mapping[str, LimitLaw]"  # all limits of the file
 
 
 class Constant(Value):

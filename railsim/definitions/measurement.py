@@ -7,7 +7,7 @@ without further ado.  Reading is in `railsim.measurement`.
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import (
@@ -21,6 +21,7 @@ from railsim.definitions.base import (
     Text,
     Whole,
     check,
+    holds,
 )
 from railsim.definitions.file_definition import FileDefinition
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SHOWN_UNITS, SIDES, Quantity
@@ -80,19 +81,20 @@ def quantity_of(selection: str) -> Quantity | None:
     return quantity
 
 
-def _known(selection: str) -> str:
-    if quantity_of(selection) is None:
-        raise ValueError(
-            "a quantity of a result with a label for each of its dimensions: 'Q:1:left', "
-            "'sensor_acceleration:floor_front:z'; or one of " + ", ".join(AXES)
-        )
-    return selection
+Selection = Annotated[
+    Text,
+    holds(
+        lambda selection: quantity_of(selection) is not None,
+        "a quantity of a result with a label for each of its dimensions: 'Q:1:left', "
+        "'sensor_acceleration:floor_front:z'; or one of " + ", ".join(AXES),
+    ),
+]
 
 
 class Channel(Definition):
     """A column of the files: what it measures, where, in which unit and with which sign."""
 
-    quantity: Annotated[Text, AfterValidator(_known)]
+    quantity: Selection
     """Counterpart in a result, with its labels: `Q:1:left`, `sum_Y:2`,
     `sensor_acceleration:axlebox_1_left:z`; `time`, `distance`, `mileage`, `speed`, `curvature` or
     `yaw_rate` (of the body) of the run itself"""

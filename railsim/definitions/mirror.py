@@ -22,8 +22,6 @@ Row = tuple[float, float, float]
 def mirrored_track(track: Track) -> Track:
     """Return the mirror image of a track.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_track
     >>> mirrored_track(load_track("curve_r250")).plan[2].radius
     -250.0

@@ -32,14 +32,10 @@ NARROWEST = 0.01  # m
 
 @dataclass(frozen=True, eq=False)
 class SectionList:
-    """Sections in the order of their positions.
+    """Sections in the order of their positions."""
 
-    `positions`, shape (n,): arc length [m] or angle [rad]; `points`, shape (2, k): y, z along the
-    contour of each section [m].
-    """
-
-    positions: Floats
-    points: tuple[Floats, ...]
+    positions: Floats  # shape (n,): arc length [m] or angle [rad]
+    points: tuple[Floats, ...]  # shape (2, k): y, z along the contour of each section [m]
 
 
 def read_sections(path: str | Path, kind: str) -> SectionList:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from railsim.definitions.base import (
     EMPTY_TABLE,
@@ -15,6 +15,7 @@ from railsim.definitions.base import (
     Speed,
     Text,
     check,
+    holds,
     rises,
 )
 from railsim.definitions.creep_law import CreepLawName
@@ -30,16 +31,10 @@ Cells = Annotated[int, Field(strict=True, ge=1, le=500)]
 Share = Annotated[Finite, Field(ge=0.0, le=1.0)]
 
 
-def _from_zero(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    if rows[0] != (0.0, 0.0):
-        raise ValueError("the first row must be [0.0, 0.0]: no creepage, no force")
-    return rows
-
-
 AdhesionRows = Annotated[
     tuple[tuple[NonNegative, Share], ...],
     Field(min_length=2),
-    AfterValidator(_from_zero),
+    holds(lambda r: r[0] == (0.0, 0.0), "the first row must be [0.0, 0.0]: no creepage, no force"),
     rises("first column"),
 ]
 TractionRows = Annotated[

@@ -5,10 +5,10 @@ belong to one command (`[target]` to design, `[fatigue]` to fatigue, `[vehicle]`
 `[search]` and `[tolerances]` to the search).  Lengths in m, forces in N, stresses in Pa.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from railsim.definitions.base import (
     EMPTY_TABLE,
@@ -20,25 +20,13 @@ from railsim.definitions.base import (
     Remark,
     Text,
     check,
+    holds,
     rises,
 )
 from railsim.definitions.file_definition import FileDefinition
 from railsim.errors import Fault, nearest
 
 Row = tuple[NonNegative, Positive]
-Range = tuple[Positive, Positive]
-
-
-def _polyline(rows: Sequence[Sequence[float]]) -> Sequence[Sequence[float]]:
-    if any(upper < lower for lower, upper in rows):
-        raise ValueError("rows [tau_min, tau_max]: the upper stress must not be below the lower")
-    return rows
-
-
-def _ordered(bounds: Range) -> Range:
-    if bounds[1] < bounds[0]:
-        raise ValueError("[smallest, largest]: the second must not be below the first")
-    return bounds
 
 
 _NUMBER = {"type": "number", "exclusiveMinimum": 0}
@@ -52,9 +40,18 @@ NumberOrTable = Annotated[
     WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _ROW, "minItems": 1}]}),
 ]
 Polyline = Annotated[
-    tuple[Row, ...], Field(min_length=2), rises("first column"), AfterValidator(_polyline)
+    tuple[Row, ...],
+    Field(min_length=2),
+    rises("first column"),
+    holds(
+        lambda rows: all(lower <= upper for lower, upper in rows),
+        "rows [tau_min, tau_max]: the upper stress must not be below the lower",
+    ),
 ]
-Bounds = Annotated[Range, AfterValidator(_ordered)]
+Bounds = Annotated[
+    tuple[Positive, Positive],
+    holds(lambda b: b[0] <= b[1], "[smallest, largest]: the second must not be below the first"),
+]
 
 
 class TrailingArm(Definition):

@@ -44,24 +44,14 @@ STATUS = 0.1  # share of one instant's derivative: sides differ there
 class Derivative:
     """Derivative of one output to one parameter.
 
-    Attributes
-    ----------
-    value : ndarray
-        Change of the output [SI] for a relative change of the parameter: d y / d ln p; to the
-        share of a profile d y / d share.
-    error : float
-        Estimated error over the norm of the derivative [1].
-    step : float
-        Of the parameter's coordinate.
-    kinked : float
-        Share of the instants (of the values) at which the derivatives to both sides differ; NaN
-        for forward differences.
+    It is the change of the output [SI] for a relative change of the parameter, d y / d ln p; to the
+    share of a profile d y / d share.
     """
 
     value: Floats
-    error: float
-    step: float
-    kinked: float = np.nan
+    error: float  # estimated, over the norm of the derivative [1]
+    step: float  # of the parameter's coordinate
+    kinked: float = np.nan  # share of the values at which both sides differ; NaN: forward
 
     @property
     def is_smooth(self) -> bool:

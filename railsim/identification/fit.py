@@ -280,10 +280,7 @@ def _banded(x: Floats, step: float, low: float, high: float) -> Floats:
 
 
 def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
-    """Set the weights: by the noise that is stated, else by the residuals of each channel.
-
-    Returns whether one of them has changed by more than `SETTLED`.
-    """
+    """Set the weights, by noise or residuals; return whether one changes by over `SETTLED`."""
     before, problem.weights = problem.weights, []
     for one, rows in zip(problem.placed(x), problem.residuals(x), strict=True):
         noise = problem.form.expected(one) if stated else [np.nan] * len(rows)

@@ -28,33 +28,18 @@ NOT_WHITE = 0.01  # probability
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A channel before and after.
-
-    Attributes
-    ----------
-    run, name, quantity : str
-    step : float
-        [s]
-    at : float64[time]
-        Arc length [m].
-    measured, before, after : float64[time]
-        Measured, simulated with the file's and with the identified values [SI].
-    level : float
-        rms of the weighted residuals: 1 where they are the noise [1].
-    statistic, probability : float
-        Of white residuals, see `railsim.identification.residuals.whiteness`.
-    """
+    """A channel before and after."""
 
     run: str
     name: str
     quantity: str
-    step: float
-    at: Floats = field(repr=False)
-    measured: Floats = field(repr=False)
-    before: Floats = field(repr=False)
-    after: Floats = field(repr=False)
-    level: float
-    statistic: float
+    step: float  # [s]
+    at: Floats = field(repr=False)  # arc length, float64[time] [m]
+    measured: Floats = field(repr=False)  # [SI]
+    before: Floats = field(repr=False)  # simulated with the file's values
+    after: Floats = field(repr=False)  # with the identified ones
+    level: float  # rms of the weighted residuals: 1 where they are the noise [1]
+    statistic: float  # of white residuals, see `railsim.identification.residuals.whiteness`
     probability: float
 
     @property
@@ -209,6 +194,7 @@ class Identified:
 
     def record(self) -> dict[str, Any]:
         """Return everything but the series as plain values."""
+        arrays = ("covariance", "correlation", "singular_values", "combinations")
         return {
             "vehicle": self.vehicle.name,
             "parameters": [
@@ -225,10 +211,7 @@ class Identified:
                 )
             ],
             "values": dict(self._values),
-            "covariance": self.covariance.tolist(),
-            "correlation": self.correlation.tolist(),
-            "singular_values": self.singular_values.tolist(),
-            "combinations": self.combinations.tolist(),
+            **{name: getattr(self, name).tolist() for name in arrays},
             "unidentified": list(self.unidentified),
             "channels": [
                 {

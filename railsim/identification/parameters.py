@@ -193,8 +193,6 @@ def _scalable(value: Any) -> bool:
 def scaled(value: Any, factor: float) -> Any:
     """Return a number, a vector or what a table holds over its first column, times a factor.
 
-    Examples
-    --------
     >>> scaled(2.0, 3.0), scaled([1.0, 2.0], 2.0), scaled([[0.1, 5.0], [0.2, 7.0]], 2.0)
     (6.0, [2.0, 4.0], [[0.1, 10.0], [0.2, 14.0]])
     """

@@ -30,21 +30,17 @@ LARGEST_KEPT = 2_000_000_000  # bytes
 
 @dataclass(eq=False)
 class Problem:
-    """Residuals of some runs.
-
-    `place`: whether shift and stretch of each run are sought; `folder`: where evaluations are kept;
-    `progress`: called with the number of simulated runs; `weights`: for each run and channel one
-    over the standard deviation of the noise.
-    """
+    """Residuals of some runs."""
 
     model: Model
     parameters: Sequence[Parameter]
     runs: Sequence[Prepared]
     form: Form
-    place: bool
+    place: bool  # whether shift and stretch of each run are sought
     workers: Workers
-    folder: Path | None
-    progress: Callable[[int], None]
+    folder: Path | None  # where evaluations are kept
+    progress: Callable[[int], None]  # called with the number of simulated runs
+    # by run and channel: one over the standard deviation of the noise
     weights: list[Floats] = field(default_factory=list)
     simulations: int = 0
     _inputs: str = field(init=False)

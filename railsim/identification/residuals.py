@@ -104,8 +104,6 @@ def whiteness(residual: Floats) -> tuple[float, float]:
     distribution of Kolmogorov and Smirnov where the residuals are white (Bartlett 1955, An
     Introduction to Stochastic Processes, section 9.2).
 
-    Examples
-    --------
     >>> rng = np.random.default_rng(1)
     >>> whiteness(rng.standard_normal(2000))[1] > 0.05
     True

@@ -42,23 +42,18 @@ VARYING_RATE, FAR_ABOVE = 400.0, 10.0  # 1/s at least; times the end of the band
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A measured run as it is simulated; small enough to be sent to a worker.
-
-    `load`: load case of the vehicle; `speed`, `start`, `until`: [m/s], [m]; `selections`:
-    quantities with labels; `amplifiers`: what each channel has been through; `at`: arc lengths of
-    the measured values [m].
-    """
+    """A measured run as it is simulated; small enough to be sent to a worker."""
 
     name: str
     track: Track
-    load: str | None
+    load: str | None  # load case of the vehicle
     settings: Settings
-    speed: float
-    start: float
-    until: float
-    selections: tuple[str, ...]
-    amplifiers: tuple[Channel, ...] = field(repr=False)
-    at: Floats = field(repr=False)
+    speed: float  # [m/s]
+    start: float  # [m]
+    until: float  # [m]
+    selections: tuple[str, ...]  # quantities with labels
+    amplifiers: tuple[Channel, ...] = field(repr=False)  # what each channel has been through
+    at: Floats = field(repr=False)  # arc lengths of the measured values [m]
 
     def simulated(
         self, model: Model, parameters: Sequence[Parameter], x: Floats, slope: bool
@@ -137,15 +132,12 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A run, and what was measured at the same places.
-
-    `measured`: float64[channel, time], NaN where there is no value; `names`: of the channels;
-    `noise`: standard deviation of white noise in the band for each, NaN where it is not known.
-    """
+    """A run, and what was measured at the same places."""
 
     run: Run
-    measured: Floats
-    names: tuple[str, ...]
+    measured: Floats  # float64[channel, time], NaN where there is no value
+    names: tuple[str, ...]  # of the channels
+    # standard deviation of white noise in the band by channel, NaN where it is not known
     noise: Floats
     step: float  # time between two values [s]
     measurement: Measurement

@@ -11,10 +11,7 @@ Task = tuple[Callable[..., Any], tuple[Any, ...]]
 
 @dataclass
 class Workers:
-    """Processes that carry out tasks; with one worker everything happens in this process.
-
-    Used as a context manager: the processes end with the block.
-    """
+    """Processes for tasks, within a block; with one worker everything happens in this process."""
 
     count: int
     _pool: WorkerPool | None = field(default=None, init=False, repr=False)

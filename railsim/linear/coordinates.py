@@ -25,15 +25,8 @@ from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
 
-TRACK_PARTS = (
-    "rail.left.y",
-    "rail.left.z",
-    "rail.right.y",
-    "rail.right.z",
-    "sleeper.y",
-    "sleeper.z",
-    "sleeper.roll",
-)
+OF_RAILS = ("rail.left.y", "rail.left.z", "rail.right.y", "rail.right.z")
+TRACK_PARTS = (*OF_RAILS, "sleeper.y", "sleeper.z", "sleeper.roll")
 STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
 
 
@@ -41,23 +34,19 @@ STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
 class Coordinates:
     """Which entries of the state vector are coordinates of the analysis.
 
-    `names`: ``carbody.y``, of its rate ``carbody.y'``; of an internal state the element's name; of
-    the track ``front.outer.wheelset.rail.left.y``; `indices`: indices in the state vector:
-    positions and velocities of the bodies, internal states of elements, displacements of elastic
-    rails, their rates; `bodies`, `components`: body and component of positions and velocities, -1
-    of all others; `n_positions`, `n_velocities`: of the bodies; `steps`: steps of difference
-    quotients; `forceless`: rates of rails without mass: their equations say that the forces
-    balance.
+    These are positions and velocities of the bodies, internal states of elements, displacements of
+    elastic rails, their rates.
     """
 
+    # ``carbody.y``, ``carbody.y'``, name of an element, ``front.wheelset.rail.left.y``
     names: tuple[str, ...]
-    indices: Integers
-    bodies: Integers
-    components: Integers
-    n_positions: int
-    n_velocities: int
-    steps: Floats
-    forceless: Integers
+    indices: Integers  # in the state vector
+    bodies: Integers  # of positions and velocities, -1 of all others
+    components: Integers  # likewise
+    n_positions: int  # of the bodies
+    n_velocities: int  # of the bodies
+    steps: Floats  # of difference quotients
+    forceless: Integers  # rates of rails without mass: their equations say that the forces balance
 
     @property
     def positions(self) -> slice:
@@ -134,14 +123,9 @@ def track_indices(model: Model) -> tuple[list[int], list[str]]:
         return [], []
     first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(model.index.wheelsets)
     moving = DOF if support.sleeper else RAIL_DOF
-    indices = [
-        first + SUPPORT_SIZE * w + k
-        for w in range(len(model.index.wheelsets))
-        for k in range(moving)
-    ]
-    return indices, [
-        f"{wheelset}.{part}" for wheelset in model.index.wheelsets for part in TRACK_PARTS[:moving]
-    ]
+    wheelsets, parts = model.index.wheelsets, TRACK_PARTS[:moving]
+    indices = [first + SUPPORT_SIZE * w + k for w in range(len(wheelsets)) for k in range(moving)]
+    return indices, [f"{wheelset}.{part}" for wheelset in wheelsets for part in parts]
 
 
 def _internal_names(model: Model) -> list[str]:
@@ -203,10 +187,7 @@ class FreeVehicle:
         return self.state[self.coordinates.indices].copy()
 
     def tangent(self) -> Floats:
-        """Jacobian of `rate` at the state of steady rolling, float64[n, n].
-
-        Raises ModelError: it is not finite.
-        """
+        """Jacobian of `rate` in steady rolling, float64[n, n]; ModelError: it is not finite."""
         matrix = jacobian(self.rates, self.x, self.coordinates.steps)
         if not np.isfinite(matrix).all():
             raise ModelError("the vehicle cannot be linearised: a derivative is not finite")
@@ -224,10 +205,7 @@ class FreeVehicle:
         return Linearisation(names, matrix, self.x[kept], float(self.state[SPEED]))
 
     def evaluate(self, state: Floats) -> Floats:
-        """Derivative of a whole state as the kernels give it; leaves forces in `work`.
-
-        Raises ModelError: the state lies outside the range of the model.
-        """
+        """Derivative of a whole state, forces left in `work`; ModelError: it is out of range."""
         return np.asarray(self._evaluated(state[None])[0])
 
     def _evaluated(self, states: Floats) -> Floats:

@@ -32,16 +32,12 @@ STEP = 0.2  # of the parameter, in which a loss of stability is looked for
 
 @dataclass(frozen=True)
 class Eigenmodes:
-    """Modes of one linearisation; of a conjugate pair the one with Im(lambda) > 0.
-
-    `eigenvalues`: by rising magnitude [1/s]; `shapes`: right eigenvectors, largest component 1;
-    `left`: left eigenvectors with l r = 1 (where they can be scaled so).
-    """
+    """Modes of one linearisation; of a conjugate pair the one with Im(lambda) > 0."""
 
     linearisation: Linearisation
-    eigenvalues: Complexes
-    shapes: Complexes
-    left: Complexes
+    eigenvalues: Complexes  # by rising magnitude [1/s]
+    shapes: Complexes  # right eigenvectors, largest component 1
+    left: Complexes  # left eigenvectors with l r = 1 (where they can be scaled so)
 
     @property
     def frequencies(self) -> Floats:
@@ -70,8 +66,6 @@ class Eigenmodes:
 def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
     """Eigenmodes of a linearisation, by rising |lambda|.
 
-    Examples
-    --------
     >>> oscillator = Linearisation(("x", "v"), np.array([[0.0, 1.0], [-4.0, -0.4]]), np.zeros(2), 1)
     >>> modes = eigenmodes(oscillator)
     >>> modes.natural_frequencies.round(4), modes.damping_ratios.round(4)
@@ -168,16 +162,12 @@ def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
 
 @dataclass(frozen=True)
 class LossOfStability:
-    """Where an equilibrium loses its stability to an oscillation, or that it does not.
+    """Where an equilibrium loses its stability to an oscillation, or that it does not."""
 
-    `parameter`: lowest value with Re(lambda) = 0 (a Hopf bifurcation); None if there is none in the
-    range; `already`: whether the equilibrium is unstable at the range's lower end; `modes`: one
-    mode each: the critical one at `parameter`; where there is none, the least damped ones at both
-    ends of the range.
-    """
-
+    # lowest value with Re(lambda) = 0 (a Hopf bifurcation); None: none in the range
     parameter: float | None
-    already: bool
+    already: bool  # whether the equilibrium is unstable at the range's lower end
+    # the critical one at `parameter`; without it the least damped ones at both ends of the range
     modes: tuple[Eigenmodes, ...]
 
 

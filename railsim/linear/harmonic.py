@@ -30,10 +30,7 @@ STEP = 1e-8  # m and rad
 
 
 class ContactPath:
-    """Wheelsets moved along their contact path by one amplitude.
-
-    `amplitude`: a [m].
-    """
+    """Wheelsets moved along their contact path by one amplitude [m]."""
 
     def __init__(self, amplitude: float) -> None:
         self.amplitude = amplitude
@@ -69,11 +66,8 @@ class ContactPath:
                 try:
                     x, pose = self._on_path(vehicle, body, y, guess)
                 except ModelError as error:
-                    raise argument_error(
-                        "amplitude",
-                        f"found {1e3 * self.amplitude:g} mm, but {error}",
-                        "a smaller amplitude",
-                    ) from None
+                    words = f"found {1e3 * self.amplitude:g} mm, but {error}"
+                    raise argument_error("amplitude", words, "a smaller amplitude") from None
                 self._known[body, y] = pose
                 before = y
                 share = 4.0 * side * sine / (ANGLES * self.amplitude)

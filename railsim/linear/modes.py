@@ -31,18 +31,13 @@ DAMPING = Column("damping_ratio", "damping", "%", ".2f")
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of a vehicle.
+    """One mode of a vehicle; with an empty name and NaN where a root locus has no such mode."""
 
-    `name`: after the field, see `railsim.linear.naming`; empty, and NaN values, where a root locus
-    has no such mode; `eigenvalue`: lambda [1/s]; `participation`: share of the kinetic energy by
-    ``body.component``, largest first; `shape`: displacements by ``body.component``, the largest 1
-    [m, rad].
-    """
-
-    name: str
-    eigenvalue: complex
+    name: str  # after the field, see `railsim.linear.naming`
+    eigenvalue: complex  # lambda [1/s]
+    # share of the kinetic energy by ``body.component``, largest first
     participation: dict[str, float]
-    shape: dict[str, complex]
+    shape: dict[str, complex]  # displacements by ``body.component``, the largest 1 [m, rad]
 
     @property
     def frequency(self) -> float:
@@ -72,11 +67,9 @@ class Mode:
 
     def record(self) -> dict[str, Any]:
         """Return the mode as plain data."""
+        names = ("name", "frequency", "natural_frequency", "damping_ratio")
         return {
-            "name": self.name,
-            "frequency": self.frequency,
-            "natural_frequency": self.natural_frequency,
-            "damping_ratio": self.damping_ratio,
+            **{name: getattr(self, name) for name in names},
             "eigenvalue": [self.eigenvalue.real, self.eigenvalue.imag],
             "participation": self.participation,
             "shape": {name: [value.real, value.imag] for name, value in self.shape.items()},
@@ -85,20 +78,15 @@ class Mode:
 
 @dataclass(frozen=True, repr=False)
 class Modes(Plottable):
-    """Modes of a vehicle at one speed.
+    """Modes of a vehicle at one speed."""
 
-    `speed`: [m/s]; `contact`: how the contact was linearised; `modes`: by rising |lambda|, or in
-    the order of the root locus; `remarks`: remarks for the reader; `parameter`: key and value of
-    another parameter than the speed; `vehicle`, `place`: name of the vehicle; the track in words.
-    """
-
-    speed: float
-    contact: Contact
-    modes: tuple[Mode, ...]
+    speed: float  # [m/s]
+    contact: Contact  # how it was linearised
+    modes: tuple[Mode, ...]  # by rising |lambda|, or in the order of the root locus
     remarks: tuple[str, ...] = ()
-    parameter: tuple[str, float] | None = None
-    vehicle: str = ""
-    place: str = ""
+    parameter: tuple[str, float] | None = None  # key and value of another one than the speed
+    vehicle: str = ""  # its name
+    place: str = ""  # the track in words
 
     def __iter__(self) -> Any:
         return iter(self.modes)
@@ -170,14 +158,11 @@ class Modes(Plottable):
 
 @dataclass(frozen=True, repr=False)
 class RootLocus(Plottable):
-    """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
+    """Oscillations of a vehicle over a parameter, each at the same index throughout."""
 
-    `key`: ``speed`` or the key of the parameter; `values`: its values; `sets`: one for each value.
-    """
-
-    key: str
-    values: tuple[float, ...]
-    sets: tuple[Modes, ...]
+    key: str  # ``speed`` or the key of the parameter
+    values: tuple[float, ...]  # of it
+    sets: tuple[Modes, ...]  # one for each value
 
     @property
     def eigenvalues(self) -> Complexes:
@@ -248,8 +233,6 @@ class RootLocus(Plottable):
 def numbered(names: Sequence[str]) -> list[str]:
     """Names with a number from the second of the same on.
 
-    Examples
-    --------
     >>> numbered(["front hunting", "bogie roll", "front hunting"])
     ['front hunting', 'bogie roll', 'front hunting 2']
     """
@@ -363,26 +346,20 @@ def _prepared(
 def parameter_locus(
     prepared: Callable[[float], LinearVehicle], key: str, values: Sequence[float], speed: float
 ) -> RootLocus:
-    """Return the modes of a vehicle over any parameter of its files.
+    """Return the modes of a vehicle over any parameter of its files, called `key`, at a speed.
 
-    `prepared`: value of the parameter to the vehicle; `key`: what the parameter is called; `speed`:
-    [m/s].
+    `prepared`: value of the parameter to the vehicle.
     """
     (speed,) = checked_speeds([speed])
     of = cache(prepared)
     sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
-    named = [
-        _named(of(value), found, speed, (key, value))
-        for found, value in zip(sets, values, strict=True)
-    ]
+    each = zip(sets, values, strict=True)
+    named = [_named(of(value), found, speed, (key, value)) for found, value in each]
     return RootLocus(key, tuple(values), tuple(named))
 
 
 def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[float]:
-    """Return speeds, which may be texts with units [m/s].
-
-    Raises InputError: one of them is no speed or out of range, or there is none.
-    """
+    """Return speeds, perhaps texts with units [m/s]; raises InputError: out of range, or none."""
     low, high = SPEED_RANGE
     if isinstance(speeds, str | Real):
         raise argument_error(name, f"found {speeds!r}", "several, such as [20.0, 40.0]")
@@ -402,10 +379,8 @@ def _named(
     parameter: tuple[str, float] | None = None,
 ) -> Modes:
     c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
-    names = [
-        "" if np.isnan(value) else mode_name(parts, found, k)
-        for k, value in enumerate(found.eigenvalues)
-    ]
+    there = ~np.isnan(found.eigenvalues)
+    names = [mode_name(parts, found, k) if one else "" for k, one in enumerate(there)]
     listed = []
     for name, value, shape in zip(numbered(names), found.eigenvalues, found.shapes, strict=True):
         if np.isnan(value):

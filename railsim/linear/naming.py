@@ -43,10 +43,7 @@ BOGIE_NAMES = ("longitudinal", "lateral", "bounce", "roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class Parts:
-    """Which bodies are what.
-
-    `cars`, `frames`, `wheelsets`: body indices.
-    """
+    """Which bodies, by their indices, are what."""
 
     model: Model
     coordinates: Coordinates
@@ -93,13 +90,9 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
         cars = [b for b in rigid if bodies.mass[b] > 0.5 * heaviest]
         if len(cars) > 1 and len(cars) == len(rigid):
             cars = []  # bogies alone
-    return Parts(
-        model,
-        coordinates,
-        tuple(cars),
-        tuple(b for b in rigid if b not in cars),
-        tuple(int(b) for b in model.system.contact.body),
-    )
+    frames = tuple(b for b in rigid if b not in cars)
+    wheelsets = tuple(int(b) for b in model.system.contact.body)
+    return Parts(model, coordinates, tuple(cars), frames, wheelsets)
 
 
 def mode_name(parts: Parts, modes: Eigenmodes, k: int = 0) -> str:

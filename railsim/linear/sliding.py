@@ -101,10 +101,7 @@ class SlidingPath:
         self._grip = self.solver.grip(self.state)
 
     def to(self, goal: float) -> None:
-        """Go to another share of the load in one step, or in halves of it.
-
-        Raises NotConverged: says at which share; state and share are those reached.
-        """
+        """Go to another share of the load, in halves if need be; NotConverged: which is reached."""
         step = goal - self.share
         while self.share != goal:
             ahead = self.share + step

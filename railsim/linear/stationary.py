@@ -35,16 +35,12 @@ CLOSED = 1e-3  # ... to this part of the load
 
 @dataclass(frozen=True)
 class Standing:
-    """A vehicle that stands.
-
-    `state`: its state; `Q`, `Q0`: wheel loads, and those on straight level track [N]; `Y`: guiding
-    forces of rolling wheelsets [N].
-    """
+    """A vehicle that stands."""
 
     state: Floats
-    Q: Floats
-    Q0: Floats
-    Y: Floats | None = None
+    Q: Floats  # wheel loads [N]
+    Q0: Floats  # on straight level track [N]
+    Y: Floats | None = None  # guiding forces of rolling wheelsets [N]
 
     @property
     def unloading(self) -> float:
@@ -53,11 +49,7 @@ class Standing:
 
 
 def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = False) -> Standing:
-    """Return the vehicle standing on canted straight track.
-
-    `balance`: of the vehicle at `WALKING_PACE`; `track`: whose rails and friction count; `cant`:
-    [m]; `held`: hold the wheelsets across the track.
-    """
+    """Return the vehicle standing on canted straight track [m]; `held`: its wheelsets."""
     model, start = balance.model, placed(balance.state)
     system = model.system._replace(track=track_tables(circle(track, cant=cant)))
     solver = SteadyRolling(model, system, held=held)
@@ -67,25 +59,18 @@ def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = Fal
 
 
 def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -> float:
-    """Roll of a body against the track over the angle of cant (EN 15273, UIC 505).
-
-    `body`: full name of the body, such as ``carbody``.
-    """
+    """Roll of a body against the track over the angle of cant (EN 15273, UIC 505)."""
     roll = standing.state[model.index.coordinate(body, 3)]
     return float(roll / np.arcsin(cant / CANT_BASE))
 
 
 @dataclass(frozen=True)
 class TwistLoop:
-    """Wheel loads while a twist grows from level track, and goes to and fro until the loop closes.
+    """Wheel loads while a twist grows from level track, and goes to and fro until it closes."""
 
-    `share`: of the twist, from 1/n over 1 to -1 and back, as often as it takes [1]; `Q`: wheel
-    loads [N]; `Q0`: on straight level track [N].
-    """
-
-    share: Floats
-    Q: Floats
-    Q0: Floats
+    share: Floats  # of the twist, from 1/n over 1 to -1 and back, as often as it takes [1]
+    Q: Floats  # wheel loads [N]
+    Q0: Floats  # on straight level track [N]
 
     @property
     def unloading(self) -> Floats:

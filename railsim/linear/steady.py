@@ -43,8 +43,7 @@ class NotConverged(ModelError):
 class SteadyRolling:
     """Newton's method for one vehicle on one track of constant curvature and cant.
 
-    `model`: with preloads; `system`: the model on that track; `held`: whether the wheelsets stay
-    where the guess has them.
+    `held`: whether the wheelsets stay where the guess has them.
     """
 
     def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
@@ -77,10 +76,7 @@ class SteadyRolling:
         return state
 
     def evaluate(self, state: Floats) -> Floats:
-        """Derivative of a state, forces into `work`.
-
-        Raises NotConverged: the state lies outside the range of the model.
-        """
+        """Derivative of a state, forces into `work`; NotConverged: the state is out of range."""
         return np.asarray(self._evaluated(state[None])[0])
 
     def _evaluated(self, states: Floats) -> Floats:

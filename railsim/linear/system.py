@@ -14,16 +14,12 @@ from railsim.arrays import Floats, Integers
 
 @dataclass(frozen=True)
 class Linearisation:
-    """x' = A x about an equilibrium.
+    """x' = A x about an equilibrium."""
 
-    `names`: names of the coordinates; `matrix`: a = df/dx [1/s and mixed units]; `state`: where it
-    was formed; `parameter`: value of the parameter, mostly the speed [m/s].
-    """
-
-    names: tuple[str, ...]
-    matrix: Floats
-    state: Floats
-    parameter: float
+    names: tuple[str, ...]  # of the coordinates
+    matrix: Floats  # A = df/dx [1/s and mixed units]
+    state: Floats  # where it was formed
+    parameter: float  # mostly the speed [m/s]
 
 
 def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats) -> Floats:
@@ -32,8 +28,6 @@ def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats)
     `function`: of many states at once, float64[k, n] to float64[k, m]; `state`, `steps`: where, and
     with which steps.
 
-    Examples
-    --------
     >>> product = lambda rows: rows[:, :1] * rows[:, 1:]
     >>> jacobian(product, np.array([2.0, 3.0]), np.full(2, 1e-3))
     array([[3., 2.]])

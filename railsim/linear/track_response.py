@@ -21,6 +21,7 @@ of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belon
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.linalg import schur
@@ -33,6 +34,7 @@ from railsim.linear.circle import POSITION
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.system import jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
+from railsim.notation import SIDES
 from railsim.result.sensors import Sensor
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
@@ -50,31 +52,23 @@ TOGETHER = 4096  # wave numbers that are solved at once
 
 @dataclass(frozen=True)
 class TrackResponse:
-    """State space of a vehicle with track inputs at one speed.
+    """State space of a vehicle with track inputs u at one speed: y = C x + D u + R x'.
 
-    - `speed`: [m/s]
-    - `outputs`: readings, such as ``axlebox_1_left.z``; ``roll_rate`` instead of an axis; wheel
-      forces, such as ``Q.1.left``
-    - `offsets`: of the wheelsets from the reference body along the track [m]
-    - `A`, `C`: state matrix; output matrix apart from accelerations
-    - `B`, `D`: of the displacements of the rails, their slopes and curvatures
-    - `R`: outputs by the derivative of the state: y = C x + D u + R x'
-    - `rows`: where the accelerations of the wheelsets in y, z, roll, yaw stand in x'
-    - `own`: outputs by unknown accelerations of the wheelsets, beside R
-    - `steady`: outputs in steady rolling
+    The inputs are displacements of the rails, their slopes and curvatures.
     """
 
-    speed: float
+    speed: float  # [m/s]
+    # readings, such as ``axlebox_1_left.z``, ``floor.roll_rate``; forces, such as ``Q.1.left``
     outputs: tuple[str, ...]
-    offsets: Floats
+    offsets: Floats  # of the wheelsets from the reference body along the track [m]
     A: Floats
     B: Floats
-    C: Floats
+    C: Floats  # apart from accelerations
     D: Floats
     R: Floats
-    rows: Integers
-    own: Floats
-    steady: Floats
+    rows: Integers  # where the accelerations of the wheelsets in y, z, roll, yaw stand in x'
+    own: Floats  # outputs by unknown accelerations of the wheelsets, beside R
+    steady: Floats  # outputs in steady rolling
 
     def over(self, wave_numbers: Floats) -> Complexes:
         """Frequency response H over the angular wave number, complex128[k, output, input].
@@ -174,12 +168,8 @@ def track_response(
 
 def _of_wheelsets(count: int) -> list[str]:
     """Names of the outputs Q, Y, sum of Y and lateral displacement."""
-    names = [
-        f"{force}.{w + 1}.{side}"
-        for force in FORCES
-        for w in range(count)
-        for side in ("left", "right")
-    ]
+    wheels = product(FORCES, range(1, count + 1), SIDES)
+    names = [f"{force}.{number}.{side}" for force, number, side in wheels]
     return names + [f"{name}.{w + 1}" for name in ("sum_Y", "lateral") for w in range(count)]
 
 

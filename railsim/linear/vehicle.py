@@ -61,16 +61,11 @@ def conditions(track: Track, settings: Settings) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Contact:
-    """How the contact of wheel and rail is linearised.
+    """How the contact of wheel and rail is linearised."""
 
-    `linearisation`: the derivative at the steady state, or the first harmonic for an amplitude;
-    `amplitude`: of the harmonic linearisation [m]; `conicity`: wheels replaced by straight cones of
-    this slope [1].
-    """
-
-    linearisation: str = "tangent"
-    amplitude: float = AMPLITUDE
-    conicity: float | None = None
+    linearisation: str = "tangent"  # ``tangent`` in the steady state, or ``harmonic``
+    amplitude: float = AMPLITUDE  # of the harmonic linearisation [m]
+    conicity: float | None = None  # of straight cones instead of the wheels [1]
 
     def faults(self) -> Faults:
         """Return what is wrong with it."""
@@ -182,10 +177,7 @@ class LinearVehicle:
         return f"{shape}, rails {where['rails']}, friction {where['friction']}"
 
     def steady(self, speed: float) -> Floats:
-        """Return the state of steady rolling at a speed [m/s].
-
-        Raises ModelError: there is none.
-        """
+        """Return the state of steady rolling at a speed [m/s]; raises ModelError: there is none."""
         solver = SteadyRolling(self.model, self.system, held=self.held)
         if speed not in self._known and self._known:
             near = min(self._known, key=lambda v: abs(v - speed))
@@ -227,16 +219,12 @@ class LinearVehicle:
 
 def _check_hold(model: Model, hold: Sequence[str]) -> None:
     """Refuse to hold parts that are not bodies, or all bodies."""
-    rigid = [
-        name
-        for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)
-        if kind in (RIGID, FIXED)
-    ]
+    kinds = zip(model.index.bodies, model.system.bodies.kind, strict=True)
+    rigid = [name for name, kind in kinds if kind in (RIGID, FIXED)]
     wrong = [name for name in hold if name not in rigid]
     if wrong:
-        raise argument_error(
-            "hold", "no such body; `held` holds the wheelsets", ", ".join(rigid), key=wrong[0]
-        )
+        found = "no such body; `held` holds the wheelsets"
+        raise argument_error("hold", found, ", ".join(rigid), key=wrong[0])
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

@@ -30,8 +30,6 @@ def gas_spring_force(
     Source: makers' catalogues as collected by M. Merci (2017), ch. 3; the isothermal law is that of
     an ideal gas in a volume that the rod reduces linearly.
 
-    Examples
-    --------
     >>> round(float(gas_spring_force(0.05, 1.0, 1.3, 0.1, "isothermal")), 4)
     1.1304
     """
@@ -49,8 +47,6 @@ def gas_temperature_factor(temperature: Any) -> Any:
     0.36 % per degree as makers' catalogues print (Merci, 2017, ch. 3); an ideal gas in a fixed
     volume has (T + 273.15)/293.15, 0.34 % per degree.
 
-    Examples
-    --------
     >>> round(400.0 * gas_temperature_factor(-30.0), 6)
     328.0
     """
@@ -66,8 +62,6 @@ def lid_force(weight: float, D: float, b: float, n: float, alpha: float) -> floa
     Source: makers' catalogues (Merci, 2017); the springs should stand at about two thirds of the
     centre of gravity's distance.
 
-    Examples
-    --------
     >>> round(lid_force(20.0, 0.4, 0.15, 2.0, 1.1), 3)
     287.467
     """
@@ -77,8 +71,6 @@ def lid_force(weight: float, D: float, b: float, n: float, alpha: float) -> floa
 def next_size(sizes: list[float], wanted: float) -> float | None:
     """Smallest of the made sizes that is not below the wanted one; None where none is.
 
-    Examples
-    --------
     >>> next_size([0.032, 0.04, 0.05], 0.033)
     0.04
     """
@@ -88,8 +80,6 @@ def next_size(sizes: list[float], wanted: float) -> float | None:
 def table_value(rows: Floats, x: Any) -> Any:
     """Value of a table of rows (x, y), straight in between; NaN outside.
 
-    Examples
-    --------
     >>> float(table_value(np.array([[0.0, 50.0], [2.0, 20.0]]), 1.0))
     35.0
     """
@@ -132,8 +122,6 @@ class AirSpringTable:
     def pressure(self, height: Any, force: Any) -> Any:
         """Pressure that gives a force [Pa]; NaN outside the table.
 
-        Examples
-        --------
         >>> table = AirSpringTable(np.array([0.1, 0.2]), np.array([2e5, 4e5]),
         ...                        np.array([[100.0, 300.0], [200.0, 400.0]]))
         >>> float(table.pressure(0.15, 250.0)), float(table.force(0.15, 3e5))

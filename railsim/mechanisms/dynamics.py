@@ -26,8 +26,6 @@ def polynomial_345(duration: float, stroke: float) -> tuple[float, float, float]
 
     `h (10 u^3 - 15 u^4 + 6 u^5)`, u = t/T.
 
-    Examples
-    --------
     >>> [round(c, 6) for c in polynomial_345(2.0, 0.434)]
     [0.5425, -0.406875, 0.081375]
     """

@@ -118,10 +118,7 @@ def inertia(motion: Motion) -> tuple[Any, Any]:
 
 
 def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
-    """Push of an element between two points at every position [N].
-
-    Raises InputError: a gas spring beyond its stroke, a spring outside its table.
-    """
+    """Push of an element between two points [N]; raises InputError: beyond its stroke or table."""
     model = motion.model
     element, n = model.definition.elements[name], model.number
     length, slope, _ = motion.length(points_of(element))
@@ -145,10 +142,7 @@ def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
 def _spring_law(
     motion: Motion, name: str, spring: Spring | TorsionSpring, x: Any, free: Any, rates: Rates
 ) -> Any:
-    """Push or torque of a spring at a length or angle, linear or by its table.
-
-    Raises InputError: outside the table.
-    """
+    """Push or torque of a spring at a length or angle; raises InputError: outside its table."""
     model, n = motion.model, motion.model.number
     if spring.table is None:
         assert spring.stiffness is not None
@@ -358,10 +352,7 @@ def chamber_area(model: Model, cylinder: Cylinder, acts: str) -> Any:
 
 
 def applied(motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST) -> Any:
-    """Applied forces less inertia on every body, shape (position, 3 n_bodies).
-
-    `forces` are those of the actuators by name.
-    """
+    """Applied forces, those of the actuators by name, less inertia, (position, 3 n_bodies)."""
     model = motion.model
     actuators = model.definition.actuators
     loads: list[Load] = [*_loads(motion, rates)]

@@ -69,10 +69,7 @@ def _refined(
 
 
 def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
-    """All values of the driver at which a function of the motion goes through zero.
-
-    The function need not be smooth; where it is NaN there is nothing to find.
-    """
+    """All values of the driver at which a function of the motion, not always smooth, is zero."""
     known = np.asarray(function(motion))
     found = []
 

@@ -134,10 +134,7 @@ class Judge:
     def __call__(
         self, x: Floats, choice: dict[str, float], extra: Sequence[float] = ()
     ) -> Judgement:
-        """Judge values of the parameters.
-
-        Raises InputError: the links cannot be assembled over the whole travel.
-        """
+        """Judge values of the parameters; raises InputError: the links cannot be assembled."""
         moved = self.model(x, choice)
         model = moved.real()
         grid = self.grid(model, extra)
@@ -161,8 +158,7 @@ class Judge:
     ) -> dict[str, tuple[float, float]]:
         """Least margin of every constraint over the travel, and the share of the travel there.
 
-        `x`, `choice`: As when judging. `near`: Margin above which the least known value is not
-        refined.
+        Margins above `near` are not refined between the known positions.
         """
         model = self.real_model(x, choice)
         motion = solve(model, np.linspace(model.start, model.end, DENSE))

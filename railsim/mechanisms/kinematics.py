@@ -80,10 +80,7 @@ class Motion:
         return length, rate, (dot(d1, d1) + dot(d, d2) - rate * rate) / length
 
     def angle(self, name: str) -> Any:
-        """Angle of the first line less that of the second, plus the offset, from -pi to pi [rad].
-
-        Of shape (..., position), not folded.
-        """
+        """Angle of the first line less that of the second, plus offset, -pi to pi [rad]."""
         angle = self.model.definition.angles[name]
         lines = (self.point(second)[0] - self.point(first)[0] for first, second in angle.between)
         (a, b), (c, d) = (np.moveaxis(line, -1, 0) for line in lines)
@@ -99,8 +96,6 @@ def dot(a: Any, b: Any) -> Any:
 def folded(angle: Any) -> Any:
     """Angle between lines without direction, from 0 to pi/2 [rad].
 
-    Examples
-    --------
     >>> [round(float(np.degrees(folded(np.radians(x)))), 9) for x in (30.0, 140.0, -100.0, 200.0)]
     [30.0, 40.0, 80.0, 20.0]
     """
@@ -195,10 +190,7 @@ def driver_words(model: Model, value: float) -> str:
 
 
 def check_freedom(model: Model) -> None:
-    """Refuse joints that hold the same freedom twice at the start.
-
-    Raises InputError: the joints concerned, and the degrees of freedom that are left.
-    """
+    """Refuse, by InputError, joints that hold the same freedom twice at the start."""
     arcs = model.linkage.joint[:, 4].copy()
     lost: InputError | None = None
     try:

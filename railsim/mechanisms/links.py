@@ -12,10 +12,7 @@ from railsim.mechanisms.kinematics import Motion, dot
 
 @dataclass(frozen=True)
 class Course:
-    """Angle [rad] of a link or length [m] of an actuator at all positions, with two derivatives.
-
-    By the driver or, `in_time`, by time; all of shape (position,).
-    """
+    """Angle [rad] or length [m] at all positions with two derivatives by the driver or by time."""
 
     value: Any
     first: Any

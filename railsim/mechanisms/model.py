@@ -94,10 +94,7 @@ class Model:
 
 
 def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Model:
-    """Return the model of a mechanism; `changed` are values instead of the file's.
-
-    Raises InputError: an expression has no value with these parameters.
-    """
+    """Return the model with values `changed`; raises InputError: an expression has no value."""
     values = parameter_values(definition, changed)
     lanes = max((np.size(v) for v in values.values()), default=1)
     complex_values = any(np.iscomplexobj(v) for v in values.values())

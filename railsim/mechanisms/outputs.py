@@ -139,10 +139,7 @@ def check_pressure(motion: Motion, output: Mapping[str, Any]) -> None:
 
 
 def zone_drivers(dense: Motion) -> dict[str, float]:
-    """Values of the driver at the zone's heights; none without a zone.
-
-    Raises InputError: A height is never reached.
-    """
+    """Values of the driver at the zone's heights; raises InputError: one is never reached."""
     model = dense.model
     zone, output = model.definition.zone, model.definition.output
     if zone is None or output is None:

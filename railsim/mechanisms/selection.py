@@ -191,10 +191,7 @@ def F1_band(result: Analysis, row: CatalogueRow, F1: float) -> tuple[float, floa
 def _unknown_forces(
     result: Analysis, name: str, spring: GasSpring, temperature: float
 ) -> list[Any]:
-    """The unknown force at all positions with another gas spring, on the way and back.
-
-    All gas springs have the same temperature.
-    """
+    """The unknown force, way and back, with another gas spring; all have the same temperature."""
     definition = result.definition
     assert definition.solve is not None
     elements = {**definition.elements, name: spring}

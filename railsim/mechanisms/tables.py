@@ -83,10 +83,7 @@ def published_table(result: Analysis) -> Table:
 
 
 def selection_table(choices: Sequence[Choice]) -> Table:
-    """Return one row for each row of a catalogue, with the force that the mechanism then needs.
-
-    Neighbours that do not fit for the same reason share a row.
-    """
+    """Return a row for each row of a catalogue; neighbours that fail for one reason share one."""
     groups: list[list[Choice]] = []
     for choice in choices:
         same = bool(groups) and not choice.fits and not groups[-1][0].fits

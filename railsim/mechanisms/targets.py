@@ -40,10 +40,7 @@ class Positions:
 
 
 def reference_of(definition: Mechanism) -> Mechanism | None:
-    """The reference of a mechanism's optimisation, with the parameters that it shares.
-
-    Raises InputError: there is no such file, or it is wrong.
-    """
+    """The reference of an optimisation with the parameters that it shares; raises InputError."""
     optimise = definition.optimise
     if optimise is None or optimise.reference is None:
         return None

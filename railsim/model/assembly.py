@@ -58,16 +58,11 @@ _KINDS = {"body": RIGID, "wheelset": WHEELSET, "axlebox": AXLEBOX}
 
 @dataclass(frozen=True)
 class Index:
-    """Names of the model's parts in the order of the arrays.
+    """Names of the model's parts in the order of the arrays."""
 
-    `bodies`: all bodies: rigid ones, wheelsets from the leading end, axleboxes; `wheelsets`: names
-    of the wheelsets; `links`, `mounts`, `actuators`, `signals`, `controllers`: names of the rows of
-    these parts of the system.
-    """
-
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...]  # rigid ones, wheelsets from the leading end, axleboxes
     wheelsets: tuple[str, ...]
-    links: tuple[str, ...]
+    links: tuple[str, ...]  # rows of this part of the system; likewise all that follow
     mounts: tuple[str, ...]
     actuators: tuple[str, ...] = ()
     signals: tuple[str, ...] = ()
@@ -96,29 +91,19 @@ class Index:
 
 @dataclass(frozen=True)
 class Model:
-    """A vehicle on a track, ready for the kernels.
-
-    - `system`, `index`: arrays and names
-    - `flat`: the vehicle's parts with names and positions
-    - `tables`: contact tables in the order of `System.contact.values`
-    - `profiles`: profiles used, by name
-    - `design`: the vehicle in its design load, whose preloads these are, where a load case is in
-      force
-    - `wheels`: wheels that are not round, which `system` leaves out: see
-      `railsim.model.uneven_wheels`
-    - `check`: check rails, likewise
-    - `rails`: rails whose section changes, likewise
-    """
+    """A vehicle on a track, ready for the kernels."""
 
     system: System
     index: Index
-    flat: FlatVehicle
-    tables: tuple[ContactTable, ...]
-    profiles: Mapping[str, Profile]
+    flat: FlatVehicle  # the vehicle's parts with names and positions
+    tables: tuple[ContactTable, ...]  # in the order of `System.contact.values`
+    profiles: Mapping[str, Profile]  # used, by name
+    # in its design load, whose preloads these are, where a load case is in force
     design: "Model | None" = None
+    # not round, left out of `system`: see `railsim.model.uneven_wheels`
     wheels: UnevenWheels = ROUND
-    check: CheckRails = NONE
-    rails: RailRanges = PLAIN
+    check: CheckRails = NONE  # likewise
+    rails: RailRanges = PLAIN  # whose section changes, likewise
 
     @property
     def n_state(self) -> int:
@@ -234,35 +219,17 @@ def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> Non
 
 
 def support_arrays(definition: SupportDefinition, rail_base: float) -> Support:
-    """Arrays of the moving track model; the track's elastic parts as they follow from the file.
-
-    `rail_base`: distance of the rails, under which the pads stand on the sleeper [m].
-    """
+    """Arrays of the moving track model; `rail_base`: distance of the rails on the sleeper [m]."""
     values = definition.values
     variation = np.array(definition.variation or (), dtype=float).reshape(-1, 3)
     if values is None:
         return Support(0, 0, 0, np.zeros(SUPPORT_ROW), variation)
-    (k_y, c_y), (k_z, c_z) = values.pad_lateral, values.pad_vertical
-    ballast_y, ballast_z = values.ballast_lateral or (0.0, 0.0), values.ballast_vertical
-    k_side, c_side = ballast_z or (0.0, 0.0)
-    square = values.ballast_base**2
-    row = np.array(
-        [
-            values.rail_mass,
-            values.sleeper_mass,
-            values.sleeper_inertia,
-            k_y,
-            c_y,
-            k_z,
-            c_z,
-            *ballast_y,
-            2.0 * k_side,
-            2.0 * c_side,
-            2.0 * square * k_side,
-            2.0 * square * c_side,
-            0.5 * rail_base,
-        ]
-    )
+    masses = values.rail_mass, values.sleeper_mass, values.sleeper_inertia
+    across = values.ballast_lateral or (0.0, 0.0)
+    both = 2.0 * np.array(values.ballast_vertical or (0.0, 0.0))  # halves of the sleeper
+    pads = *values.pad_lateral, *values.pad_vertical
+    ballast = *across, *both, *(values.ballast_base**2 * both)
+    row = np.array([*masses, *pads, *ballast, 0.5 * rail_base])
     return Support(1, int(values.has_sleeper), int(values.massless), row, variation)
 
 
@@ -283,19 +250,14 @@ def _names(bodies: Sequence[FlatBody]) -> list[str]:
 def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     """Arrays of the bodies, and the arc length of each track frame from the reference body."""
     names = _names(flat.bodies)
-    origin = flat.body(flat.reference).position[0]
-    positions = [round(body.position[0] - origin, 9) for body in flat.bodies]
+    positions = [round(x, 9) for x in flat.along(flat.bodies)]
     offsets = sorted(set(positions))
-    kinds = np.array(
-        [FIXED if body.fixed else _KINDS[body.kind] for body in flat.bodies], dtype=np.int64
-    )
+    kinds = np.array([FIXED if b.fixed else _KINDS[b.kind] for b in flat.bodies], dtype=np.int64)
+    parents = [names.index(body.parent) if body.parent else -1 for body in flat.bodies]
     bodies = Bodies(
         kind=kinds,
         frame=np.array([offsets.index(position) for position in positions], dtype=np.int64),
-        parent=np.array(
-            [names.index(body.parent) if body.parent else -1 for body in flat.bodies],
-            dtype=np.int64,
-        ),
+        parent=np.array(parents, dtype=np.int64),
         row=aligned(np.array([_body_row(body) for body in flat.bodies])),
         whole=np.flatnonzero(kinds != AXLEBOX),
         axleboxes=np.flatnonzero(kinds == AXLEBOX),
@@ -308,14 +270,8 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
 def _body_row(body: FlatBody) -> tuple[float, ...]:
     inertia = (1.0, body.pitch_inertia, 1.0) if body.kind == "axlebox" else body.inertia
     radius = 0.5 * sum(body.wheelset.radius) if body.wheelset else 1.0
-    return (
-        max(body.mass, 1e-9),
-        *inertia,
-        body.position[1],
-        body.position[2],
-        radius,
-        float(body.wheelset is not None),
-    )
+    _, y, z = body.position
+    return max(body.mass, 1e-9), *inertia, y, z, radius, float(body.wheelset is not None)
 
 
 def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]:
@@ -324,10 +280,8 @@ def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]
     first = max(round(t.y0 / dy) for t in tables)
     last = min(round(t.y0 / dy) + t.values.shape[3] for t in tables)
     starts = [first - round(t.y0 / dy) for t in tables]
-    parts = [
-        t.values[..., start : start + last - first, :]
-        for t, start in zip(tables, starts, strict=True)
-    ]
+    each = zip(tables, starts, strict=True)
+    parts = [t.values[..., start : start + last - first, :] for t, start in each]
     return tables[starts.index(0)].y0, parts
 
 
@@ -341,11 +295,7 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
 
 
 class SharedTables:
-    """Tables of the track and of the contacts that several models on one track share.
-
-    `track`: once the first model is there; `contact`: contact tables by what they depend on beside
-    track and settings.
-    """
+    """Tables of a track, once it is known, and of contacts by what they depend on beside it."""
 
     def __init__(self) -> None:
         self.track: TrackTables | None = None
@@ -387,6 +337,13 @@ def _contact(
         return used[name]
 
     wheelsets = flat.of_kind("wheelset")
+    alike: dict[str, Any] = {
+        "gauge": track.gauge,
+        "inclination": track.inclination,
+        "G": settings.shear_modulus,
+        "nu": settings.poisson,
+        "normal": settings.normal_contact,
+    }
     keys: dict[tuple[Any, ...], int] = {}
     tables: list[ContactTable] = []
     which = np.zeros((len(wheelsets), 2), dtype=np.int64)
@@ -394,30 +351,16 @@ def _contact(
         wheelset = body.wheelset
         assert wheelset is not None
         for side in range(2):
-            key = (
-                wheelset.profile[side],
-                track.rail[side],
-                wheelset.radius[side],
-                -body.position[2],
-                wheelset.back_to_back,
-                wheelset.tape_circle_distance,
-            )
-            wheel = profile(wheelset.profile[side], "wheel")
-            rail = profile(track.rail[side], "rail")
-            table = shared.contact_table(
-                key,
-                wheel,
-                rail,
-                radius=wheelset.radius[side],
-                gauge=track.gauge,
-                inclination=track.inclination,
-                back_to_back=wheelset.back_to_back,
-                tape_circle_distance=wheelset.tape_circle_distance,
-                G=settings.shear_modulus,
-                nu=settings.poisson,
-                centre_height=-body.position[2],
-                normal=settings.normal_contact,
-            )
+            own = {
+                "radius": wheelset.radius[side],
+                "centre_height": -body.position[2],
+                "back_to_back": wheelset.back_to_back,
+                "tape_circle_distance": wheelset.tape_circle_distance,
+            }
+            of_wheel, of_rail = wheelset.profile[side], track.rail[side]
+            wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")
+            key = (of_wheel, of_rail, *own.values())
+            table = shared.contact_table(key, wheel, rail, **own, **alike)
             if key not in keys:
                 keys[key] = len(tables)
                 tables.append(table)

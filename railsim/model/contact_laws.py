@@ -16,12 +16,9 @@ from railsim.laws.binding import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
 def settings_creep_law(settings: Settings, track: Track) -> CreepLaw:
     """Creep law of the settings with the third body of the track."""
     if settings.adhesion_curve is not None and track.third_body != (1.0, 1.0):
-        raise input_error(
-            "track",
-            f"found {list(track.third_body)} together with settings.adhesion_curve",
-            "[1.0, 1.0]: a measured curve holds the third body",
-            key="third_body",
-        )
+        found = f"found {list(track.third_body)} together with settings.adhesion_curve"
+        allowed = "[1.0, 1.0]: a measured curve holds the third body"
+        raise input_error("track", found, allowed, key="third_body")
     return creep_law(
         settings.creep_law,
         settings.fastsim_grid,

@@ -22,19 +22,8 @@ from railsim.model.assembly import Model
 from railsim.model.element_arrays import LawBlocks
 from railsim.notation import COMPONENTS
 
-OF_BODY = dict(
-    zip(
-        BODY_SIGNALS,
-        (
-            kernel.POINT_POSITION,
-            kernel.POINT_VELOCITY,
-            kernel.POINT_ACCELERATION,
-            kernel.BODY_ANGLE,
-            kernel.BODY_RATE,
-        ),
-        strict=True,
-    )
-)
+OF_POINTS = kernel.POINT_POSITION, kernel.POINT_VELOCITY, kernel.POINT_ACCELERATION
+OF_BODY = dict(zip(BODY_SIGNALS, (*OF_POINTS, kernel.BODY_ANGLE, kernel.BODY_RATE), strict=True))
 OF_RUN = {
     "speed": kernel.OF_SPEED,
     "distance": kernel.OF_DISTANCE,

@@ -32,19 +32,7 @@ from railsim.definitions.elements.rows import (
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import input_error, nearest
-from railsim.kernels.actuators import (
-    ALONG,
-    AXLE,
-    BY_BRAKE,
-    BY_DAMPER,
-    BY_FORCE,
-    BY_LAW,
-    BY_POSITION,
-    LAW_TAKES,
-    LINE,
-    ROW_SIZE,
-    WHICH_SIZE,
-)
+from railsim.kernels import actuators as acts
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.commands import Actuators, Own
 from railsim.kernels.element_columns import (
@@ -62,9 +50,10 @@ from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
 
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}
 LAWS |= {"lag": LAG, "own": OWN}
-MODES = {"force": BY_FORCE, "damper": BY_DAMPER, "position": BY_POSITION, "law": BY_LAW}
-MODES["brake"] = BY_BRAKE
-ACTIONS = {"line": LINE, "axle": AXLE} | {axis: ALONG + k for k, axis in enumerate(AXES)}
+MODES = {"force": acts.BY_FORCE, "damper": acts.BY_DAMPER, "position": acts.BY_POSITION}
+MODES |= {"law": acts.BY_LAW, "brake": acts.BY_BRAKE}
+ACTIONS = {axis: acts.ALONG + k for k, axis in enumerate(AXES)}
+ACTIONS |= {"line": acts.LINE, "axle": acts.AXLE}
 SLOT = 2.5e-4
 """Commands on their way to an actuator may follow each other by so much [s]."""
 
@@ -76,8 +65,6 @@ def rotation_potential(stiffness: Sequence[float]) -> Triple:
 
     `stiffness`: k_x, k_y, k_z [N m/rad]. Returns: K_d [N m]; entries may be negative.
 
-    Examples
-    --------
     >>> rotation_potential((4.0, 2.0, 0.0))
     (-1.0, 1.0, 3.0)
     """
@@ -116,7 +103,7 @@ class LawBlocks:
             raise input_error("vehicle", found, allowed, key=f"elements.{name}.law")
         bound = bind(act.law, laws[act.law], FORCE_ELEMENT)
         values = bound.parameters(f"elements.{name}.parameters", act.parameters)
-        block = [0.0] * (1 + bound.states + LAW_TAKES + bound.states)
+        block = [0.0] * (1 + bound.states + acts.LAW_TAKES + bound.states)
         return self.law(bound), self.room([*block, *values]), bound.states
 
     def law(self, bound: Bound) -> int:
@@ -134,12 +121,9 @@ class LawBlocks:
 
 @dataclass
 class ElementArrays:
-    """Collects elements row by row until the arrays are made.
+    """Collects elements row by row until the arrays are made."""
 
-    `bodies`: all bodies by name, in the order of their indices.
-    """
-
-    bodies: Mapping[str, FlatBody]
+    bodies: Mapping[str, FlatBody]  # all, by name, in the order of their indices
     link_rows: list[dict[str, Any]] = field(default_factory=list)
     mount_rows: list[dict[str, Any]] = field(default_factory=list)
     load_rows: list[dict[str, Any]] = field(default_factory=list)
@@ -154,71 +138,60 @@ class ElementArrays:
         for row in element.definition.rows():
             match row:
                 case Link():
-                    self._add_link(element, row)
+                    self.link_rows.append(self._link(element, row))
                 case Mount():
-                    self._add_mount(element, row)
+                    self.mount_rows.append(self._mount(element, row))
                 case Load():
-                    self._add_load(element, row)
+                    self.load_rows.append(self._load(element, row))
                 case Drive():
-                    self._add_drive(element, row)
+                    self.drive_rows.append(self._drive(element, row))
                 case Act() if row.mode != "law" or self.own.laws is not None:
-                    self._add_act(element, row)
+                    self.act_rows.append(self._act(element, row))
 
-    def _add_link(self, element: FlatElement, link: Link) -> None:
+    def _link(self, element: FlatElement, link: Link) -> dict[str, Any]:
         point1, point2 = np.array(element.point1), np.array(element.point2)
         damper_curve = self._curve(link.damper_table)
-        self.link_rows.append(
-            {
-                "name": element.name,
-                "body": self._pair(element),
-                **self._levers(element, point1, point2),
-                "length": float(np.linalg.norm(point2 - point1)),
-                "stiffness": link.stiffness,
-                "damping": link.damping,
-                "preload": link.preload,
-                "internal": self._state(link.state),
-                "curve": (self._curve(link.spring_table), damper_curve),
-            }
-        )
+        return {
+            "name": element.name,
+            "body": self._pair(element),
+            **self._levers(element, point1, point2),
+            "length": float(np.linalg.norm(point2 - point1)),
+            "stiffness": link.stiffness,
+            "damping": link.damping,
+            "preload": link.preload,
+            "internal": self._state(link.state),
+            "curve": (self._curve(link.spring_table), damper_curve),
+        }
 
-    def _add_mount(self, element: FlatElement, mount: Mount) -> None:
+    def _mount(self, element: FlatElement, mount: Mount) -> dict[str, Any]:
         point1, point2 = np.array(element.point1), np.array(element.point2)
         point = 0.5 * (point1 + point2) if mount.both_ends else point2
         rotates = any(mount.rotation) or any(mount.rotation_damping)
         friction = ONE_SIDED if mount.one_sided else int(mount.friction is not None)
         limits = mount.friction or (FrictionLimit(),) * 3
-        self.mount_rows.append(
-            {
-                "name": element.name,
-                "body": self._pair(element),
-                **self._levers(element, point, point),
-                "share": (0.5, 0.5) if mount.both_ends else (float(mount.translates), 0.0),
-                "stiffness": mount.stiffness,
-                "damping": mount.damping,
-                "preload": mount.preload,
-                "rotation": rotation_potential(mount.rotation),
-                "rotation_damping": mount.rotation_damping,
-                "friction": [(f.force, f.coefficient, f.ratio, f.speed) for f in limits],
-                "internal": [self._state(state) for state in mount.states],
-                "curve": [self._curve(table) for table in mount.tables],
-                "flags": (mount.translates, mount.both_ends, rotates, friction),
-            }
-        )
+        return {
+            "name": element.name,
+            "body": self._pair(element),
+            **self._levers(element, point, point),
+            "share": (0.5, 0.5) if mount.both_ends else (float(mount.translates), 0.0),
+            "stiffness": mount.stiffness,
+            "damping": mount.damping,
+            "preload": mount.preload,
+            "rotation": rotation_potential(mount.rotation),
+            "rotation_damping": mount.rotation_damping,
+            "friction": [(f.force, f.coefficient, f.ratio, f.speed) for f in limits],
+            "internal": [self._state(state) for state in mount.states],
+            "curve": [self._curve(table) for table in mount.tables],
+            "flags": (mount.translates, mount.both_ends, rotates, friction),
+        }
 
-    def _add_drive(self, element: FlatElement, drive: Drive) -> None:
-        begin, end = drive.slip_control or (0.0, 0.0)
-        self.drive_rows.append(
-            {
-                "body": self._pair(element),
-                "row": (drive.brakes, drive.over_distance, begin, end),
-                "tables": (
-                    np.array(drive.torque_table, dtype=float),
-                    np.array(drive.demand_table or (), dtype=float).reshape(-1, 2),
-                ),
-            }
-        )
+    def _drive(self, element: FlatElement, drive: Drive) -> dict[str, Any]:
+        torque = np.array(drive.torque_table, dtype=float)
+        demand = np.array(drive.demand_table or (), dtype=float).reshape(-1, 2)
+        row = drive.brakes, drive.over_distance, *(drive.slip_control or (0.0, 0.0))
+        return {"body": self._pair(element), "row": row, "tables": (torque, demand)}
 
-    def _add_act(self, element: FlatElement, act: Act) -> None:
+    def _act(self, element: FlatElement, act: Act) -> dict[str, Any]:
         point1, point2 = np.array(element.point1), np.array(element.point2)
         line = act.action == "line"
         levers = self._levers(element, point1 if line else point2, point2)
@@ -231,37 +204,25 @@ class ElementArrays:
         first = len(self.internal_rows)
         for _ in range(states):
             self._state(State("own", NOTHING))
+        of_command = ACTIONS[act.action], MODES[act.mode], lagging, command, queue, slots
+        length = float(np.linalg.norm(point2 - point1))
         limits = (act.force_limit, act.power_limit, act.stroke)
-        self.act_rows.append(
-            {
-                "name": element.name,
-                "body": self._pair(element),
-                "which": (
-                    *(ACTIONS[act.action], MODES[act.mode], lagging, command, queue, slots),
-                    *(law, block, first, states),
-                ),
-                "row": (
-                    *levers["point_1"],
-                    *levers["point_2"],
-                    float(np.linalg.norm(point2 - point1)),
-                    act.sense,
-                    *(np.inf if limit is None else limit for limit in limits),
-                    act.stiffness,
-                    act.damping,
-                    act.delay,
-                ),
-            }
-        )
+        most = (np.inf if limit is None else limit for limit in limits)
+        where = *levers["point_1"], *levers["point_2"], length, act.sense
+        return {
+            "name": element.name,
+            "body": self._pair(element),
+            "which": (*of_command, law, block, first, states),
+            "row": (*where, *most, act.stiffness, act.damping, act.delay),
+        }
 
-    def _add_load(self, element: FlatElement, load: Load) -> None:
-        self.load_rows.append(
-            {
-                "body": self._number(element.body1),
-                "point": np.array(element.point1) - self._centre(element.body1),
-                "flags": (load.is_torque, load.track_axes, load.over_distance),
-                "table": np.array(load.table, dtype=float),
-            }
-        )
+    def _load(self, element: FlatElement, load: Load) -> dict[str, Any]:
+        return {
+            "body": self._number(element.body1),
+            "point": np.array(element.point1) - self._centre(element.body1),
+            "flags": (load.is_torque, load.track_axes, load.over_distance),
+            "table": np.array(load.table, dtype=float),
+        }
 
     def _number(self, name: str) -> int:
         return list(self.bodies).index(name)
@@ -329,8 +290,8 @@ class ElementArrays:
                 **_columns(self.drive_rows, float, row=(4,)),
             ),
             "actuators": Actuators(
-                **_columns(self.act_rows, np.int64, body=(2,), which=(WHICH_SIZE,)),
-                **_columns(self.act_rows, float, row=(ROW_SIZE,)),
+                **_columns(self.act_rows, np.int64, body=(2,), which=(acts.WHICH_SIZE,)),
+                **_columns(self.act_rows, float, row=(acts.ROW_SIZE,)),
             ),
             "own": self.own.own(),
         }

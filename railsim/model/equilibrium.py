@@ -55,18 +55,13 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """The vehicle at rest and in steady rolling on straight level track.
+    """The vehicle at rest and in steady rolling on straight level track."""
 
-    `model`: the model with all preloads filled in; `state`: steady rolling at s = 0; `Q0`: static
-    wheel loads [N]; `residual`: largest remaining acceleration [m/s2, rad/s2]; `remarks`: remarks
-    for the reader of results.
-    """
-
-    model: Model
-    state: Floats
-    Q0: Floats
-    residual: float
-    remarks: tuple[str, ...] = ()
+    model: Model  # with all preloads filled in
+    state: Floats  # steady rolling at s = 0
+    Q0: Floats  # static wheel loads [N]
+    residual: float  # largest remaining acceleration [m/s2, rad/s2]
+    remarks: tuple[str, ...] = ()  # for the reader of results
 
 
 class AtRest(NamedTuple):
@@ -120,10 +115,7 @@ def _at_rest(model: Model) -> AtRest:
 
 
 def stored_equilibrium(model: Model, speed: float, inputs: str) -> Equilibrium:
-    """As `equilibrium`, from the disk where it was found before.
-
-    `inputs`: hash of all that the model was made of, but for the friction of its track.
-    """
+    """As `equilibrium`, from the disk where it was found before; `inputs` as there."""
     friction = model.system.track.rail[:, MU_LEFT : MU_LEFT + 2, 0]
     digest = hashlib.sha256(f"{inputs} {speed!r} {model.system.contact.values.shape}".encode())
     digest.update(np.ascontiguousarray(friction).data)
@@ -164,11 +156,8 @@ def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:
         level = level_track(released.system)
         balance = _Balance(released, level, speed=1.0, rolling=False)
         guess = balance.solve(_first_guess(released, level))
-        return (
-            replace(released, system=released.system._replace(bodies=model.system.bodies)),
-            guess,
-            (),
-        )
+        system = released.system._replace(bodies=model.system.bodies)
+        return replace(released, system=system), guess, ()
     except ModelError:
         model = with_preloads(model)
         names = ", ".join(model.index.bodies[b] for b in fixed)
@@ -319,7 +308,8 @@ class _Balance:
             self.residual = float(np.max(np.abs(rest)))
             if self.residual < RESIDUAL:
                 break
-            change = least_squares(self._jacobian(state, rest), -rest, 1e-13)
+            jacobian = difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
+            change = least_squares(jacobian, -rest, 1e-13)
             state, rest, shorter = self._line_search(state, rest, change, 2)
             if not shorter:
                 state, rest, shorter = self._over_kinks(state, rest, change)
@@ -377,9 +367,6 @@ class _Balance:
         if status != RUNNING:
             raise ModelError(f"no static equilibrium: {self.model.index.sentence(status, where)}")
         return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
-
-    def _jacobian(self, state: Floats, rest: Floats) -> Floats:
-        return difference_quotients(self._accelerations, state, rest, self._unknowns, 1e-9)
 
     def _line_search(
         self, state: Floats, rest: Floats, change: Floats, trials: int

@@ -16,7 +16,7 @@ from railsim.definitions.elements.base import FreeLength
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
-from railsim.errors import ModelError
+from railsim.errors import ModelError, listed
 
 if TYPE_CHECKING:
     from railsim.model.assembly import Model
@@ -54,8 +54,6 @@ def vehicle_remarks(
     `balanced`: its model with preloads, where there is one; `supports`: whether the weight on each
     support is computed too; it needs the compiler's import.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_vehicle
     >>> coach = load_vehicle("coach_manchester", ["bodies.carbody.inertia.0=4e7"])
     >>> print(vehicle_remarks(coach)[0])
@@ -70,9 +68,7 @@ def vehicle_remarks(
 
 def gathered(what: str, names: Sequence[str]) -> Remark:
     """Return one remark for several parts with the same finding, the first ones by name."""
-    first = ", ".join(names[:3])
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return Remark(first + more, what)
+    return Remark(listed(names), what)
 
 
 def _below_the_rails(flat: FlatVehicle) -> Iterator[Remark]:

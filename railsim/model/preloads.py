@@ -49,18 +49,11 @@ def _key(model: Model) -> bytes:
     """Hash of all that the preloads of a model follow from."""
     system, index = model.system, model.index
     bodies, links, mounts = system.bodies, system.links, system.mounts
-    facts = [
-        (
-            element.name,
-            element.body1,
-            element.body2,
-            element.definition.given_preload,
-            element.definition.vertical_stiffness,
-            element.definition.has_free_length,
-            element.definition.has_levelling,
-        )
-        for element in model.flat.elements
-    ]
+    facts = []
+    for e in model.flat.elements:
+        law = e.definition
+        preload = law.given_preload, law.vertical_stiffness, law.has_free_length
+        facts.append((e.name, e.body1, e.body2, *preload, law.has_levelling))
     names = index.bodies, index.links, index.mounts
     digest = hashlib.sha256(repr((names, facts, system.gravity)).encode())
     for array in (*bodies, system.frame_offset, links.body, links.row, mounts.body, mounts.row):
@@ -75,9 +68,8 @@ def _solved(model: Model) -> Model:
     """Solve every `auto` preload, see `with_preloads`."""
     if model.design is not None:
         design = with_preloads(model.design).system
-        return _levelled(
-            with_these_preloads(model, design.links.spring[:, 2], design.mounts.preload)
-        )
+        preloads = design.links.spring[:, 2], design.mounts.preload
+        return _levelled(with_these_preloads(model, *preloads))
     conditions = _conditions(model.system)
     # springs carry the weight of a fixed body where they can
     weights = [(int(body), 2) for body in model.system.bodies.fixed]
@@ -94,18 +86,11 @@ def _solved(model: Model) -> Model:
 
 
 def _with_pressing_wedges(model: Model) -> Model:
-    """Return the model; a wedge that would have to pull stands the wrong way round.
-
-    Raises ModelError: names the wedges.
-    """
+    """Return the model; raises ModelError: wedges would have to pull, the wrong way round."""
     force = dict(zip(model.index.mounts, model.system.mounts.preload[:, 2], strict=True))
-    wrong = [
-        element.name
-        for element in model.flat.elements
-        if element.definition.MUST_PRESS
-        and force[element.name] < (1.0 if element.definition.preload_is_free else 0.0)
-    ]
-    if wrong:
+    wedges = [e for e in model.flat.elements if e.definition.MUST_PRESS]
+    least = {e.name: 1.0 if e.definition.preload_is_free else 0.0 for e in wedges}
+    if wrong := [name for name, needed in least.items() if force[name] < needed]:
         raise ModelError(
             "wedges press and never pull, these would have to pull in the nominal position: "
             + ", ".join(wrong)
@@ -189,7 +174,8 @@ def _with_solved_preloads(
     What only presses does not pull: it carries nothing, and the others are solved without it.
     """
     system, support = model.system, dict(support)
-    loads = np.array([_load(system, body, component) for body, component in conditions])
+    weights = system.bodies.mass * system.gravity
+    loads = np.array([weights[body] if axis == 2 else 0.0 for body, axis in conditions])
     unit_links, unit_mounts = _copies(system)
     unit_links.spring[:, 2] = 1.0
     unit_mounts.preload[:] = 0.0, 0.0, 1.0
@@ -249,10 +235,8 @@ def _with_forces(system: System, forces: Floats) -> System:
 
 def _copies(system: System) -> tuple[Links, Mounts]:
     """Links and mounts whose preloads may be changed."""
-    return (
-        system.links._replace(row=aligned(system.links.row)),
-        system.mounts._replace(row=aligned(system.mounts.row)),
-    )
+    links, mounts = system.links, system.mounts
+    return links._replace(row=aligned(links.row)), mounts._replace(row=aligned(mounts.row))
 
 
 def with_these_preloads(model: Model, tension: Floats, preload: Floats) -> Model:
@@ -276,11 +260,11 @@ def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[int, fl
 
     With `known_lengths` also those whose preload follows from their lengths.
     """
+    laws = {element.name: element.definition for element in model.flat.elements}
     auto = {
-        element.name: element.definition.vertical_stiffness
-        for element in model.flat.elements
-        if element.definition.preload_is_free
-        or (known_lengths and element.definition.has_free_length)
+        name: law.vertical_stiffness
+        for name, law in laws.items()
+        if law.preload_is_free or (known_lengths and law.has_free_length)
     }
     return {k: auto[name] for k, name in enumerate(_names(model)) if auto.get(name, 0.0) > 0.0}
 
@@ -294,11 +278,6 @@ def _conditions(system: System) -> list[tuple[int, int]]:
         elif kind == AXLEBOX:
             rows.append((body, 4))
     return rows
-
-
-def _load(system: System, body: int, component: int) -> float:
-    weight = system.bodies.mass[body] * system.gravity
-    return float(weight) if component == 2 else 0.0
 
 
 def _preload_forces(

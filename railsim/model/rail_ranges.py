@@ -23,15 +23,12 @@ from railsim.profiles.profile import Profile
 
 @dataclass(frozen=True, eq=False)
 class RailRanges:
-    """Ranges of a track over which the section of a rail changes.
+    """Ranges of a track over which the section of a rail changes."""
 
-    `tables`: one for each range and kind of wheel, see `railsim.contact.section_tables`; `which`:
-    which of them serves each wheel on each range, else -1; `ends`: begin and end of the ranges [m].
-    """
-
+    # by range and kind of wheel, see `railsim.contact.section_tables`
     tables: tuple[ContactTable, ...]
-    which: Integers
-    ends: Floats
+    which: Integers  # of them serves each wheel on each range, else -1
+    ends: Floats  # begin and end of the ranges [m]
 
     @cached_property
     def arrays(self) -> RailTables:

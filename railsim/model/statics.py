@@ -116,14 +116,12 @@ class StaticLoads:
 
     def record(self) -> dict[str, Any]:
         """Return the loads as plain numbers, SI."""
+        tables = ("heights", "springs", "stops", "masses")
         return {
             "load": self.load,
             "Q0": dict(zip(self.wheelsets, self.Q0.tolist(), strict=True)),
             "preload": {name: value.tolist() for name, value in self.preload.items()},
-            "heights": self.heights.records(),
-            "springs": self.springs.records(),
-            "stops": self.stops.records(),
-            "masses": self.masses.records(),
+            **{name: getattr(self, name).records() for name in tables},
         }
 
     def __repr__(self) -> str:

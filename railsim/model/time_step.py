@@ -154,10 +154,7 @@ class Stability:
         return min(most, usual)
 
     def choose(self, interval: float) -> float:
-        """Longest stable step that divides the output interval, with the margin.
-
-        Raises ModelError: no step longer than `SHORTEST_STEP` is stable.
-        """
+        """Longest stable step that divides the output interval, with the margin; or ModelError."""
         n = max(1, int(np.ceil(interval / self.longest * (1.0 - 1e-9))))
         while interval / n >= SHORTEST_STEP:
             if self.holds(interval / n, MARGIN):

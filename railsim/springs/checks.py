@@ -30,8 +30,6 @@ def solid_height(n_t: Values, d: Values) -> Values:
 
     Source: EN 13906-1:2013, solid length.
 
-    Examples
-    --------
     >>> round(solid_height(total_coils(3.6), 0.041), 6)
     0.205
     """
@@ -87,8 +85,6 @@ def goodman_limit(goodman: Table, tau_min: Values) -> Values:
 
     Straight in between; beyond the corners the first and last upper stress.
 
-    Examples
-    --------
     >>> line = [(0.0, 430e6), (390e6, 690e6), (690e6, 690e6)]
     >>> float(goodman_limit(line, 195e6)) / 1e6
     560.0
@@ -102,10 +98,7 @@ def allowable_stress(table: Table, d: Values) -> Values:
 
 
 def mass(d: Values, D: Values, n_t: Values, density: float) -> Values:
-    """Mass of a spring, `rho pi d^2/4 * pi D n_t` [kg].
-
-    The helix angle (about 1 % more) and the ground-off ends (less) are left out.
-    """
+    """Mass of a spring, `rho pi d^2/4 * pi D n_t` [kg], but for its helix and its ground ends."""
     return density * 0.25 * np.pi * d**2 * (np.pi * D * n_t)
 
 
@@ -116,8 +109,6 @@ def surge_frequency(d: Values, D: Values, n: Values, G: Values, density: Values)
     its active coils; EN 13906-1:2013 prints it as `3560 d/(n D^2) sqrt(G/rho)` in mm, N/mm^2 and
     kg/dm^3.
 
-    Examples
-    --------
     >>> round(float(surge_frequency(0.041, 0.230, 3.6, 78.5e9, 7850.0)), 1)
     76.6
     """

@@ -132,10 +132,7 @@ def design(suspension: TrailingArmSuspension) -> Design:
 
 
 def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
-    """Return the wanted deflections, and the arm with springs at their mounting deflection.
-
-    Raises InputError: No target, no inner spring, or deflections that springs or arm cannot reach.
-    """
+    """Return the wanted deflections, and the arm under the mounting load; raises InputError."""
     target, mounting, inner = suspension.target, suspension.mounting, suspension.inner
     if target is None or inner is None:
         needed = {"target": "needed: load and deflection"} if target is None else {}

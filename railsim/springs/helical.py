@@ -37,8 +37,6 @@ def vertical_stiffness(G: Values, d: Values, D: Values, n: Values) -> Values:
 
     Source: EN 13906-1:2013, spring rate R.
 
-    Examples
-    --------
     >>> round(vertical_stiffness(78.48e9, 0.041, 0.230, 3.6))
     632876
     """
@@ -48,8 +46,6 @@ def vertical_stiffness(G: Values, d: Values, D: Values, n: Values) -> Values:
 def active_coils(G: Values, d: Values, D: Values, K_V: Values) -> Values:
     """Number of active coils that gives the vertical stiffness `K_V`, `n = G d^4 / (8 K_V D^3)`.
 
-    Examples
-    --------
     >>> round(active_coils(78.48e9, 0.041, 0.230, 632875.4), 3)
     3.6
     """
@@ -83,8 +79,6 @@ def beam_stiffnesses(
     Source: Krettek and Sobczak, as quoted by Grossi (2025), ch. 2; C_q is the same as EN 13906-1's
     transverse spring rate R_Q.
 
-    Examples
-    --------
     >>> [round(float(C)) for C in beam_stiffnesses(632875.4, 0.230, 0.338, 0.0734697, 0.3125)]
     [676538, 23250]
     """
@@ -122,8 +116,6 @@ def lateral_and_tilting(
 def lateral_stiffness(K_V: Values, D: Values, H0: Values, dz: Values, nu: Values) -> Values:
     """Lateral stiffness of a helical spring under load, `K_L = a1 C_q` [N/m].
 
-    Examples
-    --------
     The outer and the inner spring of the reference nest at the mounting load:
 
     >>> outer = lateral_stiffness(632875.4, 0.230, 0.338, 0.0734697, 0.3125)
@@ -166,8 +158,6 @@ def buckling_deflection(H0: Values, D: Values, nu: Values, seating: Values = 1.0
     free.  For 1 this is exactly where `C_q` of `beam_stiffnesses` vanishes.
     Source: EN 13906-1:2013, buckling.
 
-    Examples
-    --------
     >>> float(buckling_deflection(0.338, 0.142, 0.3125))
     inf
     >>> round(float(buckling_deflection(0.600, 0.142, 0.3125)), 4)

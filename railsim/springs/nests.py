@@ -67,10 +67,7 @@ class Evaluation:
 
 
 def task_of(suspension: TrailingArmSuspension) -> Task:
-    """Collect what stays fixed during a search.
-
-    Raises InputError: a table that the search needs is missing.
-    """
+    """Collect what stays fixed during a search; raises InputError: a table that it needs lacks."""
     limits, target, inner = suspension.search, suspension.target, suspension.inner
     missing = [name for name in ("search", "target", "inner") if getattr(suspension, name) is None]
     if limits is not None and limits.objective == "fatigue" and suspension.fatigue is None:
@@ -120,9 +117,8 @@ def evaluate(task: Task, x: Dimensions, n: Floats | None = None) -> Evaluation:
     if as_built:
         at_target = trailing_arm.rotation(arm, wanted.target_load)
         deflection = trailing_arm.coil_state(arm, arm.coils[0], at_target).deflection
-        errors = np.stack(
-            [start - wanted.mounting_deflection, deflection - wanted.target_deflection]
-        )
+        apart = start - wanted.mounting_deflection, deflection - wanted.target_deflection
+        errors = np.stack(apart)
     # the same arms with a last axis for the loads
     coils = (Coil(*(np.expand_dims(v, -1) for v in vars(coil).values())) for coil in arm.coils)
     arm = replace(arm, coils=tuple(coils))

@@ -96,16 +96,16 @@ class SearchResult:
 def search(suspension: TrailingArmSuspension) -> SearchResult:
     """Search the feasible nests of a suspension file.
 
-    Raises
-    ------
-    InputError : a table that the search needs is missing, or no nest keeps all limits: which
-        limits stand in the way, and how to loosen them.
+    Raises InputError: a table that the search needs is missing, or no nest keeps all limits: which
+    limits stand in the way, and how to loosen them.
     """
     task = many.task_of(suspension)
     sample = candidates(task.limits, task.wires)
     found = evaluate(task, sample)
     feasible = found.feasible
-    optima = _optima(task, sample, found)
+    leaders, merit = _leaders(task, sample, _merit(task, found))
+    best = np.argsort(merit, kind="stable")[: task.limits.results + _SPARE]
+    optima = [_optimum(task, leaders, int(i)) for i in best]
     nests = [nest for optimum in optima if (nest := _built(task, optimum)) is not None]
     by_mass = task.limits.objective == "mass"
     nests.sort(key=lambda nest: nest.mass if by_mass else -nest.fatigue_margin)
@@ -160,13 +160,6 @@ class _Optimum:
     def active(self) -> tuple[str, ...]:
         """Limits that hold it in place."""
         return tuple(name for name, value in self.slack.items() if value < ACTIVE)
-
-
-def _optima(task: Task, sample: Dimensions, found: Evaluation) -> list[_Optimum]:
-    """Optima of the most promising pairs of wires."""
-    leaders, merit = _leaders(task, sample, _merit(task, found))
-    best = np.argsort(merit, kind="stable")[: task.limits.results + _SPARE]
-    return [_optimum(task, leaders, int(i)) for i in best]
 
 
 def _merit(task: Task, found: Evaluation) -> Floats:

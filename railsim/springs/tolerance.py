@@ -40,9 +40,7 @@ class RideHeight:
 def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
     """Scatter of the ride height under every load of a suspension file.
 
-    Raises
-    ------
-    InputError : no table `[tolerances]`, or a load that the nominal nest cannot carry.
+    Raises InputError: no table `[tolerances]`, or a load that the nominal nest cannot carry.
     """
     limits = deviations(suspension)
     frame, cases = load_cases(suspension, suspension.loads)

@@ -44,8 +44,6 @@ class VehiclePart:
 def axlebox_load(vehicle: FlatVehicle) -> float:
     """Return the static load of an axlebox, all bodies but the wheelsets shared by all of them [N].
 
-    Examples
-    --------
     >>> from railsim.definitions.vehicle.flatten import flatten
     >>> from railsim.definitions.loading import load_vehicle
     >>> round(axlebox_load(flatten(load_vehicle("coach_manchester"))))
@@ -60,9 +58,7 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
 
     The springs are taken at a named load, by default that of the table `[vehicle]`.
 
-    Raises
-    ------
-    InputError : no table `[vehicle]`, or a load that the nest cannot carry.
+    Raises InputError: no table `[vehicle]`, or a load that the nest cannot carry.
     """
     table = suspension.vehicle
     if table is None:
@@ -73,7 +69,12 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
     _, (case,) = load_cases(suspension, {name: suspension.loads[name]})
     nest, remarks = _nest(suspension, table, case)
     elements = {"arm_bush": _bush(suspension, table, case), "coil_nest": nest}
-    return VehiclePart(table.assembly, {"arm": _axlebox(table)}, elements, case, remarks)
+    axlebox = {
+        "wheelset": table.wheelset,
+        "position": _rounded([0.0, table.lateral_position, -table.wheel_radius]),
+        "pitch_inertia": table.pitch_inertia, "sides": "both",
+    }  # fmt: skip
+    return VehiclePart(table.assembly, {"arm": axlebox}, elements, case, remarks)
 
 
 def vehicle_text(
@@ -84,8 +85,7 @@ def vehicle_text(
 ) -> str:
     """Return the text of a vehicle file that replaces the primary suspension of another one.
 
-    The vehicle file that it extends, and the parts of it to remove, are by default those of the
-    table `[vehicle]`.
+    File and parts to remove are by default those of the table `[vehicle]`.
     """
     table = suspension.vehicle
     if table is None:
@@ -110,12 +110,6 @@ def vehicle_text(
     notes = "".join(f"# {remark}\n" for remark in part.remarks)
     text: str = tomli_w.dumps(head) + "\n" + tomli_w.dumps(tables)
     return heading + notes + _INNERMOST_ARRAY.sub(_on_one_line, text)
-
-
-def _axlebox(table: VehicleTable) -> dict[str, Any]:
-    position = _rounded([0.0, table.lateral_position, -table.wheel_radius])
-    return {"wheelset": table.wheelset, "position": position,
-                    "pitch_inertia": table.pitch_inertia, "sides": "both"}  # fmt: skip
 
 
 def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) -> dict[str, Any]:

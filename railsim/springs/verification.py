@@ -92,11 +92,7 @@ def solid_heights(suspension: TrailingArmSuspension) -> dict[str, float]:
 
 
 def mounted(suspension: TrailingArmSuspension) -> Arm:
-    """Return the arm with the file's springs, horizontal under the mounting load.
-
-    Raises InputError: A wire diameter or a number of coils is missing, or a spring is solid
-    unloaded.
-    """
+    """Return the arm with the file's springs, horizontal under the mounting load; or InputError."""
     needed = {"wire_diameter": "the wire diameter [m]"}
     needed["active_coils"] = "the number of active coils; see design"
     faults = Faults()
@@ -126,11 +122,7 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
 def load_cases(
     suspension: TrailingArmSuspension, loads: Mapping[str, float], key: str = "loads"
 ) -> tuple[Arm, tuple[Case, ...]]:
-    """Return the mounted arm and its state under each of some loads [N].
-
-    Raises InputError: The nest cannot carry a load; `key` is the table of the file that gives
-    them.
-    """
+    """Return the mounted arm and its state under loads [N] of the table `key`; or InputError."""
     frame = mounted(suspension)
     rotations = trailing_arm.rotation(frame, np.array(list(loads.values()))).tolist()
     cases = []
@@ -155,13 +147,8 @@ def load_cases(
 def verify(suspension: TrailingArmSuspension) -> Verification:
     """Verify a suspension under all its loads.
 
-    Raises
-    ------
-    InputError
-        A wire diameter or number of coils is missing, or a load cannot be carried.
+    Raises InputError: A wire diameter or number of coils is missing, or a load cannot be carried.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_spring
     >>> result = verify(load_spring("turasas_axlebox"))
     >>> {case.name: round(case.K_sys / 9810, 3) for case in result.cases}["T.I."]
@@ -174,13 +161,8 @@ def verify(suspension: TrailingArmSuspension) -> Verification:
 def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     """Fatigue of each spring between the lowest and the highest dynamic load.
 
-    Raises
-    ------
-    InputError
-        No table `[fatigue]`, or a dynamic load that cannot be carried.
+    Raises InputError: no table `[fatigue]`, or a dynamic load that cannot be carried.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_spring
     >>> margins = fatigue(load_spring("turasas_axlebox"))
     >>> round(margins["outer"].margin, 3)

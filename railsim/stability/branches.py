@@ -24,18 +24,13 @@ COLUMNS = ("speed", "amplitude", "frequency", "sum_Y_rms", "stable")
 
 @dataclass(frozen=True)
 class Point:
-    """One motion of a branch.
+    """One motion of a branch."""
 
-    `speed`, `amplitude`, `frequency`: [m/s], lateral of the wheelset that moves most [m], [Hz];
-    `sum_Y_rms`: largest rms of a wheelset's lateral force [N]; `stable`: whether a run stays at it;
-    `state`: at the end of the run that found it; empty of other methods.
-    """
-
-    speed: float
-    amplitude: float
-    frequency: float
-    sum_Y_rms: float = float("nan")
-    stable: bool = True
+    speed: float  # [m/s]
+    amplitude: float  # lateral, of the wheelset that moves most [m]
+    frequency: float  # [Hz]
+    sum_Y_rms: float = float("nan")  # largest of a wheelset's lateral force [N]
+    stable: bool = True  # whether a run stays at it
     state: Floats = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
 
     @property
@@ -55,15 +50,11 @@ def seen_at(speed: float, seen: Stretch, *, stable: bool = True) -> Point:
 
 @dataclass
 class Branch:
-    """One branch of a bifurcation diagram.
+    """One branch of a bifurcation diagram."""
 
-    `direction`: how it was found; `points`: in the order in which they were found; `end`: of a ramp
-    the speed below which its motions only die [m/s].
-    """
-
-    direction: str
-    points: list[Point] = field(default_factory=list)
-    end: float = 0.0
+    direction: str  # how it was found
+    points: list[Point] = field(default_factory=list)  # in the order in which they were found
+    end: float = 0.0  # of a ramp the speed below which its motions only die [m/s]
 
     def column(self, name: str) -> Floats:
         """Return one of `COLUMNS` at all points."""
@@ -102,30 +93,22 @@ class Branch:
 
 @dataclass(frozen=True)
 class Jump:
-    """Where a branch ends and the motion changes to another, or to rest.
+    """Where a branch ends and the motion changes to another, or to rest."""
 
-    `direction`: of the change of speed; `speed`, `amplitude`: of the last motion before [m/s], [m];
-    `to`: amplitude of the motion after [m].
-    """
-
-    direction: str
-    speed: float
-    amplitude: float
-    to: float
+    direction: str  # of the change of speed
+    speed: float  # of the last motion before [m/s]
+    amplitude: float  # of that motion [m]
+    to: float  # amplitude of the motion after [m]
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The lowest speed of stable hunting beyond a limit.
+    """The lowest speed of stable hunting beyond a limit."""
 
-    `speed`: [m/s]; None where the limit is not reached; `limit`: [m] or [N]; `searched_to`: highest
-    speed of the search [m/s].
-    """
-
-    speed: float | None
-    limit: float
+    speed: float | None  # [m/s]; None where the limit is not reached
+    limit: float  # [m] or [N]
     reached: bool
-    searched_to: float
+    searched_to: float  # highest speed of the search [m/s]
 
 
 def far_apart(one: float, other: float) -> bool:

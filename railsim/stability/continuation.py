@@ -34,16 +34,13 @@ APART = 0.01  # relative difference of frequencies with which two bogies hunt ea
 
 @dataclass
 class Continued:
-    """What continuation found.
-
-    `begins`: first motion of the branch that begins where rest loses its stability; `folds`: where
-    the branches turn back in speed; `remarks`: which branches were not followed, or not to their
-    end, and why.
-    """
+    """What continuation found."""
 
     branches: list[Branch] = field(default_factory=list)
+    # first motion of the branch that begins where rest loses its stability
     begins: Point | None = None
-    folds: list[Point] = field(default_factory=list)
+    folds: list[Point] = field(default_factory=list)  # where the branches turn back in speed
+    # which were not followed, or not to their end, and why
     remarks: list[str] = field(default_factory=list)
 
 

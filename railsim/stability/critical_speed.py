@@ -174,13 +174,9 @@ def _checked(
         faults.require(low < high, "low", f"found {low:g} m/s", words, "--from")
     faults.require(2 <= points <= 200, "points", f"found {points}", "2 to 200")
     wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
-    faults.require(
-        len(excitations) and not wrong,
-        "excitations",
-        f"found {wrong[0]:g} m" if wrong else "no size",
-        f"{SMALL:g} to {LARGEST_EXCITATION:g} m",
-        "--excitation",
-    )
+    words = f"found {wrong[0]:g} m" if wrong else "no size"
+    allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(excitations) and not wrong
+    faults.require(fine, "excitations", words, allowed, "--excitation")
     faults.check()
     return float(low), float(high)
 
@@ -202,9 +198,7 @@ def _loss_of_hunting(
     Friction that sticks damps nothing: the sway of such a vehicle is undamped at speeds at which
     friction, once it slides, damps it.
     """
-    counts = None
-    if prepared.sticking:
-        counts = _hunts(prepared)
+    counts = _hunts(prepared) if prepared.sticking else None
     return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
 
 
@@ -428,10 +422,8 @@ def _conclude(
     branches = [branch for branch in found.branches if branch.direction != "ramp"]
     only_ramp = not branches
     if only_ramp:
-        branches = [
-            Branch(one.direction, [point for point in one.points if point.speed >= one.end])
-            for one in found.branches
-        ]
+        kept = [[p for p in one.points if p.speed >= one.end] for one in found.branches]
+        branches = [Branch("ramp", points) for points in kept]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.high)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.high)
     if only_ramp and (found.amplitude_limit.reached or found.instability_limit.reached):

@@ -112,16 +112,10 @@ class Curving(Plottable):
     place: str = ""
     remarks: tuple[str, ...] = ()
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
+    OF_WHEELS: ClassVar = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "T_gamma", "contact_y")
     VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
-        "Q": ("wheelset", "side"),
-        "Y": ("wheelset", "side"),
-        "Y_over_Q": ("wheelset", "side"),
-        "dQ_over_Q0": ("wheelset", "side"),
-        "T_gamma": ("wheelset", "side"),
-        "contact_y": ("wheelset", "side"),
-        "lateral": ("wheelset",),
-        "attack": ("wheelset",),
-        "sum_Y": ("wheelset",),
+        **dict.fromkeys(OF_WHEELS, ("wheelset", "side")),
+        **dict.fromkeys(("lateral", "attack", "sum_Y"), ("wheelset",)),
         "steering": ("bogie",),
         "car_roll": (),
     }
@@ -154,14 +148,10 @@ class Curving(Plottable):
             r, i, m = index
             outer = 0 if self.radius[r] > 0.0 else 1
             wheel = [getattr(self, name)[index][0, outer] for name in ("Q", "Y", "Y_over_Q")]
-            rows.append(
-                [
-                    *(self.radius[r], self.cant_deficiency[i], self.friction[m], self.speed[r, i]),
-                    *(self.lateral[index][0], self.attack[index][0], *wheel),
-                    self.T_gamma[index].sum(),
-                    METHODS[int(self.converged[index])],
-                ]
-            )
+            at = self.radius[r], self.cant_deficiency[i], self.friction[m], self.speed[r, i]
+            leading = self.lateral[index][0], self.attack[index][0], *wheel
+            found = METHODS[int(self.converged[index])]
+            rows.append([*at, *leading, self.T_gamma[index].sum(), found])
         caption = f"{self.title}; leading wheelset, its outer wheel, T_gamma of all wheels"
         return Table(COLUMNS, rows, caption)
 
@@ -275,12 +265,10 @@ def _check(
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
-        faults.require(
-            math.isfinite(value) and all(low <= v <= high for v in speeds),
-            "cant_deficiency",
-            f"found {value:g} m with a cant of {cant:g} m",
-            f"a sum that gives speeds of {low:g} to {high:g} m/s",
-        )
+        fine = math.isfinite(value) and all(low <= v <= high for v in speeds)
+        found = f"found {value:g} m with a cant of {cant:g} m"
+        allowed = f"a sum that gives speeds of {low:g} to {high:g} m/s"
+        faults.require(fine, "cant_deficiency", found, allowed)
     for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
         faults.require(len(values), name, "no value", "one at least")
     faults.check()
@@ -294,10 +282,7 @@ Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
 
 
 class _Search:
-    """Steady states of one vehicle, each sought from the nearest known one.
-
-    `shares` (float64[side]): Friction of the left and right rail over that of the point.
-    """
+    """Steady states from the nearest known one; `shares`: friction of the rails over the given."""
 
     def __init__(
         self,
@@ -359,27 +344,18 @@ class _Search:
             state = solver.prepared(state, speed)
             rolling = solver.prepared(self._rest[1], speed)
             # the curve itself is where the run settles: judged with the state that Newton left
-            step = Stability(
-                self.model, straight, rolling, "fast", lambda _: [(system, state)]
-            ).choose(5e-3)
+            judged = Stability(self.model, straight, rolling, "fast", lambda _: [(system, state)])
+            step = judged.choose(5e-3)
         except ModelError:
             return solver, state, FAILED
         work, derivative = work_arrays(system), np.zeros_like(state)
         stages, recorder = np.zeros((3, len(state))), empty_recorder(self.model, 1)
+        arrays = work, state, derivative, stages, recorder
         before = np.zeros_like(self.Q0)
         for second in range(int(SETTLING)):
             state[ARC_LENGTH] = POSITION
-            status, *_ = time_loop(
-                system,
-                work,
-                state,
-                derivative,
-                stages,
-                recorder,
-                FAST,
-                step,
-                Chunk(1, round(1.0 / step), 1 << 40, fresh=int(second == 0)),
-            )
+            chunk = Chunk(1, round(1.0 / step), 1 << 40, fresh=int(second == 0))
+            status, *_ = time_loop(system, *arrays, FAST, step, chunk)
             if status != RUNNING:
                 return solver, state, FAILED
             now = work.wheel[:, :, W_Y].copy()

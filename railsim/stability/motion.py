@@ -36,17 +36,12 @@ class LeftRange(ModelError):
 
 @dataclass(frozen=True)
 class Stretch:
-    """What a system did for a while.
+    """What a system did for a while."""
 
-    `state`: at the end; `time`: from the beginning of the stretch [s]; `lateral`: lateral
-    displacements of the wheelsets from the middle of their rails [m]; `sum_Y`: lateral forces of
-    the wheelsets on the track [N]; zero where a system has none.
-    """
-
-    state: Floats
-    time: Floats
-    lateral: Floats
-    sum_Y: Floats
+    state: Floats  # at the end
+    time: Floats  # from the beginning of the stretch [s]
+    lateral: Floats  # displacements of the wheelsets from the middle of their rails [m]
+    sum_Y: Floats  # lateral forces of the wheelsets on the track [N]; zero where a system has none
 
     @property
     def amplitude(self) -> float:
@@ -80,10 +75,7 @@ class Motion(Protocol):
     def stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
         """Move for `duration` [s] while the speed goes evenly from `begin` to `end` [m/s].
 
-        Raises
-        ------
-        LeftRange
-            The motion leaves the range of the model.
+        Raises LeftRange: the motion leaves the range of the model.
         """
 
 
@@ -116,12 +108,9 @@ class VehicleMotion:
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
         if number not in self._steps:
             states = [self.prepared.steady(SPEED_CLASS**end) for end in (number, number + 1)]
-            self._steps[number] = min(
-                Stability(self.model, self.system, state, self._scheme, lambda _: ()).choose(
-                    1.0 / OUTPUT_RATE
-                )
-                for state in states
-            )
+            of = self.model, self.system
+            judged = (Stability(*of, state, self._scheme, lambda _: ()) for state in states)
+            self._steps[number] = min(one.choose(1.0 / OUTPUT_RATE) for one in judged)
         return self._steps[number]
 
     def rest(self, speed: float, amplitude: float) -> Floats:
@@ -140,11 +129,8 @@ class VehicleMotion:
             v0, v1 = (begin + (end - begin) * t / duration for t in (done, done + length))
             parts.append(self._part(parts[-1].state if parts else state, v0, v1, length, done))
             done += length
-        time, lateral, sum_Y = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("time", "lateral", "sum_Y")
-        )
-        return Stretch(parts[-1].state, time, lateral, sum_Y)
+        columns = ([getattr(part, name) for part in parts] for name in ("time", "lateral", "sum_Y"))
+        return Stretch(parts[-1].state, *map(np.concatenate, columns))
 
     def _part(
         self, before: Floats, begin: float, end: float, duration: float, offset: float
@@ -164,21 +150,10 @@ class VehicleMotion:
         return Stretch(state, time, self.lateral(rows), wheel.sum(axis=2))
 
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
-        """Move a state of the time loop by a chunk of steps; number of records.
-
-        Raises LeftRange: the motion leaves the range of the model.
-        """
-        status, where, _, rows = time_loop(
-            system,
-            self._work,
-            state,
-            self._derivative,
-            self._stages,
-            self._recorder,
-            SCHEMES[self._scheme],
-            step,
-            chunk,
-        )
+        """Move a state by a chunk of steps; number of records; LeftRange: it leaves the model."""
+        arrays = self._work, state, self._derivative, self._stages, self._recorder
+        scheme = SCHEMES[self._scheme]
+        status, where, _, rows = time_loop(system, *arrays, scheme, step, chunk)
         if status != RUNNING:
             raise LeftRange(self.model.index.sentence(status, where))
         if not np.isfinite(state).all():

@@ -48,24 +48,16 @@ class Flow(Protocol):
 
 @dataclass(frozen=True)
 class PeriodicMotion:
-    """One periodic motion.
+    """One periodic motion."""
 
-    - `state`: a state that it passes through
-    - `period`, `speed`: [s], [m/s]
-    - `amplitude`: half the largest lateral travel of a wheelset [m]
-    - `multipliers`: Floquet multipliers without the trivial one
-    - `tangent`: direction of the branch in the scaled u
-    - `along`: direction of the motion itself at `state`, scaled
-    - `matrix`: Jacobian of the residual there, with which the search for the next one begins
-    """
-
-    state: Floats
-    period: float
-    speed: float
-    amplitude: float
-    multipliers: Complexes
-    tangent: Floats
-    along: Floats
+    state: Floats  # one that it passes through
+    period: float  # [s]
+    speed: float  # [m/s]
+    amplitude: float  # half the largest lateral travel of a wheelset [m]
+    multipliers: Complexes  # of Floquet, without the trivial one
+    tangent: Floats  # direction of the branch in the scaled u
+    along: Floats  # direction of the motion itself at `state`, scaled
+    # Jacobian of the residual there, with which the search for the next one begins
     matrix: Floats | None = None
 
     @property
@@ -136,10 +128,7 @@ class Shooting:
                 length = min(step, 1.5 * length)
 
     def ahead(self, now: PeriodicMotion, length: float) -> tuple[PeriodicMotion, int]:
-        """Return the motion one arc length further, and the number of iterations.
-
-        Raises ModelError: Newton's method does not converge.
-        """
+        """Return the motion one arc length further, and iterations; ModelError: none is found."""
         return self._solved(now, now.tangent, length)
 
     def nearest(self, state: Floats, period: float, speed: float) -> PeriodicMotion:
@@ -206,10 +195,7 @@ class Shooting:
         raise ModelError("the search for a periodic motion does not converge")
 
     def fold(self, before: PeriodicMotion, after: PeriodicMotion, length: float) -> PeriodicMotion:
-        """Return the motion where the branch turns back in speed between two of its motions.
-
-        `length`: arc length from `before` to `after`, or somewhat more.
-        """
+        """Return the motion where the branch turns back between two, some `length` of arc apart."""
         found = {}
 
         def forward(share: float) -> float:

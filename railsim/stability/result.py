@@ -23,31 +23,22 @@ TABLE = (
 
 @dataclass(frozen=True)
 class LinearLoss:
-    """Where steady rolling loses its stability.
+    """Where steady rolling loses its stability."""
 
-    `speed`, `frequency`: [m/s], [Hz]; `mode`: name of the mode that is undamped there;
-    `speed_of_runs`: the speed with the creep law of runs as it is, cells included [m/s];
-    `speed_on_rigid_rails`: the speed on rigid rails, where those of the track are elastic [m/s].
-    """
-
-    speed: float
-    frequency: float
-    mode: str
-    speed_of_runs: float | None = None
-    speed_on_rigid_rails: float | None = None
+    speed: float  # [m/s]
+    frequency: float  # [Hz]
+    mode: str  # that is undamped there
+    speed_of_runs: float | None = None  # with the creep law of runs as it is, cells included [m/s]
+    speed_on_rigid_rails: float | None = None  # where those of the track are elastic [m/s]
 
 
 @dataclass(frozen=True)
 class OverAmplitude:
-    """Linear critical speed over the amplitude for which the contact is linearised.
+    """Linear critical speed over the amplitude of the contact; None where the vehicle is stable."""
 
-    `amplitude`: [m]; `speed`, `frequency`: [m/s], [Hz]; None where the vehicle is stable throughout
-    the range.
-    """
-
-    amplitude: list[float] = field(default_factory=list)
-    speed: list[float | None] = field(default_factory=list)
-    frequency: list[float | None] = field(default_factory=list)
+    amplitude: list[float] = field(default_factory=list)  # [m]
+    speed: list[float | None] = field(default_factory=list)  # [m/s]
+    frequency: list[float | None] = field(default_factory=list)  # [Hz]
 
     @property
     def smallest(self) -> tuple[float, float] | None:
@@ -63,14 +54,11 @@ class OverAmplitude:
 
 @dataclass(frozen=True)
 class Conicity:
-    """Equivalent conicity over amplitude on rigid rails (EN 15302).
-
-    `amplitude`, `conicity`: [m], [1].
-    """
+    """Equivalent conicity over amplitude on rigid rails (EN 15302)."""
 
     wheelset: str
-    amplitude: list[float]
-    conicity: list[float]
+    amplitude: list[float]  # [m]
+    conicity: list[float]  # [1]
 
 
 @dataclass(repr=False)

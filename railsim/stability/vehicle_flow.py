@@ -22,11 +22,7 @@ OBSERVED = 40  # records within a period
 
 
 class VehicleFlow:
-    """Flow of a vehicle for `railsim.stability.periodic`.
-
-    `motion`: vehicle, scheme and step; `speed`: near which motions are sought: it decides the step
-    [m/s].
-    """
+    """Flow of a vehicle near a speed for `railsim.stability.periodic`."""
 
     def __init__(self, motion: VehicleMotion, speed: float) -> None:
         self._motion = motion

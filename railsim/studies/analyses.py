@@ -26,11 +26,7 @@ LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
 def analysed(case: Case, result: Result | None) -> tuple[Numbers, list[str]]:
-    """Return the numbers of all analyses of a case, and remarks on them.
-
-    `result`: result of its run, if one of its analyses needs one. Raises InputError, ModelError: an
-    analysis fails; the message names it.
-    """
+    """Return the numbers of all analyses of a case, and remarks; raises InputError, ModelError."""
     found: Numbers = {}
     said: list[str] = []
     for name, analysis in case.analyses.items():

@@ -57,20 +57,16 @@ UNCHECKED = "The limits of EN 13848-5 are from memory, not compared with the pri
 
 @dataclass(frozen=True)
 class Place:
-    """A place at which a vehicle exceeds the share of a limit.
-
-    `speed`: [m/s]; `quantity`: of `QUANTITIES`; `where`: wheel, wheelset or point; `s`: of that
-    wheelset or point [m]; `value`, `limit`: [SI]; `shape`: the defect there in words.
-    """
+    """A place at which a vehicle exceeds the share of a limit."""
 
     vehicle: str
-    speed: float
-    quantity: str
-    where: str
-    s: float
-    value: float
-    limit: float
-    shape: str
+    speed: float  # [m/s]
+    quantity: str  # of `QUANTITIES`
+    where: str  # wheel, wheelset or point
+    s: float  # of that wheelset or point [m]
+    value: float  # [SI]
+    limit: float  # [SI]
+    shape: str  # the defect there in words
 
 
 class _Run(NamedTuple):
@@ -238,10 +234,7 @@ def _lifting(unloaded: Mapping[tuple[str, float], Sequence[float]]) -> list[str]
 
 
 def recorded(recording: str | Path) -> Track:
-    """Return a track with a recording; of a CSV, on straight track as long as it is.
-
-    Raises InputError: no measured irregularity.
-    """
+    """Return a track with a recording, straight for a CSV; raises InputError: it has none."""
     if str(recording).lower().endswith(".csv"):
         irregular = [{"type": "measured", "file": str(Path(recording).resolve())}]
         data: dict[str, Any] = {"irregularities": irregular}
@@ -264,8 +257,7 @@ def recorded(recording: str | Path) -> Track:
 def _behind(vehicle: Vehicle) -> float:
     """Distance of the last wheelset or floor point behind the reference body [m]."""
     flat, placed = flatten(vehicle), sensors(vehicle)
-    origin = flat.body(flat.reference).position[0]
-    wheelsets = [body.position[0] - origin for body in flat.of_kind("wheelset")]
+    wheelsets = flat.along(flat.of_kind("wheelset"))
     return -min(0.0, *wheelsets, *(placed[point].along for point in POINTS))
 
 

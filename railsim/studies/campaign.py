@@ -7,7 +7,7 @@ independent seeds of its track, scaled to the target quality.
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -48,16 +48,12 @@ LATERAL, VERTICAL = ("lateral", "gauge"), ("vertical", "cross_level")
 
 @dataclass(frozen=True)
 class Campaign:
-    """Results of a campaign in its folder.
-
-    `assessments`: one for each vehicle; `results`: results by the names of their runs; `computed`:
-    number of runs that were computed by this call; the others existed.
-    """
+    """Results of a campaign in its folder."""
 
     folder: Path
-    assessments: tuple[Assessment, ...]
-    results: dict[str, Result]
-    computed: int
+    assessments: tuple[Assessment, ...]  # one for each vehicle
+    results: dict[str, Result]  # by the names of their runs
+    computed: int  # number of runs that were computed by this call; the others existed
 
 
 def campaign(
@@ -108,13 +104,11 @@ def campaign(
 def scenario_cases(
     scenario: Scenario, vehicles: Sequence[str | Path], assignments: Sequence[str] = ()
 ) -> list[Case]:
-    """Return all runs of a scenario: vehicles, then parts, then the grid.
-
-    Raises InputError: all faults of all runs.
-    """
+    """Return all runs: vehicles, then parts, then the grid; raises InputError: all their faults."""
     faults = Faults()
     cases: list[Case] = []
-    conditions = _conditions(scenario)
+    named: Iterable[tuple[str, TestCondition | None]] = scenario.conditions.items() or [("", None)]
+    conditions = [(k, name, one) for k, (name, one) in enumerate(named)]
     axes = (vehicles, conditions, scenario.parts, *scenario.grid.values())
     check_number(math.prod(map(len, axes)), available_cores(), lambda: ROUGH_DURATION)
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
@@ -165,13 +159,6 @@ def scenario_cases(
             cases += repeated(case, limits, service, number) if limits else [case]
     Faults(dict.fromkeys(faults)).check()
     return cases
-
-
-def _conditions(scenario: Scenario) -> list[tuple[int, str, TestCondition | None]]:
-    """Number, name and contents of each condition; one without name where there are none."""
-    if not scenario.conditions:
-        return [(0, "", None)]
-    return [(k, name, one) for k, (name, one) in enumerate(scenario.conditions.items())]
 
 
 def part_speed(speed: Speed, service: Service) -> float:
@@ -239,12 +226,10 @@ def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
         return track
     as_drawn = _speed_in_curve(speed, service)
     factor = (speed.admissible * service.admissible_speed / as_drawn) ** 2
-    plan = [
-        element.model_copy(update={"radius": factor * element.radius})
-        if isinstance(element, Circle)
-        else element
-        for element in track.plan
-    ]
+    plan = list(track.plan)
+    for k, element in enumerate(plan):
+        if isinstance(element, Circle):
+            plan[k] = element.model_copy(update={"radius": factor * element.radius})
     return track.model_copy(update={"plan": tuple(plan)})
 
 
@@ -280,9 +265,7 @@ def counting_sections(
     """Sections that count, of the zone with most of them, at constant speed."""
     vehicle = case.vehicle
     flat = flatten(vehicle)
-    origin = flat.body(flat.reference).position[0]
-    x = [b.position[0] - origin for b in flat.of_kind("wheelset")]
-    x += [sensor.along for sensor in sensors(vehicle).values()]
+    x = flat.along(flat.of_kind("wheelset")) + [one.along for one in sensors(vehicle).values()]
     ahead, behind = max(0.0, *x), min(0.0, *x)
     begin = case.start + max(START * case.speed, ahead - behind) + ahead
     end = (case.until or track.length) + behind - 1.0

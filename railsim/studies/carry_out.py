@@ -13,22 +13,14 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, argument_error, argument_fault
+from railsim.errors import Fault, InputError, argument_error, argument_fault, listed
 from railsim.files.access import is_file, make_folder, sweep
 from railsim.laws.permission import check_laws
 from railsim.processes import available_cores
 from railsim.result import open_result
 from railsim.result.hdf5 import Storage
+from railsim.studies import execute
 from railsim.studies.case import Case
-from railsim.studies.execute import (
-    Job,
-    batches,
-    cluster,
-    compile_on_cluster,
-    in_processes,
-    in_this_process,
-    on_cluster,
-)
 from railsim.studies.journal import JOURNAL, Journal, Records
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Point, check_names
@@ -47,10 +39,7 @@ Load = Callable[[Sequence[Point]], list[Case]]
 
 
 def carry_out_cases(cases: Sequence[Case], spec: StudySpec, folder: Path, **how: Any) -> Outcome:
-    """Compute the missing runs of cases that are loaded, the longest first.
-
-    `how`: fields of `Execution`. Raises InputError: as `carry_out`; equal names.
-    """
+    """Compute the missing runs of loaded cases, the longest first; `how`: fields of `Execution`."""
     points = [
         Point(c.name, RunSpec(c.vehicle.name, c.track.name, c.speed), c.labels, c.key)
         for c in cases
@@ -83,7 +72,7 @@ def carry_out(
         if known is None and not execution.overwrite:
             _refuse_files_of_others(folder)
         state = State(folder, points, load, spec, known, execution)
-        client = None if execution.scheduler is None else cluster(execution.scheduler)
+        client = None if execution.scheduler is None else execute.cluster(execution.scheduler)
         make_folder(folder)
         sweep(folder)
         journal = known or stack.enter_context(Journal(folder))
@@ -119,31 +108,37 @@ def carry_out(
 
 def _jobs(
     state: "State", spec: StudySpec, keep: tuple[str, ...], folder: Path, execution: Execution
-) -> list[Job]:
+) -> list[execute.Job]:
     storage = Storage(compress=spec.compress, single=spec.single)
     jobs = []
     for case in state.cases:
         path = (folder / f"{case.name}.h5").resolve()
         picture = path.with_suffix(".png") if execution.plots and case.file_name else None
         exists = case.name in state.to_be_analysed
-        jobs.append(Job(case, path, picture, spec.quantities, keep, storage, exists))
+        jobs.append(execute.Job(case, path, picture, spec.quantities, keep, storage, exists))
     if execution.longest_first:
         jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
     return jobs
 
 
 def _computed(
-    jobs: Sequence[Job], client: Any, execution: Execution, remark: Callable[[str], None]
+    jobs: Sequence[execute.Job], client: Any, execution: Execution, remark: Callable[[str], None]
 ) -> Iterable[Record]:
     progress = execution.progress or (lambda _: None)
     if client is not None:
         threads = sum(client.nthreads().values())
-        compile_on_cluster(client, remark)
-        return on_cluster(batches(jobs, execution.together, max(1, threads)), client, progress)
+        execute.compile_on_cluster(client, remark)
+        return execute.on_cluster(
+            execute.batches(jobs, execution.together, max(1, threads)), client, progress
+        )
     workers = execution.workers or available_cores()
-    work = batches(jobs, execution.together, workers)
+    work = execute.batches(jobs, execution.together, workers)
     workers = min(workers, len(work))
-    return in_processes(work, workers, progress) if workers > 1 else in_this_process(work, progress)
+    return (
+        execute.in_processes(work, workers, progress)
+        if workers > 1
+        else execute.in_this_process(work, progress)
+    )
 
 
 def _refuse_another_study(
@@ -218,9 +213,7 @@ class State:
         self.to_be_analysed: set[str] = set()
         waiting = [point for point in points if not self._is_done(point)]
         self._waiting = dict(zip(waiting, load(waiting), strict=True))
-        faults = [
-            fault for point, case in self._waiting.items() for fault in self._faults_of(point, case)
-        ]
+        faults = [fault for one in self._waiting.items() for fault in self._faults_of(*one)]
         if faults and not execution.resume:
             raise InputError(faults)
         found = {point for point, _ in self.found}
@@ -275,29 +268,20 @@ class State:
         for path, words in self._damaged.items():
             old = _moved_aside(path)
             remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
-        lost = [
-            case.name
-            for case in self.cases
-            if self._entries.get(case.name)
-            and case.file_name not in self._files
-            and self._entries[case.name].size
-        ]
+        gone = [case.name for case in self.cases if case.file_name not in self._files]
+        lost = [name for name in gone if name in self._entries and self._entries[name].size]
         for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
             if names:
                 number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
-                remarks.append(f"{number} {words} and computed again: {_listed(names)}")
+                remarks.append(f"{number} {words} and computed again: {listed(names)}")
         return remarks
 
     def records(self, journal: Journal) -> Records:
         """Return the records of all runs, done or waiting, in the order of the combinations."""
         waiting = {point.name: case for point, case in self._waiting.items()}
-        return Records(
-            journal.path,
-            [
-                journal.entries.get(point.name) or waiting_record(waiting[point.name])
-                for point in self._points
-            ],
-        )
+        names = [point.name for point in self._points]
+        found = [journal.entries.get(name) or waiting_record(waiting[name]) for name in names]
+        return Records(journal.path, found)
 
 
 def _moved_aside(path: Path) -> Path:
@@ -315,8 +299,3 @@ def _files(folder: Path) -> dict[str, os.stat_result]:
             return {entry.name: entry.stat() for entry in entries if entry.name.endswith(".h5")}
     except OSError:  # missing, or not a folder
         return {}
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more

@@ -24,32 +24,19 @@ from railsim.version import __version__
 
 @dataclass(frozen=True)
 class Case:
-    """One run: vehicle, track, speed and settings.
+    """One run: vehicle, track, speed and settings; times and distances as in `RunSpec`."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the run, and of its file without the ending.
-    speed : float
-        Speed, at the start where it varies [m/s].
-    labels : mapping of str to str or float
-        ``vehicle``, ``track``, ``speed`` and the keys of a grid.
-    analyses : mapping of str to Analysis
-        Analyses by name; without analyses, a run is computed.
-
-    Others as in `RunSpec`.
-    """
-
-    name: str
+    name: str  # of the run, and of its file without the ending
     vehicle: Vehicle
     track: Track
     settings: Settings
-    speed: float
+    speed: float  # at the start where it varies [m/s]
     start: float = 0.0
     duration: float | None = None
     until: float | None = None
+    # ``vehicle``, ``track``, ``speed``, keys of a grid
     labels: Mapping[str, str | float] = field(default_factory=dict)
-    analyses: Mapping[str, Analysis] = field(default_factory=dict)
+    analyses: Mapping[str, Analysis] = field(default_factory=dict)  # without any, a run is computed
 
     @property
     def file_name(self) -> str:
@@ -170,10 +157,7 @@ class Loader:
 
 
 def load_case(run: RunSpec) -> Case:
-    """Load the inputs of one run.
-
-    Raises InputError: everything that is wrong in any of them.
-    """
+    """Load the inputs of one run; raises InputError: everything that is wrong in any of them."""
     loader = Loader()
     loader.overrides(run.assignments)  # its faults come first
     run = replace(run, speed=loader.first_speed(run))
@@ -198,8 +182,6 @@ def short_name(path: str | Path) -> str:
 def run_name(run: RunSpec) -> str:
     """Return the name of a run.
 
-    Examples
-    --------
     >>> run_name(RunSpec("vehicles/coach_manchester.toml", "curve_r250", 20.0))
     'coach_manchester_curve_r250_20'
     """

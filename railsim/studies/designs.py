@@ -27,30 +27,15 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Design:
-    """Values of the variables, objectives and constraints.
+    """Values of the variables, objectives and constraints."""
 
-    Attributes
-    ----------
-    number : int
-        In the order of computation, from 1.
-    variables : dict of str to float
-        By their paths [SI].
-    objectives : tuple of float
-        In the order of the definition [SI]; NaN if a run has no such value.
-    constraints : tuple of float
-        Worst value of the quantity of each constraint [SI].
-    feasible : bool
-        Whether all values exist and all constraints are met.
-    reason : str
-        Reason why there are no values.
-    """
-
-    number: int
-    variables: dict[str, float]
+    number: int  # in the order of computation, from 1
+    variables: dict[str, float]  # by their paths [SI]
+    # in the order of the definition [SI]; NaN if a run has no such value
     objectives: tuple[float, ...]
-    constraints: tuple[float, ...]
-    feasible: bool
-    reason: str = ""
+    constraints: tuple[float, ...]  # worst value of the quantity of each [SI]
+    feasible: bool  # all values exist and all constraints are met
+    reason: str = ""  # why there are no values
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -133,8 +118,6 @@ class Evaluation:
 def _written(variable: Variable, share: float) -> str:
     """Return the value at a share of a variable's range as text.
 
-    Examples
-    --------
     >>> _written(Variable(low=1e3, high=1e5, scale="log"), 0.5)
     '10000'
     """

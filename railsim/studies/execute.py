@@ -50,22 +50,16 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A case and the paths of its files.
-
-    `path`, `picture`: files of result and figure; existing ones are replaced; `function`: function
-    for user-defined quantities, see `railsim.studies.user_function`; `keep`, `storage`: quantities
-    of the result that are kept, see `railsim.studies.spec.kept_quantities`, compression and
-    precision of its file; `exists`: whether the run exists, and only its analyses are to be
-    computed.
-    """
+    """A case and the paths of its files; existing ones are replaced."""
 
     case: Case
     path: Path
     picture: Path | None = None
-    function: str | None = None
+    function: str | None = None  # for user-defined quantities, see `railsim.studies.user_function`
+    # quantities of the result, see `railsim.studies.spec.kept_quantities`
     keep: tuple[str, ...] = ("*",)
-    storage: Storage = PLAIN
-    exists: bool = False
+    storage: Storage = PLAIN  # compression and precision of its file
+    exists: bool = False  # the run exists, only its analyses are to be computed
 
 
 Batch = tuple[Job, ...]
@@ -212,10 +206,7 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
 
 
 class _Pool:
-    """One pool of processes, until all batches are done or a process dies.
-
-    `lost`: batches that were running in a process that died.
-    """
+    """One pool of processes, until all batches are done or one dies, whose batches are `lost`."""
 
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
         context: Any = worker_context()
@@ -290,10 +281,7 @@ def _shares(batches: Sequence[Batch]) -> list[float]:
 
 
 def cluster(address: str) -> Any:
-    """Return a client of the dask scheduler at an address.
-
-    Raises InputError: dask is not installed, or no scheduler answers.
-    """
+    """Return a client of a dask scheduler; raises InputError: no dask, or none that answers."""
     try:
         from distributed import Client
     except ImportError:
@@ -366,23 +354,17 @@ def _marks(folders: set[Path]) -> Iterator[str]:
 
 
 def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, bytes]]:
-    """Carry out the jobs of a batch on a machine that may lack access to the folder of the study.
-
-    Returns: `records`; `files`: files written by the jobs, if the folder is not accessible.
-    """
+    """Carry out a batch, perhaps without access to the folder; then the files it wrote come too."""
     if all((job.path.parent / mark).is_file() for job in batch):
         return perform(batch), {}
     with tempfile.TemporaryDirectory(prefix="railsim-") as folder:
-        here = tuple(
-            replace(
-                job,
-                path=Path(folder) / job.path.name,
-                picture=job.picture and Path(folder) / job.picture.name,
-            )
-            for job in batch
-        )
-        records = perform(here)
-        return records, {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+        there = Path(folder)
+        here = []
+        for job in batch:
+            picture = job.picture and there / job.picture.name
+            here.append(replace(job, path=there / job.path.name, picture=picture))
+        records = perform(tuple(here))
+        return records, {path.name: path.read_bytes() for path in there.iterdir()}
 
 
 def _taken(future: Any, batch: Batch) -> list[Record]:

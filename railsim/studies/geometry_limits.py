@@ -24,10 +24,7 @@ GEOMETRY = (
 
 
 class RecordedGeometry:
-    """Alignment, level and cross level in D1 along a recording, and what their limits say.
-
-    `track`: with a recording; `begin`, `end`: part of it [m].
-    """
+    """Geometry in D1 of a recording from `begin` to `end` [m], and what its limits say."""
 
     def __init__(self, track: Track, begin: float, end: float) -> None:
         function = displacement(track)

@@ -30,21 +30,15 @@ NOT_DONE = ("failed", "waiting")  # status of runs that are computed again
 
 
 class Entry(NamedTuple):
-    """Data of a run that are available without reading its record.
+    """Data of a run that are available without reading its record."""
 
-    `name`, `status`: name of the run, and how it ended: as in its result, or ``failed``; `key`:
-    hash of the inputs of the run, see `railsim.studies.plan`; `size`, `changed`: size of its
-    result file [bytes] and time of its last change [ns]; 0 without a file; `offset`, `length`:
-    position and length of its record in the journal [bytes].
-    """
-
-    name: str
-    status: str
-    key: str
-    size: int
-    changed: int
-    offset: int
-    length: int
+    name: str  # of the run
+    status: str  # as in its result, or ``failed``
+    key: str  # hash of the inputs of the run, see `railsim.studies.plan`
+    size: int  # of its result file [bytes]; 0 without a file
+    changed: int  # time of its last change [ns]
+    offset: int  # of its record in the journal [bytes]
+    length: int  # of its record [bytes]
 
     @property
     def is_done(self) -> bool:
@@ -168,11 +162,7 @@ class Journal:
 
 
 class Records(Sequence[Record]):
-    """Records of runs, each read from the journal on access.
-
-    `path`: the journal; `entries`: entry of each record, or the record itself of a run that has not
-    been done.
-    """
+    """Records of runs from a journal, each read on access; of a run not done the record itself."""
 
     def __init__(self, path: Path, entries: Sequence[Entry | Record]) -> None:
         self._path = path

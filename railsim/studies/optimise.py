@@ -89,17 +89,10 @@ class Optimisation:
         columns = [Column("design", format="d"), *variables]
         columns += [Column(name, format=".5g") for name in values]
         numbers = zip(*values.values(), strict=True)
-        rows = [
-            [
-                design.number,
-                *design.variables.values(),
-                *of_design,
-                int(design.feasible),
-                int(design.number in on_front),
-                design.reason,
-            ]
-            for design, of_design in zip(self.designs, numbers, strict=True)
-        ]
+        rows = []
+        for design, of_design in zip(self.designs, numbers, strict=True):
+            known = [design.number, *design.variables.values(), *of_design, int(design.feasible)]
+            rows.append([*known, int(design.number in on_front), design.reason])
         return Table([*columns, "feasible", "front", "reason"], rows)
 
     def record(self) -> dict[str, Any]:
@@ -119,12 +112,8 @@ class Optimisation:
 
 
 def _design_record(design: Design) -> dict[str, Any]:
-    return {
-        "number": design.number,
-        "variables": design.variables,
-        "objectives": list(design.objectives),
-        "constraints": list(design.constraints),
-    }
+    own = {"objectives": list(design.objectives), "constraints": list(design.constraints)}
+    return {"number": design.number, "variables": design.variables, **own}
 
 
 def optimise(
@@ -184,30 +173,16 @@ def optimise(
     folder = Path(out)
     check_folder(folder)
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)
-    evaluation = Evaluation(
-        definition,
-        wanted,
-        folder,
-        Execution(
-            workers=workers,
-            scheduler=scheduler,
-            overwrite=overwrite,
-            progress=progress,
-            on_remark=on_remark,
-        ),
+    execution = Execution(
+        workers=workers,
+        scheduler=scheduler,
+        overwrite=overwrite,
+        progress=progress,
+        on_remark=on_remark,
     )
-    search(
-        wanted.method,
-        Task(
-            evaluation,
-            len(wanted.variables),
-            len(wanted.objectives),
-            len(wanted.constraints),
-            wanted.evaluations,
-            wanted.batch,
-            wanted.seed,
-        ),
-    )
+    evaluation = Evaluation(definition, wanted, folder, execution)
+    sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)
+    search(wanted.method, Task(evaluation, *sizes, wanted.evaluations, wanted.batch, wanted.seed))
     return _concluded(evaluation, choose)
 
 
@@ -245,12 +220,9 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         if not 1 <= choose <= len(designs):
             raise argument_error("choose", f"design {choose}", f"1 to {len(designs)}")
         chosen = designs[choose - 1]
+    about = evaluation.folder, wanted, designs, tuple(front), chosen
     found = Optimisation(
-        evaluation.folder,
-        wanted,
-        designs,
-        tuple(front),
-        chosen,
+        *about,
         _active(wanted, chosen) if chosen else (),
         tuple(_sensitivities(evaluation, chosen)) if chosen else (),
         tuple(export_vehicles(evaluation, chosen)) if chosen else (),
@@ -341,14 +313,8 @@ def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
 def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) -> str:
     """Return the text of a vehicle file that extends another one with some values changed.
 
-    Parameters
-    ----------
-    vehicle : str or Path
-        File, or name of a shipped one.
-    overrides : sequence of str
-        ``key.path=value`` with the file's own keys.
-    folder : Path
-        Folder of the new file; the path to the original is relative to it.
+    `overrides`: ``key.path=value`` with the file's own keys; `folder`: of the new file, from which
+    the path to the original counts.
     """
     from railsim.definitions import Vehicle
 
@@ -367,8 +333,6 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
 def _difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
     """Return the entries that turn one table into another by `extends`.
 
-    Examples
-    --------
     >>> _difference({"a": {"b": 1, "c": [1, 2]}}, {"a": {"b": 1, "c": [1, 3]}, "d": {"e": 4}})
     {'a': {'c': [1, 3]}, 'd': {'e': 4}}
     """

@@ -42,18 +42,13 @@ REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Inputs of one run, before its definitions are loaded.
+    """Inputs of one run, before its definitions are loaded."""
 
-    `name`: name of the run; `run`: the run, with its speed at the start; `labels`: labels of the
-    run; `key`: hash of all inputs; empty if a file cannot be read; `has_run`: whether a run in the
-    time domain belongs to it, with a result file.
-    """
-
-    name: str
-    run: RunSpec
-    labels: Mapping[str, str | float]
-    key: str
-    has_run: bool = True
+    name: str  # of the run
+    run: RunSpec  # with its speed at the start
+    labels: Mapping[str, str | float]  # of the run
+    key: str  # hash of all inputs; empty if a file cannot be read
+    has_run: bool = True  # in the time domain, with a result file
 
 
 class Plan:
@@ -75,19 +70,14 @@ class Plan:
         self._further = [f"told {told}"] if (told := fingerprint(spec.quantities)) else []
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
         linked = [next(iter(table.values())) for table in spec.linked]
-        lists: list[Sequence[object]] = [
-            *(spec.vehicles, spec.tracks, spec.speeds),
-            *spec.grid.values(),
-            *linked,
-        ]
+        lists: list[Sequence[object]] = [spec.vehicles, spec.tracks, spec.speeds]
+        lists += [*spec.grid.values(), *linked]
         number = math.prod(map(len, lists)) * (spec.sample.number if spec.sample else 1)
         check_number(number, workers, self._simulated_time)
         self._loader.overrides(tuple(spec.assignments))  # its faults come first
         rows = made_rows(spec.grid, spec.linked, spec.sample)
-        assigned = [
-            (*spec.assignments, *(f"{key}={value}" for key, value in row.values.items()))
-            for row in rows
-        ]
+        of_rows = ([f"{key}={value}" for key, value in row.values.items()] for row in rows)
+        assigned = [(*spec.assignments, *texts) for texts in of_rows]
         shared = spec.settings, spec.start, spec.duration, spec.until
         self.points: list[Point] = []
         for vehicle, track, speed in product(spec.vehicles, spec.tracks, spec.speeds):
@@ -101,24 +91,16 @@ class Plan:
 
     def _point(self, run: RunSpec, row: Row) -> Point:
         overrides = self._loader.overrides(run.assignments)
-        parts = [
-            self._fingerprints.of(kind, getattr(run, kind), some)
-            for kind, some in overrides.items()
-        ]
+        of = self._fingerprints.of
+        parts = [of(kind, getattr(run, kind), some) for kind, some in overrides.items()]
         inputs = (*parts, run.speed, run.start, run.duration, run.until, *self._further)
-        return Point(
-            run_name(run) + row.suffix,
-            run,
-            {**run_labels(run), **row.values},
-            "" if "" in parts else _hashed([__version__, *map(repr, inputs)]),
-            needs_run(self._spec.analyses),
-        )
+        key = "" if "" in parts else _hashed([__version__, *map(repr, inputs)])
+        labels = {**run_labels(run), **row.values}
+        has_run = needs_run(self._spec.analyses)
+        return Point(run_name(run) + row.suffix, run, labels, key, has_run)
 
     def cases(self, points: Sequence[Point] | None = None) -> list[Case]:
-        """Load the inputs of the runs of some points, by default of all.
-
-        Raises InputError: everything that is wrong in any of them.
-        """
+        """Load the inputs of some points, by default all; raises InputError: all their faults."""
         wanted = self.points if points is None else points
         found = [self._loader.case(point.name, point.run, point.labels) for point in wanted]
         self._loader.check()
@@ -229,10 +211,7 @@ def check_number(number: int, cores: int, seconds: Callable[[], float]) -> None:
 
 
 def check_names(points: Sequence[Point]) -> None:
-    """Refuse names of runs that are equal, or too long for a file.
-
-    Raises InputError: all of them.
-    """
+    """Refuse, by InputError, names of runs that are equal, or too long for a file."""
     counts = Counter(point.name for point in points)
     faults = Faults(
         Fault("study", name, f"{count} runs of this name", "give files with different names")
@@ -253,8 +232,6 @@ def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
 
     Raises InputError: the text has neither form.
 
-    Examples
-    --------
     >>> parse_grid("settings.fastsim_grid=[10,10],[20,20]")
     ('settings.fastsim_grid', ('[10,10]', '[20,20]'))
     >>> parse_grid("track.friction=0.1,0.2:0.4:3")

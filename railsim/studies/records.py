@@ -21,10 +21,7 @@ def write_record(path: Path, record: Record) -> None:
 
 
 def read_record(path: Path) -> Record:
-    """Return a stored record.
-
-    Raises InputError: the record cannot be read, or is damaged.
-    """
+    """Return a stored record; raises InputError: it cannot be read, or is damaged."""
     text = read_text(path, TABLE_BYTES)
     try:
         stored = json.loads(text)
@@ -52,10 +49,7 @@ def finite(data: Any) -> Any:
 
 
 def parsed(text: bytes) -> Any:
-    """Return what JSON holds.
-
-    Raises ValueError: it is broken, or nested too deeply.
-    """
+    """Return what JSON holds; raises ValueError: it is broken, or nested too deeply."""
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError:

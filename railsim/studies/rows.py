@@ -17,24 +17,19 @@ PERMITTED = "permitted"  # as a speed: the lower of the speeds of vehicle and tr
 
 @dataclass(frozen=True)
 class Row:
-    """Values of the varied keys of one run.
+    """Values of the varied keys of one run."""
 
-    `values`: texts as in `key=value`, by the paths of the keys; `suffix`: suffix to the name of the
-    run; `speed`: speed of the run if the row varies it [m/s].
-    """
-
-    values: Mapping[str, str]
-    suffix: str
-    speed: float | None = None
+    values: Mapping[str, str]  # texts as in `key=value`, by the paths of the keys
+    suffix: str  # to the name of the run
+    speed: float | None = None  # of the run if the row varies it [m/s]
 
 
 def made_rows(grid: Grid, linked: Sequence[Grid], sample: Sample | None) -> list[Row]:
     """Return all combinations: the grid outermost, then linked keys, then the sample."""
     combined = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     for table in linked:
-        together = [
-            dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)
-        ]
+        each = zip(*table.values(), strict=True)
+        together = [dict(zip(table, values, strict=True)) for values in each]
         combined = [{**row, **more} for row in combined for more in together]
     members = [("", dict[str, str]())]
     if sample is not None:
@@ -55,10 +50,7 @@ SPEEDS = "such as 20 or 72km/h"
 
 
 def speed_of(text: str) -> float:
-    """Return the speed of a text, which may have a unit [m/s].
-
-    Raises InputError: the text is not a number.
-    """
+    """Return the speed of a text, perhaps with a unit [m/s]; raises InputError: it is no number."""
     found = speed_in_si(text)
     if isinstance(found, str):
         raise argument_error("speeds", f"'{text}' is not a speed", SPEEDS)
@@ -89,8 +81,6 @@ def sampled(sample: Sample) -> list[dict[str, str]]:
 def quantile(spread: Spread, share: float) -> float:
     """Return the value of a parameter below which `share` of its values lie.
 
-    Examples
-    --------
     >>> quantile(Spread(low=1.0, high=100.0, scale="log"), 0.5)
     10.0
     >>> quantile(Spread(nominal=200.0, tolerance=0.1), 0.75)
@@ -114,8 +104,6 @@ def quantile(spread: Spread, share: float) -> float:
 def suffix(point: Mapping[str, str]) -> str:
     """Return the suffix of a point of the grid to the name of its run.
 
-    Examples
-    --------
     >>> suffix({"track.friction": "0.3", "settings.drive.speed_table.0.1": "12"})
     '_friction=0.3_speed_table.0.1=12'
     """
@@ -128,8 +116,6 @@ def suffix(point: Mapping[str, str]) -> str:
 def in_a_name(text: str) -> str:
     """Return a text in a form for file names, which cannot point to another folder.
 
-    Examples
-    --------
     >>> in_a_name("[10, 20]"), in_a_name("../other")
     ('10-20', '..-other')
     """

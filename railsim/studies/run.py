@@ -61,10 +61,7 @@ def run_cases(
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> list[Result | Exception]:
-    """Run cases that differ only in the vehicle in one call, to their files or to memory.
-
-    Returns: one for each case; the failure of one case does not affect the others.
-    """
+    """Run cases that differ only in the vehicle in one call; failures do not affect the others."""
     found: dict[int, Result | Exception] = {}
     sinks: dict[int, Hdf5Sink | MemorySink] = {}
     with ExitStack() as stack:

@@ -44,19 +44,15 @@ Evaluate = Callable[[Floats], Values]
 
 @dataclass(frozen=True)
 class Task:
-    """Task of a search.
+    """Task of a search."""
 
-    `evaluate`: takes designs, float64[design, variable] between 0 and 1; returns the values of all
-    designs so far; `variables`, `objectives`, `constraints`: numbers of variables, objectives and
-    constraints; `number`, `batch`: number of designs in total, and at a time.
-    """
-
+    # designs, float64[design, variable] from 0 to 1, to the values of all designs so far
     evaluate: Evaluate
     variables: int
     objectives: int
     constraints: int
-    number: int
-    batch: int
+    number: int  # of designs in total
+    batch: int  # designs at a time
     seed: int
 
 
@@ -140,10 +136,7 @@ def _at_bounds(points: Floats, rng: np.random.Generator) -> Floats:
 
 
 class _Gain:
-    """Dominated volume that candidates would add, estimated with random points.
-
-    `front`: known feasible designs; `predicted`: predicted objectives.
-    """
+    """Dominated volume that candidates would add to a front, estimated with random points."""
 
     def __init__(self, front: Floats, predicted: Floats, rng: np.random.Generator) -> None:
         from scipy.stats import qmc
@@ -282,8 +275,6 @@ def non_dominated(values: Floats) -> Flags:
 
     Of equal rows only the first is non-dominated; rows with NaN are dominated.
 
-    Examples
-    --------
     >>> non_dominated(np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 3.0], [np.nan, 0.0]])).tolist()
     [True, True, False, False]
     """
@@ -304,8 +295,6 @@ def hypervolume(values: Floats, reference: Floats) -> float:
     reference point.  Computed in slices along the last objective; the time grows with the number of
     rows to the power of the number of objectives.
 
-    Examples
-    --------
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """
@@ -326,8 +315,6 @@ def hypervolume(values: Floats, reference: Floats) -> float:
 def knee(front: Floats) -> int:
     """Return the row nearest to the best value of each objective, scaled by its range.
 
-    Examples
-    --------
     >>> knee(np.array([[0.0, 1.0], [0.2, 0.2], [1.0, 0.0]]))
     1
     """

@@ -19,25 +19,16 @@ SAMPLES = 1024  # a power of two, times the number of variables and two
 class Sensitivity:
     """How one quantity depends on the variables.
 
-    Attributes
-    ----------
-    quantity : str
-    low, high : dict of str to float
-        Value with one variable at its lower or upper bound, the others as in the chosen design
-        [SI].
-    first, total : dict of str to float
-        Sobol indices over the full range of all variables: the share of the variance that a
-        variable explains alone, and with its interactions [1].
-    error : float
-        Leave-one-out error (root mean square) of the surrogate over the standard deviation [1].
+    Tornado values are those with one variable at its bound, the others as in the chosen design;
+    Sobol indices hold over the full range of all variables.
     """
 
     quantity: str
-    low: dict[str, float]
-    high: dict[str, float]
-    first: dict[str, float]
-    total: dict[str, float]
-    error: float
+    low: dict[str, float]  # at the lower bound of a variable [SI]
+    high: dict[str, float]  # at its upper bound [SI]
+    first: dict[str, float]  # share of the variance that a variable explains alone [1]
+    total: dict[str, float]  # and with its interactions [1]
+    error: float  # leave-one-out error (rms) of the surrogate over the standard deviation [1]
 
     def record(self) -> dict[str, Any]:
         """Return the sensitivity as plain data."""
@@ -82,14 +73,8 @@ def sensitivities(
         first[varied] = np.reshape(indices.first_order, (len(varied), count))
         total[varied] = np.reshape(indices.total_order, (len(varied), count))
     errors = model.errors()
-    return [
-        Sensitivity(
-            quantity,
-            named(low[:, k]),
-            named(high[:, k]),
-            named(first[k]),
-            named(total[k]),
-            float(errors[k]),
-        )
-        for k, quantity in enumerate(quantities)
-    ]
+    found = []
+    for k, quantity in enumerate(quantities):
+        tornado, sobol = (named(low[:, k]), named(high[:, k])), (named(first[k]), named(total[k]))
+        found.append(Sensitivity(quantity, *tornado, *sobol, float(errors[k])))
+    return found

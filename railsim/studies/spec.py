@@ -28,21 +28,16 @@ MOST_FAULTS = 20
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run.
+    """One run."""
 
-    `vehicle`, `track`: file, or name of a shipped one; `speed`: speed [m/s]; not needed where the
-    settings have a speed table; `settings`: settings file; `start`: distance at which the reference
-    body starts [m]; `duration`, `until`: end of the run: time [s] or distance [m]; `assignments`:
-    ``key.path=value``, the paths beginning with ``vehicle.``, ``track.`` or ``settings.``.
-    """
-
-    vehicle: str | Path
-    track: str | Path
-    speed: float | None
-    settings: str | Path | None = None
-    start: float = 0.0
-    duration: float | None = None
-    until: float | None = None
+    vehicle: str | Path  # file, or name of a shipped one
+    track: str | Path  # likewise
+    speed: float | None  # [m/s]; not needed where the settings have a speed table
+    settings: str | Path | None = None  # file
+    start: float = 0.0  # distance of the reference body at the start [m]
+    duration: float | None = None  # until its end [s]
+    until: float | None = None  # distance of its end [m]
+    # ``key.path=value`` with ``vehicle.``, ``track.`` or ``settings.`` first
     assignments: tuple[str, ...] = ()
 
 
@@ -97,21 +92,15 @@ class StudySpec(BaseModel):
     """A study: everything that its numbers and its files depend on; see `railsim.study`.
 
     Single values, ranges and numbers are taken too, and held as lists of texts.
-
-    `name`, `purpose`: what a study file or a scenario calls it, and what it is for; no number
-    depends on them; `folder`: folder that relative file names refer to, from the folder of the
-    study; `scenario`: scenario of a campaign, which has tracks and speeds of its own; `quantities`:
-    ``FILE.py:FUNCTION``, see `railsim.studies.user_function`; `keep`, `compress`, `single`: parts
-    of each result that are kept, see `kept_quantities`, and how they are stored.
     """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
     railsim_version: str = __version__
-    name: str | None = None
-    purpose: str | None = None
-    folder: str = "."
-    scenario: str | None = None
+    name: str | None = None  # in a study file or scenario; no number depends on it
+    purpose: str | None = None  # likewise
+    folder: str = "."  # that relative file names refer to, from the folder of the study
+    scenario: str | None = None  # of a campaign, which has tracks and speeds of its own
     vehicles: Annotated[list[str], BeforeValidator(_file_names)]
     tracks: Annotated[list[str], BeforeValidator(_file_names)]
     speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
@@ -120,9 +109,9 @@ class StudySpec(BaseModel):
         Annotated[dict[str, list[str]], BeforeValidator(partial(_table, option="linked"))]
     ] = []
     sample: Annotated[Sample | None, PlainSerializer(_stored)] = None
-    quantities: str | None = None
+    quantities: str | None = None  # ``FILE.py:FUNCTION``, see `railsim.studies.user_function`
     analyses: Annotated[dict[Name, Analysis], PlainSerializer(_stored)] = {}
-    keep: str = "all"
+    keep: str = "all"  # of each result, see `kept_quantities`
     compress: bool = False
     single: bool = False
     settings: Annotated[str | None, BeforeValidator(lambda v: v if v is None else str(v))] = None
@@ -148,13 +137,7 @@ class StudySpec(BaseModel):
 
 @dataclass(frozen=True)
 class Execution:
-    """How the runs of a study are carried out; the numbers do not depend on it.
-
-    Attributes as the arguments of `railsim.study`, and
-
-    longest_first : bool
-        Begin with the longest runs, to balance the load of the cores.
-    """
+    """How the runs of a study are carried out, see `railsim.study`; no number depends on it."""
 
     workers: int | None = None
     together: int = 1
@@ -162,7 +145,7 @@ class Execution:
     resume: bool = False
     overwrite: bool = False
     plots: bool = False
-    longest_first: bool = False
+    longest_first: bool = False  # to balance the load of the cores
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None
@@ -180,20 +163,16 @@ def kept_quantities(keep: str) -> tuple[str, ...]:
     known = [*QUANTITIES, *REQUESTED]
     wrong = [name for name in names if not any(fnmatchcase(one, name) for one in known)]
     if wrong or not names:
+        known = ["all", "summary", *known]
+        words = "no such quantity"
         raise InputError(
-            argument_fault(
-                "keep", name, "no such quantity", nearest(name, ["all", "summary", *known])
-            )
-            for name in wrong or [keep]
+            argument_fault("keep", n, words, nearest(n, known)) for n in wrong or [keep]
         )
     return names
 
 
 def checked(model: type[M], data: Any, file: str) -> M:
-    """Return data as a model.
-
-    Raises InputError: all faults of the data.
-    """
+    """Return data as a model; raises InputError: all faults of the data."""
     try:
         return model.model_validate(data)
     except ValidationError as error:

@@ -28,14 +28,10 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class MapPoint:
-    """One point of a map: the inputs that differ between points.
+    """One point of a map: the inputs that differ between points."""
 
-    `at`: the parameters by name, ``conicity``, ``friction`` or the path of a key; `vehicle`,
-    `track`, `settings`: definitions with the values of the point, except its conicity.
-    """
-
-    at: dict[str, float]
-    vehicle: Vehicle
+    at: dict[str, float]  # by name: ``conicity``, ``friction`` or the path of a key
+    vehicle: Vehicle  # definitions have the values of the point, except its conicity
     track: Track
     settings: Settings
 

@@ -54,21 +54,15 @@ UNLOADING = "unloading (Q0 - Q)/Q0"
 
 @dataclass(frozen=True)
 class StationaryValue:
-    """One quantity of one case, and its limit.
+    """One quantity of one case, and its limit."""
 
-    `case`, `quantity`: track under the vehicle; quantity; `value`: nan where no steady state was
-    found [1 or rad]; `limit`: none where a value is only reported; `place`: wheel, or body;
-    `source`: source of the limit; `checked`: whether the limit has been compared with the printed
-    standard.
-    """
-
-    case: str
+    case: str  # track under the vehicle
     quantity: str
-    value: float
-    limit: float | None
-    place: str
-    source: str = ""
-    checked: bool = False
+    value: float  # nan where no steady state was found [1 or rad]
+    limit: float | None  # none where a value is only reported
+    place: str  # wheel, or body
+    source: str = ""  # of the limit
+    checked: bool = False  # against the printed standard
 
     @property
     def exceeded(self) -> bool:
@@ -78,20 +72,16 @@ class StationaryValue:
 
 @dataclass(frozen=True)
 class Stationary:
-    """Stationary tests of a vehicle.
-
-    `held`: whether the wheelsets were held across the track; `reasons`: cases without a steady
-    state, a sentence each; `loops`: wheel loads on the way to each twist, to the opposite one and
-    back, by its name; `remarks`: what is left out.
-    """
+    """Stationary tests of a vehicle."""
 
     vehicle: str
     edition: str
-    held: bool
+    held: bool  # whether the wheelsets were held across the track
     values: tuple[StationaryValue, ...]
-    reasons: tuple[str, ...]
+    reasons: tuple[str, ...]  # cases without a steady state, a sentence each
+    # wheel loads on the way to each twist, to the opposite one and back, by its name
     loops: dict[str, TwistLoop] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what is left out
 
     @property
     def verdict(self) -> str:

@@ -180,11 +180,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
 
 
 def _draw(outcome: Outcome) -> None:
-    """Draw the runs whose picture is missing or out of date, and comparisons of the vehicles.
-
-    Runs that differ only in the vehicle are drawn into one picture,
-    ``compare_TRACK_SPEED.png``.
-    """
+    """Draw runs whose picture is missing or old, and those of several vehicles into one."""
     from railsim.plot.histories import histories
     from railsim.plot.overlay import overlay
     from railsim.plot.style import save
@@ -207,10 +203,7 @@ def _draw(outcome: Outcome) -> None:
 
 
 def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
-    """Return the study in a folder, and the folder of its relative file names.
-
-    Raises InputError: there is no study, or its inputs cannot be read.
-    """
+    """Return the study in a folder, and the folder of its relative names; raises InputError."""
     data: Any = None
     if is_file(folder / JOURNAL):
         with Journal(folder) as journal:
@@ -246,24 +239,16 @@ def as_files(inputs: Any, folder: Path) -> list[str]:
         name = next(name for name in names if texts.get(name, text) == text)
         texts[name] = text
         path = (folder / INPUTS / f"{name}.toml").absolute()
-        if not _holds(path, text.encode()):
+        if not (path.is_file() and path.read_bytes() == text.encode()):
             make_folder(path.parent)
             write_text(path, text)
         found.append(str(path))
     return found
 
 
-def _holds(path: Path, data: bytes) -> bool:
-    if not path.is_file() or path.stat().st_size != len(data):
-        return False
-    return path.read_bytes() == data
-
-
 def _slug(name: str) -> str:
     """Return a name in a form suitable for a file.
 
-    Examples
-    --------
     >>> _slug("Passenger coach, soft primary")
     'passenger_coach_soft_primary'
     """

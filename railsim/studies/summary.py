@@ -43,21 +43,12 @@ FORMAT = "railsim-study-result/1"
 
 def waiting_record(case: Case) -> Record:
     """Return the record of a run that has not been done yet."""
-    return {
-        "name": case.name,
-        "file": case.file_name,
-        "labels": dict(case.labels),
-        "inputs_hash": case.key,
-        "status": "waiting",
-        "status_reason": "",
-    }
+    about = {"name": case.name, "file": case.file_name, "labels": dict(case.labels)}
+    return {**about, "inputs_hash": case.key, "status": "waiting", "status_reason": ""}
 
 
 def finished_record(case: Case, result: Result, function: str | None = None) -> Record:
-    """Return the record of a run with a result, with user-defined quantities and analyses.
-
-    Raises RailsimError: one of these fails.
-    """
+    """Return the record of a run with its own quantities and analyses; RailsimError: one fails."""
     numbers, said = analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
     facts["remarks"] = [*facts["remarks"], *said]
@@ -120,10 +111,7 @@ class Index(BaseModel):
 
 
 def read_index(path: Path) -> Index:
-    """Return the content of a ``study.json``.
-
-    Raises InputError: the file cannot be read, or is not the index of a study.
-    """
+    """Return the content of a ``study.json``; raises InputError: it cannot be read, or is none."""
     text = read_text(path, INDEX_BYTES)
     # each takes some hundred bytes of memory when it is read
     if max(text.count(","), 5 * text.count("{"), 5 * text.count("[")) > MOST_VALUES:
@@ -141,10 +129,7 @@ def read_index(path: Path) -> Index:
 
 
 def refuse_too_many(inputs: Any, file: str) -> None:
-    """Refuse stored inputs with more values than a study can have: each may become a fault.
-
-    Raises InputError: there are more.
-    """
+    """Refuse, by InputError, stored inputs with more values than a study can have: each a fault."""
     nodes, number = [inputs], 0
     while nodes and number <= MOST_INPUTS:
         node = nodes.pop()
@@ -156,10 +141,7 @@ def refuse_too_many(inputs: Any, file: str) -> None:
 
 
 def check_index(path: Path) -> Index:
-    """Return the content of a ``study.json``; every finished run must have its result.
-
-    Raises InputError: as `read_index`, or results are missing.
-    """
+    """Return the index of a study; raises InputError, also where the result of a run is missing."""
     index = read_index(path)
     allowed = "the same study with `resume` computes it again"
     faults = Faults()
@@ -169,9 +151,8 @@ def check_index(path: Path) -> Index:
         if Path(run.file).name != run.file:
             faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
         elif not is_file(path.parent / run.file):
-            faults.append(
-                Fault(str(path), run.file, "the result is missing", allowed, option=str(path))
-            )
+            found = "the result is missing"
+            faults.append(Fault(str(path), run.file, found, allowed, option=str(path)))
     faults.check()
     return index
 
@@ -221,8 +202,6 @@ def _checked_row(record: Record) -> dict[str, Any]:
 def unit_of(column: str) -> str:
     """Return the unit of a column of the summary, empty if it has none.
 
-    Examples
-    --------
     >>> [unit_of(name) for name in ("Q_peak", "Q_peak_time", "wheelset_yaw_mid2", "Q_peak_side")]
     ['N', 's', 'rad', '']
     """

@@ -72,10 +72,7 @@ def fingerprint(name: str | None) -> str:
 
 
 def user_quantities(name: str | None, result: Result) -> dict[str, float]:
-    """Return the values of the function for a result; none if there is no function.
-
-    Raises RailsimError: the function fails, or does not return numbers by name.
-    """
+    """Return the values of the function, if any, for a result; RailsimError: no numbers by name."""
     if name is None:
         return {}
     try:

@@ -62,18 +62,16 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class WearStep:
-    """One step of the wear loop.
+    """One step of the wear loop; of rails distances are tonnages [kg].
 
-    `distance`, `length`: distance run before the step, and in the step [m]; of rails the tonnage
-    [kg]; `profiles`, `worn_profiles`: by side of the rail, or ``wheel``: in this step, and after
-    it; `depths`: depth of wear per distance or tonnage, mean of all wheels, tracks or vehicles and
-    over the step, on `wear_depth.grid` [m/m] or [m/kg].
+    `depths`: of wear per distance or tonnage, mean of all wheels, tracks or vehicles and over the
+    step, on `wear_depth.grid` [m/m] or [m/kg].
     """
 
-    distance: float
-    length: float
-    profiles: Mapping[str, Profile]
-    worn_profiles: Mapping[str, Profile]
+    distance: float  # before the step [m]
+    length: float  # in the step [m]
+    profiles: Mapping[str, Profile]  # by side of the rail, or ``wheel``
+    worn_profiles: Mapping[str, Profile]  # after the step
     depths: Mapping[str, Floats]
 
     @property
@@ -160,22 +158,18 @@ def wear_loop(
 
 @dataclass(frozen=True)
 class Wearing:
-    """What wears.
-
-    `new`: profiles at the beginning; `names`: names by which vehicle or track call them; `depths`:
-    a result and a law to the depth of each profile per distance or tonnage; `ended`: worn profiles
-    to the sentence why the loop ends; empty while it goes on; `outputs`: what the runs put out;
-    `unit`, `scale`: in which messages give distance or tonnage, and its factor from SI.
-    """
+    """What wears."""
 
     runs: Sequence[Run]
-    new: Mapping[str, Profile]
-    names: Mapping[str, str]
+    new: Mapping[str, Profile]  # profiles at the beginning
+    names: Mapping[str, str]  # by which vehicle or track call them
+    # a result and a law to the depth of each profile per distance or tonnage
     depths: Callable[[Result, WearLaw], dict[str, Floats]]
+    # worn profiles to the sentence why the loop ends; empty while it goes on
     ended: Callable[[Mapping[str, Profile]], str] = lambda _: ""
-    outputs: Sequence[str] = ("contact_patches",)
-    unit: str = "km"
-    scale: float = 1e-3
+    outputs: Sequence[str] = ("contact_patches",)  # of the runs
+    unit: str = "km"  # of distance or tonnage in messages
+    scale: float = 1e-3  # its factor from SI
 
     def amount(self, at: float) -> str:
         """Return a distance or tonnage as messages give it."""

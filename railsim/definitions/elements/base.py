@@ -48,8 +48,6 @@ Characteristic = Annotated[
 def two_sided(rows: Rows) -> Rows:
     """Return the table with its mirror image when it begins at zero.
 
-    Examples
-    --------
     >>> two_sided(((0.0, 0.0), (0.1, 5.0)))
     ((-0.1, -5.0), (0.0, 0.0), (0.1, 5.0))
     """

@@ -241,8 +241,6 @@ def _gauss_on_ring(inner: float, outer: float) -> list[tuple[float, float]]:
 
     The radii are the zeros of r^2 - a r + b, orthogonal to 1 and r with the weight r dr.
 
-    Examples
-    --------
     >>> [(round(r, 4), round(share, 4)) for r, share in _gauss_on_ring(0.0, 1.0)]
     [(0.3551, 0.3639), (0.8449, 0.6361)]
     """

@@ -20,15 +20,13 @@ NOTHING: Triple = (0.0, 0.0, 0.0)
 class State:
     """Internal state of an element.
 
-    `law`: ``maxwell`` damper with a spring in series; ``maxwell_curve`` the same with a table;
-    ``pad`` that sticks and slides; ``air`` of a reservoir; ``lag`` of a command; ``own`` of a law
-    of one's own; `parameter`: as in `railsim.kernels.internal.Internal`; `table`: force over
-    velocity of ``maxwell_curve``.
+    Of a ``maxwell`` damper with a spring in series (``maxwell_curve``: by a table), a ``pad`` that
+    sticks and slides, the ``air`` of a reservoir, the ``lag`` of a command, a law of one's ``own``.
     """
 
     law: Literal["maxwell", "maxwell_curve", "pad", "air", "lag", "own"]
-    parameter: Triple
-    table: Rows | None = None
+    parameter: Triple  # as in `railsim.kernels.internal.Internal`
+    table: Rows | None = None  # force over velocity of ``maxwell_curve``
 
 
 @dataclass(frozen=True)
@@ -66,30 +64,22 @@ class Link:
 
 @dataclass(frozen=True, kw_only=True)
 class Mount:
-    """Springs, dampers, tables and friction along the axes of body 1, rotation about them.
+    """Springs, dampers, tables and friction along the axes of body 1, rotation about them."""
 
-    - `stiffness`, `damping`, `preload`: along x, y, z [N/m], [N s/m], [N]
-    - `rotation`, `rotation_damping`: stiffness and damping about x, y, z [N m/rad], [N m s/rad]
-    - `tables`: force over displacement beside the springs [N], [m]
-    - `friction`: limits along x, y, z; `states` are then pads
-    - `states`: internal states of the forces along x, y, z
-    - `translates`: whether forces act, not moments alone
-    - `both_ends`: whether the force acts in the middle between the points, in the axes of both
-      bodies
-    - `one_sided`: whether spring and damper along z press and never pull
-    """
-
-    stiffness: Triple = NOTHING
-    damping: Triple = NOTHING
-    preload: Triple = NOTHING
-    rotation: Triple = NOTHING
-    rotation_damping: Triple = NOTHING
+    stiffness: Triple = NOTHING  # along x, y, z [N/m]
+    damping: Triple = NOTHING  # [N s/m]
+    preload: Triple = NOTHING  # [N]
+    rotation: Triple = NOTHING  # stiffness about x, y, z [N m/rad]
+    rotation_damping: Triple = NOTHING  # [N m s/rad]
+    # force [N] over displacement [m] beside the springs
     tables: tuple[Rows | None, Rows | None, Rows | None] = (None, None, None)
-    friction: Limits | None = None
+    friction: Limits | None = None  # limits along x, y, z; `states` are then pads
+    # of the forces along x, y, z
     states: tuple[State | None, State | None, State | None] = (None, None, None)
-    translates: bool = True
+    translates: bool = True  # whether forces act, not moments alone
+    # the force acts in the middle between the points, in the axes of both bodies
     both_ends: bool = False
-    one_sided: bool = False
+    one_sided: bool = False  # spring and damper along z press and never pull
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,29 +108,22 @@ AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 @dataclass(frozen=True, kw_only=True)
 class Act:
-    """A force that follows a command or a law of one's own.
+    """A force that follows a command or a law of one's own."""
 
-    `action`: ``line``, one of `AXES` of body 1, or ``axle`` of body 2; `mode`: what the command is:
-    ``force``, ``damper``, ``position``, ``brake``; ``law``: an argument of the law; `sense`: -1
-    where the axis is reversed; `lag`, `delay`, `stiffness`, `damping`: [s], [s], [N/m or N m/rad],
-    [N s/m or N m s]; `rate_limit`, `force_limit`, `power_limit`, `stroke`: of the command per
-    second, [N or N m], [W], [m or rad]; `law`, `parameters`: name of the law and values of its
-    further arguments.
-    """
-
-    action: str
+    action: str  # ``line``, one of `AXES` of body 1, or ``axle`` of body 2
+    # what the command is; ``law``: an argument of the law
     mode: Literal["force", "damper", "position", "law", "brake"]
-    sense: float = 1.0
-    lag: float = 0.0
-    delay: float = 0.0
-    stiffness: float = 0.0
-    damping: float = 0.0
-    rate_limit: float | None = None
-    force_limit: float | None = None
-    power_limit: float | None = None
-    stroke: float | None = None
-    law: str = ""
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    sense: float = 1.0  # -1 where the axis is reversed
+    lag: float = 0.0  # [s]
+    delay: float = 0.0  # [s]
+    stiffness: float = 0.0  # [N/m or N m/rad]
+    damping: float = 0.0  # [N s/m or N m s]
+    rate_limit: float | None = None  # of the command per second
+    force_limit: float | None = None  # [N or N m]
+    power_limit: float | None = None  # [W]
+    stroke: float | None = None  # [m or rad]
+    law: str = ""  # its name
+    parameters: Mapping[str, float] = field(default_factory=dict)  # its further arguments
 
 
 Row = Link | Mount | Load | Drive | Act

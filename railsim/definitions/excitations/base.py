@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Definition, Finite, check
+from railsim.definitions.base import Definition, Finite, check, holds
 
 Displacement = Callable[[Floats], tuple[Floats, Floats]]
 
@@ -34,15 +34,9 @@ Channel = Literal["lateral", "vertical", "cross_level", "gauge"]
 Amplitude = Annotated[Finite, Field(ge=-0.5, le=0.5)]
 
 
-def _band(wavelengths: tuple[float, float]) -> tuple[float, float]:
-    if wavelengths[1] <= wavelengths[0]:
-        raise ValueError("[shortest, longest]: the second must be larger than the first")
-    return wavelengths
-
-
 Wavelengths = Annotated[
     tuple[Annotated[Finite, Field(ge=0.2)], Annotated[Finite, Field(le=1000.0)]],
-    AfterValidator(_band),
+    holds(lambda w: w[0] < w[1], "[shortest, longest]: the second must be larger than the first"),
 ]
 
 

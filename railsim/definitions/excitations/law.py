@@ -59,11 +59,7 @@ class ByLaw(Stretch):
         raise NotImplementedError
 
     def displacement_by(self, function: Callable[[Floats], Floats], length: float) -> Displacement:
-        """Return how it moves the rails, its rate by central differences of order 4.
-
-        `function`: what the law gives at some arc lengths [m]; `length`: length of the track's plan
-        [m].
-        """
+        """Return how it moves the rails by a function of the arc length, with its rate."""
         h, (begin, end) = self.shortest / PER_WAVE, self.extent(length)
         shares = self.factor * rails_moved(self.channel)
 

@@ -38,10 +38,7 @@ STEEPEST = 0.2
 
 
 def embed_measured(data: dict[str, Any]) -> list[Fault]:
-    """Replace `file` by the `rows` that it holds in every measured irregularity of a track.
-
-    `data`: a track as plain tables; changed in place. Returns: what is wrong in the files.
-    """
+    """Replace `file` by `rows` in the measured irregularities of plain tables; return faults."""
     return embed(tables_of(data, "irregularities"), "rows", "a CSV beside the track file", _embed)
 
 
@@ -89,10 +86,7 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
 
 
 def read_measured(path: Path, how: Measured) -> Floats:
-    """Read rows [s, y_left, z_left, y_right, z_right] in m.
-
-    Raises InputError: the faults of the file.
-    """
+    """Read rows [s, y_left, z_left, y_right, z_right] in m; raises InputError."""
     try:
         text = read_bytes(path, TABLE_BYTES).decode(how.encoding or "utf-8-sig")
         return _rows_of(path, text, how)
@@ -151,10 +145,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
 
 
 def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[float]:
-    """Numbers of a row in the columns that are read.
-
-    Raises ValueError: what was found, and what is allowed.
-    """
+    """Numbers of a row that are read; raises ValueError of what was found and what is allowed."""
     if len(cells) != len(columns):
         raise ValueError(f"{len(cells)} values", f"{len(columns)} values as in the header")
     try:

@@ -47,25 +47,17 @@ class Coefficients(Definition):
 
 @dataclass(frozen=True)
 class Spectrum:
-    """One-sided spectra of the irregularities that a source describes.
+    """One-sided spectra of the irregularities that a source describes."""
 
-    - `label`: what it is called in tables and plots
-    - `source`: where the coefficients come from, with their source quality
-    - `densities`: by channel (`lateral`, `vertical`, `cross_level`, `gauge`): S over the source's
-      variable
-    - `per_cycle`: whether the variable is the spatial frequency f [1/m]; else omega [rad/m]
-    - `unit`: size of the source's unit of S in m2 per unit of the variable (1e-6 for mm2)
-    - `half_base`: half the distance between the rails to which the cross level refers [m]
-    - `cross_level_is_height`: whether the source gives the cross level as a height difference; else
-      as an angle
-    """
-
-    label: str
-    source: str
+    label: str  # in tables and plots
+    source: str  # of the coefficients, with its quality
+    # by channel (`lateral`, `vertical`, `cross_level`, `gauge`): S over the source's variable
     densities: Mapping[str, Density]
-    per_cycle: bool = False
-    unit: float = 1.0
+    per_cycle: bool = False  # the variable is the spatial frequency f [1/m]; else omega [rad/m]
+    unit: float = 1.0  # of the source's S, in m2 per unit of the variable (1e-6 for mm2)
+    # half the distance between the rails to which the cross level refers [m]
     half_base: float = 0.75
+    # the source gives the cross level as a height difference; else as an angle
     cross_level_is_height: bool = True
 
     @property

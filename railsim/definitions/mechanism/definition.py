@@ -376,9 +376,7 @@ class Mechanism(FileDefinition):
     def in_case(self, case: str | None) -> "Mechanism":
         """Return the mechanism with the parameters of a case; None is the base.
 
-        Raises
-        ------
-        InputError : there is no such case.
+        Raises InputError: there is no such case.
         """
         if case is None:
             return self

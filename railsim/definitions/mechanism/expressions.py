@@ -64,10 +64,7 @@ class Expression(str):
     names: frozenset[str]
 
     def __new__(cls, text: str) -> "Expression":
-        """Parse a text.
-
-        Raises ValueError: it is no arithmetic.
-        """
+        """Parse a text; raises ValueError: it is no arithmetic."""
         made = super().__new__(cls, text)
         made.tree = _parsed(text)
         made.code = _compiled(made.tree)
@@ -148,8 +145,6 @@ def evaluate(expression: Expression, values: Mapping[str, Any]) -> Any:
     `expression`: what to evaluate; `values`: parameters by name. Raises ValueError: a division by
     zero, a function outside its domain, an overflow.
 
-    Examples
-    --------
     >>> float(evaluate(Expression("hypot(a, 4) * cos(0)"), {"a": 3.0}))
     5.0
     """

@@ -33,15 +33,12 @@ def _quantity(value: Any) -> float | str:
     return float(value)
 
 
-Quantity = Annotated[
-    float | str,
-    PlainValidator(_quantity),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
-]
+_NUMBER_OR_TEXT = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
+Quantity = Annotated[float | str, PlainValidator(_quantity), _NUMBER_OR_TEXT]
 QuantityOrAuto = Annotated[
     float | str,
     PlainValidator(lambda value: AUTO if value == AUTO else _quantity(value)),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
+    _NUMBER_OR_TEXT,
 ]
 
 
@@ -343,9 +340,8 @@ Rows = Annotated[tuple[tuple[Quantity, Quantity], ...], Field(min_length=2)]
 
 def _one_law(spring: Any, free: str) -> None:
     """Refuse a spring with stiffness and table, or with neither."""
-    linear = spring.stiffness is not None and getattr(spring, free) is not None
-    either = spring.stiffness is not None or getattr(spring, free) is not None
-    if linear == (spring.table is not None) or (either and not linear):
+    given = [getattr(spring, key) is not None for key in ("stiffness", free, "table")]
+    if given not in ([True, True, False], [False, False, True]):
         raise ValueError(f"either 'stiffness' and '{free}', or 'table'")
 
 

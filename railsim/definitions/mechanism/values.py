@@ -65,10 +65,7 @@ def parameter_values(
 
 
 def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> Any:
-    """Value of a number or an expression.
-
-    Raises InputError: it has none.
-    """
+    """Value of a number or an expression; raises InputError: it has none."""
     if not isinstance(quantity, Expression):
         return quantity
     try:

@@ -93,8 +93,6 @@ class Analyses(Definition):
 def unit_of_number(name: str) -> str:
     """Return the unit of an analysis' number, ``NAME.NUMBER``; empty where it has none.
 
-    Examples
-    --------
     >>> unit_of_number("hunting.linear"), unit_of_number("wear.percentiles_50")
     ('m/s', '')
     """

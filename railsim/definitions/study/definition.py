@@ -32,8 +32,6 @@ def value_texts(values: Values) -> list[str]:
 
     Raises ValueError: a range that is none.
 
-    Examples
-    --------
     >>> value_texts("0.2:0.4:3"), value_texts((True, 0.5, "72 km/h", (10, 20)))
     (['0.2', '0.3', '0.4'], ['true', '0.5', '72 km/h', '[10, 20]'])
     """

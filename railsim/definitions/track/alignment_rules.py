@@ -31,10 +31,7 @@ ROUND_OFF = 1.0 + 1e-6
 def alignment_remarks(
     plan: Sequence[Section], cant: Sequence[Section], speed: float
 ) -> list[Remark]:
-    """Return where a plan with its cant breaks the rules.
-
-    `plan`, `cant`: curvature [1/m] and cant [m] over arc length; `speed`: permitted speed [m/s].
-    """
+    """Return where plan [1/m] and cant [m] over arc length break the rules at a speed [m/s]."""
     return [
         *_cants(plan, cant, speed),
         *_ramps(cant, speed),

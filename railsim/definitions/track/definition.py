@@ -8,12 +8,11 @@ cant and gradient are piecewise linear in the arc length and rounded over `round
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE, NORMAL_GAUGE
 from railsim.definitions.base import (
-    SIDED_ROWS,
     Definition,
     Finite,
     Flag,
@@ -22,13 +21,14 @@ from railsim.definitions.base import (
     NonNegativePair,
     Remark,
     Share,
+    SidedRows,
     Speed,
     Text,
     TextPair,
     both_sides,
+    holds,
     one_or_two,
     pair,
-    rises,
 )
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured_file import embed_measured
@@ -47,32 +47,14 @@ ArcLength = TypeVar("ArcLength", float, Any)
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
 
-def _softer_in_slip(factors: tuple[float, float]) -> tuple[float, float]:
-    if factors[1] > factors[0]:
-        raise ValueError("the factor of the slip area is at most that of the adhesion area")
-    return factors
-
-
+SOFTER = "the factor of the slip area is at most that of the adhesion area"
 Widening = Annotated[Finite, Field(ge=-0.05, le=0.1)]
-FrictionRows = Annotated[
-    tuple[tuple[Finite, NonNegative, NonNegative], ...],
-    Field(min_length=1),
-    rises("arc length"),
-    both_sides(),
-    SIDED_ROWS,
-]
+
 ThirdBody = Annotated[
     tuple[Share, Share],
-    AfterValidator(_softer_in_slip),
+    holds(lambda factors: factors[1] <= factors[0], SOFTER),
     BeforeValidator(pair),
     one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
-]
-WideningRows = Annotated[
-    tuple[tuple[Finite, Widening, Widening], ...],
-    Field(min_length=1),
-    rises("arc length"),
-    both_sides(0.5),
-    SIDED_ROWS,
 ]
 
 
@@ -114,14 +96,14 @@ class Track(FileDefinition, Plottable):
     """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
     friction: NonNegativePair = (0.4, 0.4)
     """Coefficient of friction, one number, or left and right [1]"""
-    friction_table: FrictionRows | None = None
+    friction_table: SidedRows[NonNegative] | None = None
     """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
     friction_falling: FallingFriction | None = None
     """How friction falls with the slip velocity; by default it does not"""
     third_body: ThirdBody = (1.0, 1.0)
     """Factor of Kalker's coefficients by a layer of dirt or water, one number or [adhesion, slip]:
     the second, for the slip area, is for the creep law `polach` only [1]"""
-    gauge_widening: WideningRows | None = None
+    gauge_widening: Annotated[SidedRows[Widening], both_sides(0.5)] | None = None
     """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
     much each rail stands further out than the gauge says, one number being shared by both rails"""
     rounding: Annotated[Finite, Field(ge=0.1, le=200)] = 10.0

@@ -2,18 +2,12 @@
 
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from railsim.definitions.base import Definition, Finite
+from railsim.definitions.base import Definition, Finite, holds
 
-
-def _curved(radius: float) -> float:
-    if not abs(radius) >= 5.0:
-        raise ValueError("a radius is 5 m at least, negative in a left-hand curve, inf if straight")
-    return radius
-
-
-Radius = Annotated[float, Field(strict=True), AfterValidator(_curved)]
+CURVED = "a radius is 5 m at least, negative in a left-hand curve, inf if straight"
+Radius = Annotated[float, Field(strict=True), holds(lambda radius: abs(radius) >= 5.0, CURVED)]
 Length = Annotated[Finite, Field(gt=0, le=1e7)]
 Cant = Annotated[Finite, Field(ge=-0.5, le=0.5)]
 Gradient = Annotated[Finite, Field(ge=-0.3, le=0.3)]

@@ -5,18 +5,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Section:
-    """One element of a list with the values at its ends.
+    """One element of a list with its values at both ends: curvature, cant or gradient."""
 
-    `key`: its key in the file, e.g. ``plan.2``; `type`: its type as written; `begin`, `end`: arc
-    lengths of its ends [m]; `start_value`, `end_value`: curvature [1/m], cant [m] or gradient [1]
-    at its ends.
-    """
-
-    key: str
-    type: str
-    begin: float
-    end: float
-    start_value: float
+    key: str  # in the file, e.g. ``plan.2``
+    type: str  # as written
+    begin: float  # arc length [m]
+    end: float  # arc length [m]
+    start_value: float  # [1/m], [m] or [1]
     end_value: float
 
     @property

@@ -20,31 +20,12 @@ slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema
+from pydantic import WithJsonSchema
 
-from railsim.definitions.base import (
-    NUMBERS,
-    SIDED_ROWS,
-    Definition,
-    Finite,
-    NonNegative,
-    Positive,
-    both_sides,
-    check,
-    rises,
-)
+from railsim.definitions.base import NUMBERS, Definition, NonNegative, Positive, SidedRows, check
 
 SpringDamper = Annotated[tuple[Positive, NonNegative], WithJsonSchema({**NUMBERS, "maxItems": 2})]
 Preset = Literal["rigid", "ballasted", "co-running", "p2", "slab"]
-
-
-FactorRows = Annotated[
-    tuple[tuple[Finite, Positive, Positive], ...],
-    Field(min_length=1),
-    rises("arc length"),
-    both_sides(),
-    SIDED_ROWS,
-]
 
 
 @dataclass(frozen=True)
@@ -128,15 +109,14 @@ class Support(Definition):
     """Lateral [stiffness N/m, damping N s/m] of the whole sleeper"""
     ballast_base: Positive | None = None
     """Lateral distance of the ballast's vertical springs from the track's middle [m]"""
-    variation: FactorRows | None = None
+    variation: SidedRows[Positive] | None = None
     """Rows [s, factor] or [s, pads, ballast]: factors of stiffness and damping along the track,
     linear in between, constant beyond [m, 1]"""
 
     @check
     def _complete(self) -> None:
-        given = [
-            name for name in SupportValues.__dataclass_fields__ if getattr(self, name) is not None
-        ]
+        names = SupportValues.__dataclass_fields__
+        given = [name for name in names if getattr(self, name) is not None]
         base = PRESETS[self.preset]
         if base is None:
             if given or self.variation:
@@ -154,19 +134,11 @@ class Support(Definition):
                 raise ValueError(
                     "'rail_mass', 'sleeper_mass' and 'sleeper_inertia' are all 0 or all positive"
                 )
-        elif any(
-            getattr(self, name) is not None
-            for name in ("sleeper_mass", "sleeper_inertia", "ballast_base")
-        ):
+        elif {"sleeper_mass", "sleeper_inertia", "ballast_base"} & {*given}:
             raise ValueError("a sleeper needs 'ballast_vertical' and 'ballast_lateral'")
-        if values.massless and not self._damped(values):
+        springs = [values.pad_vertical, values.pad_lateral, *sleeper]
+        if values.massless and any(spring[1] == 0.0 for spring in springs if spring is not None):
             raise ValueError("without masses every spring needs a damping above 0")
-
-    @staticmethod
-    def _damped(values: SupportValues) -> bool:
-        pads, ballast = values.pad_vertical, values.ballast_vertical
-        parts = [pads, values.pad_lateral, ballast, values.ballast_lateral]
-        return all(part[1] > 0.0 for part in parts if part is not None)
 
     @property
     def values(self) -> SupportValues | None:

@@ -39,10 +39,7 @@ def bogie_name(flat: FlatVehicle, wheelset: FlatBody) -> str:
 
 
 def bogie_mass(flat: FlatVehicle, wheelset: FlatBody) -> float:
-    """Mass of the bogie of a wheelset [kg]: frame, bodies of its assembly, and its wheelsets.
-
-    Zero where no frame is above it.
-    """
+    """Mass of frame, assembly and wheelsets of the bogie of a wheelset [kg]; 0 without a frame."""
     frame = frame_above(flat, wheelset)
     if frame is None:
         return 0.0

@@ -5,8 +5,8 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 (preloads, forces) turn with them, stiffness and damping do not.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -31,46 +31,34 @@ Group: TypeAlias = "Vehicle | Assembly"
 
 @dataclass(frozen=True)
 class FlatBody:
-    """A body in its nominal position.
+    """A body in its nominal position."""
 
-    - `name`: full name, e.g. ``front.outer.wheelset``
-    - `kind`: an axlebox has no mass of its own, only `pitch_inertia`
-    - `mass`: mass [kg]
-    - `inertia`: principal moments of inertia about x, y, z [kg m2]
-    - `position`: centre of gravity in vehicle axes (an axlebox: its bearing's centre) [m]
-    - `wheelset`: definition of the wheelset with radii and profiles
-    - `parent`: wheelset that carries the axlebox
-    - `pitch_inertia`: moment of inertia of an axlebox about the axle [kg m2]
-    - `fixed`: where a body is held: ``track`` or ``ground``
-    """
-
-    name: str
+    name: str  # full name, e.g. ``front.outer.wheelset``
+    # an axlebox has no mass of its own, only `pitch_inertia`
     kind: Literal["body", "wheelset", "axlebox"]
-    mass: float
-    inertia: Vector
-    position: Vector
-    wheelset: Wheelset | None = None
-    parent: str | None = None
-    pitch_inertia: float = 0.0
-    fixed: str | None = None
+    mass: float  # [kg]
+    inertia: Vector  # principal moments about x, y, z [kg m2]
+    position: Vector  # centre of gravity in vehicle axes (an axlebox: its bearing's centre) [m]
+    wheelset: Wheelset | None = None  # with radii and profiles
+    parent: str | None = None  # wheelset that carries the axlebox
+    pitch_inertia: float = 0.0  # of an axlebox about the axle [kg m2]
+    fixed: str | None = None  # where a body is held: ``track`` or ``ground``
 
 
 @dataclass(frozen=True)
 class FlatElement:
     """A force element in its nominal position.
 
-    `name`, `body1`, `body2`: full names of the element and of the bodies it acts between; an
-    applied force has no second body (an empty name); `point1`, `point2`: where it acts in vehicle
-    axes; an element without points: the bodies' positions [m]; `definition`: its parameters, with
-    signs as they are in this placement.
+    An applied force has no second body (an empty name); an element without points acts at the
+    positions of the bodies.
     """
 
-    name: str
+    name: str  # full name, as those of the bodies
     body1: str
     body2: str
-    point1: Vector
+    point1: Vector  # in vehicle axes [m]
     point2: Vector
-    definition: Element
+    definition: Element  # with signs as they are in this placement
 
 
 KEPT = "_flattened"
@@ -78,18 +66,14 @@ KEPT = "_flattened"
 
 @dataclass(frozen=True)
 class FlatVehicle:
-    """A vehicle without assemblies.
-
-    `name`: name of the vehicle; `bodies`: bodies in the order of the file, wheelsets from the
-    leading end, axleboxes in the order of their wheelsets, left before right; `elements`: elements
-    in the order of the file, left before right; `reference`: name of the body whose arc length is
-    the vehicle's `distance`.
-    """
+    """A vehicle without assemblies."""
 
     name: str
+    # in the order of the file; wheelsets from the leading end; axleboxes as their wheelsets, left
+    # before right
     bodies: tuple[FlatBody, ...]
-    elements: tuple[FlatElement, ...]
-    reference: str
+    elements: tuple[FlatElement, ...]  # in the order of the file, left before right
+    reference: str  # name of the body whose arc length is the vehicle's `distance`
 
     def body(self, name: str) -> FlatBody:
         """Return the body with this full name."""
@@ -98,6 +82,11 @@ class FlatVehicle:
     def of_kind(self, kind: str) -> tuple[FlatBody, ...]:
         """Return the bodies of one kind, in their order."""
         return tuple(body for body in self.bodies if body.kind == kind)
+
+    def along(self, bodies: Iterable[FlatBody]) -> list[float]:
+        """Where bodies stand along the vehicle, from its reference body [m]."""
+        origin = self.body(self.reference).position[0]
+        return [body.position[0] - origin for body in bodies]
 
     @property
     def mass(self) -> float:
@@ -232,17 +221,12 @@ def _elements(group: Group, frame: _Frame, positions: dict[str, Vector]) -> Iter
                 at = (frame.point(points[0], side), frame.point(points[1], side))
             definition = element.mirrored(frame.signs(side)).with_known_preload(*at)
             body2 = ends[1] if len(ends) == 2 else ""
-            full, signs = frame.full(sided), frame.signs(side)
-            parts = definition.parts()
+            full, parts = frame.full(sided), definition.parts()
             for suffix, offset, part in parts:
-                there = _sum(at[0], tuple(s * d for s, d in zip(signs, offset, strict=True)))
+                there = replace(frame, origin=at[0]).point(offset, side)
                 yield FlatElement(f"{full}.{suffix}", ends[0], body2, there, there, part)
             if not parts:
                 yield FlatElement(full, ends[0], body2, at[0], at[1], definition)
-
-
-def _sum(one: Sequence[float], two: Sequence[float]) -> Vector:
-    return (one[0] + two[0], one[1] + two[1], one[2] + two[2])
 
 
 def position_faults(vehicle: "Vehicle") -> list[Fault]:

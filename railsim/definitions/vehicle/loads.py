@@ -70,28 +70,21 @@ def loaded(vehicle: V) -> V:
 
 
 def _changes(group: Any, load: LoadGroup) -> dict[str, object]:
-    bodies = {
-        name: body.model_copy(update=load.bodies[name].model_dump(exclude_none=True))
-        if name in load.bodies
-        else body
-        for name, body in group.bodies.items()
-    }
-    assemblies = {
-        name: assembly.model_copy(update=_changes(assembly, load.assemblies[name]))
-        if name in load.assemblies
-        else assembly
-        for name, assembly in group.assemblies.items()
-    }
+    bodies, assemblies = dict(group.bodies), dict(group.assemblies)
+    for name in load.bodies.keys() & bodies.keys():
+        change = load.bodies[name].model_dump(exclude_none=True)
+        bodies[name] = bodies[name].model_copy(update=change)
+    for name in load.assemblies.keys() & assemblies.keys():
+        change = _changes(assemblies[name], load.assemblies[name])
+        assemblies[name] = assemblies[name].model_copy(update=change)
     return {"bodies": bodies, "assemblies": assemblies}
 
 
 def load_faults(vehicle: Any) -> list[Fault]:
     """Return what load cases name that is not there; the faults' file is left empty."""
-    faults = [
-        fault
-        for name, load in vehicle.loads.items()
-        for fault in _unknown(vehicle, load, f"loads.{name}")
-    ]
+    faults: list[Fault] = []
+    for name, load in vehicle.loads.items():
+        faults += _unknown(vehicle, load, f"loads.{name}")
     if DESIGN in vehicle.loads:
         found = "the load of the vehicle's own numbers is called so"
         faults.append(Fault("", f"loads.{DESIGN}", found, "another name"))

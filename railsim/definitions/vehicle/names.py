@@ -17,6 +17,7 @@ Scope = tuple[str, ...]
 Wrong = tuple[str, str, Callable[[], str]]
 """Key, what was found, and what is allowed."""
 SIDES = ("left", "right")
+KINDS = {"bodies": "body", "wheelsets": "wheelset", "axleboxes": "axlebox"}
 MOST_PARTS = 5000  # a train of twenty coaches has some 2000
 MOST_WHEELSETS = 200
 # to find the static equilibrium [s], by the square of the number of wheelsets
@@ -26,15 +27,11 @@ DEEPEST_ASSEMBLY = 10
 
 @dataclass(frozen=True)
 class Group:
-    """One standing assembly, or the vehicle itself.
+    """One standing assembly, or the vehicle itself."""
 
-    `parts`: its table: bodies, wheelsets, axleboxes, elements; `scope`: names of the placements
-    that lead to it; `path`: keys that lead to its table in the file.
-    """
-
-    parts: Mapping[str, Any]
-    scope: Scope
-    path: tuple[str, ...]
+    parts: Mapping[str, Any]  # its table: bodies, wheelsets, axleboxes, elements
+    scope: Scope  # names of the placements that lead to it
+    path: tuple[str, ...]  # keys that lead to its table in the file
 
     def table(self, key: str) -> dict[str, Mapping[str, Any]]:
         """Return the well-formed members of one of its tables."""
@@ -79,9 +76,7 @@ def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
     while level:
         inner = []
         for group, path, copies in level:
-            tables = (
-                _members(group, key) for key in ("bodies", "wheelsets", "axleboxes", "elements")
-            )
+            tables = (_members(group, key) for key in (*KINDS, "elements"))
             total += copies * sum(len(table) for table in tables)
             wheelsets += copies * len(_members(group, "wheelsets"))
             if total > MOST_PARTS or len(path) > 2 * DEEPEST_ASSEMBLY:
@@ -123,11 +118,7 @@ def body_names(parts: Mapping[str, Any]) -> tuple[dict[str, str], list[Fault]]:
     kinds: dict[str, str] = {}
     faults: list[Fault] = []
     for group in groups(parts):
-        for table, kind in (
-            ("bodies", "body"),
-            ("wheelsets", "wheelset"),
-            ("axleboxes", "axlebox"),
-        ):
+        for table, kind in KINDS.items():
             for name, part in group.table(table).items():
                 key = ".".join((*group.path, table, name))
                 for sided, _ in sided_names(name, part.get("sides")):

@@ -29,8 +29,6 @@ class Box(NamedTuple):
 def body_boxes(flat: FlatVehicle) -> dict[str, Box]:
     """Return the boxes of the rigid bodies, by their names; wheelsets and axleboxes have none.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_vehicle
     >>> from railsim.definitions.vehicle.flatten import flatten
     >>> boxes = body_boxes(flatten(load_vehicle("coach_manchester")))
