@@ -144,9 +144,9 @@ def _joined(sections: Sequence[Section]) -> list[Section]:
 def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
     """Zone of a radius; empty where there is none.
 
-    Very large radii with small cant deficiency belong to zone 1.  The ends of zone 3, 400 and 600 m,
-    belong to it and not to the zones beside it (from memory of UIC 518 and EN 14363: zone 4 is
-    250 m <= R < 400 m).
+    Very large radii with small cant deficiency belong to zone 1.  The ends of zone 3, 400 and
+    600 m, belong to it and not to the zones beside it (from memory of UIC 518 and EN 14363: zone 4
+    is 250 m <= R < 400 m).
     """
     straight = next((n for n, z in limits.zones.items() if z.radius is None), "")
     if math.isinf(radius):
