@@ -401,6 +401,7 @@ def _contact(
                 -body.position[2],
                 wheelset.back_to_back,
                 wheelset.tape_circle_distance,
+                track.widest,  # auxiliary runs stand on plain track
             )
             wheel = profile(wheelset.profile[side], "wheel")
             rail = profile(track.rail[side], "rail")
@@ -417,6 +418,7 @@ def _contact(
                 nu=settings.poisson,
                 centre_height=-body.position[2],
                 normal=settings.normal_contact,
+                widening=track.widest,
             )
             if key not in keys:
                 keys[key] = len(tables)
