@@ -14,6 +14,7 @@ import numpy as np
 
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.zones import Population, ZoneReport
+from railsim.constants import WIDENED
 from railsim.definitions.limits import (
     ConicityClasses,
     RunningLimits,
@@ -27,7 +28,6 @@ from railsim.result import Result
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"
 SHARE = 90.0  # per cent of the sections, of the track's quality
-WIDENED = 0.030  # m, difference from the nominal gauge that belongs to it
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from railsim.constants import CANT_BASE
+from railsim.constants import CANT_BASE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.track.alignment_rules import alignment_remarks
@@ -28,8 +28,6 @@ HIGHEST_CANT = 0.20
 ASTRAY_CANT = 1e-3
 # Coefficient of friction that is remarked on; dry steel on steel reaches 0.7.
 MOST_FRICTION = 1.0
-# Difference of gauge that is no other gauge [m].
-WIDENED = 0.030
 # Smallest cant that counts as cant, smallest difference of length that counts [m].
 SMALL = 1e-6
 
