@@ -1,7 +1,8 @@
 """Test conditions of the standard: each is met, not met or not checked, and belongs to the verdict.
 
 What is compared: sections (number, mean radius, both hands, independence, quality of the track) in
-each zone of each population; conicity, load states and friction over all runs of the vehicle.
+each zone of each population; conicity, load states, friction and gauge over all runs of the
+vehicle.
 A fault mode needs only one judged section, in any zone.
 """
 
@@ -13,7 +14,15 @@ import numpy as np
 
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.zones import Population, ZoneReport
-from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
+from railsim.constants import WIDENED
+from railsim.definitions.limits import (
+    ConicityClasses,
+    RunningLimits,
+    Sourced,
+    TrackTarget,
+    Value,
+    Zone,
+)
 from railsim.definitions.vehicle.tables import Service
 from railsim.result import Result
 
@@ -161,7 +170,17 @@ def vehicle_conditions(
     required = f"{least.value:g} at least" if least else ""
     met = bool(least and lowest >= least.value)
     found.append(_compared("friction", words, least, required, met=met))
+    found.append(_gauge([run.track().gauge for run in runs], limits.gauge))
     return found
+
+
+def _gauge(gauges: Sequence[float], nominal: Value | None) -> Condition:
+    """Limits of forces hold for the gauge for which they were found."""
+    ends = min(gauges), max(gauges)
+    words = " to ".join(dict.fromkeys(f"{1e3 * gauge:.4g} mm" for gauge in ends))
+    required = f"{1e3 * nominal.value:.4g} mm, for which the limits hold" if nominal else ""
+    met = bool(nominal and all(abs(end - nominal.value) <= WIDENED for end in ends))
+    return _compared("gauge", words, nominal, required, met=met)
 
 
 def _compared(

@@ -137,11 +137,17 @@ def _joined(sections: Sequence[Section]) -> list[Section]:
 
 
 def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
-    """Zone of a radius, if any; very large ones of small cant deficiency belong to zone 1."""
+    """Zone of a radius; empty where there is none.
+
+    Very large radii with small cant deficiency belong to zone 1.  The ends of zone 3, 400 and
+    600 m, belong to it and not to the zones beside it (from memory of UIC 518 and EN 14363: zone 4
+    is 250 m <= R < 400 m).
+    """
     straight = next((n for n, z in limits.zones.items() if z.radius is None), "")
     if math.isinf(radius):
         return straight
-    for name, zone in sorted(limits.zones.items(), reverse=True):
+    for name in sorted(limits.zones, key=lambda name: (name != "3", name)):
+        zone = limits.zones[name]
         if zone.radius is not None and zone.radius[0] <= abs(radius) <= zone.radius[1]:
             most = limits.zones[straight].cant_deficiency[1] if straight else -math.inf
             return straight if zone.speed is not None and abs(deficiency) <= most else name

@@ -49,6 +49,7 @@ def cached_contact_table(
     centre_height: float | None = None,
     normal: Normal | None = None,
     grid: TableGrid | None = None,
+    widening: float = 0.0,
 ) -> ContactTable:
     """As `build_contact_table`, from the disk where the same table has been built before.
 
@@ -62,11 +63,13 @@ def cached_contact_table(
     numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu)
     height = centre_height
     digest = hashlib.sha256(generator_hash().encode())
-    for part in (repr((numbers, height, grid)).encode(), wheel.key(), rail.key()):
+    for part in (repr((numbers, height, grid, widening)).encode(), wheel.key(), rail.key()):
         digest.update(part)
     return kept_table(
         digest.hexdigest(),
-        lambda: build_contact_table(wheel, rail, *numbers, centre_height=height, grid=grid),
+        lambda: build_contact_table(
+            wheel, rail, *numbers, centre_height=height, grid=grid, widening=widening
+        ),
     )
 
 

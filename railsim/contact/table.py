@@ -220,6 +220,7 @@ def build_contact_table(
     centre_height: float | None = None,
     normal: Normal | None = None,
     grid: TableGrid | None = None,
+    widening: float = 0.0,
     workers: int | None = None,
 ) -> ContactTable:
     """Build the contact table of a right wheel on a right rail.
@@ -246,6 +247,9 @@ def build_contact_table(
         Kind of normal contact; default that of `grid`.
     grid : TableGrid, optional
         Extent and fineness.
+    widening : float
+        Largest widening of the gauge on the track, by which the other wheel goes further inwards
+        before this one has climbed its rail [m].
     workers : int, optional
         Threads; default as many as there are cores.
 
@@ -266,7 +270,7 @@ def build_contact_table(
     rail_nodes = rail_curve(rail, gauge, inclination)
     if faults := misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
         raise InputError(faults)
-    usual = table_range(wheel_points, rail_nodes)
+    usual = table_range(wheel_points, rail_nodes, widening)
     s_min = usual[0] if grid.s_min is None else grid.s_min
     s_max = usual[1] if grid.s_max is None else grid.s_max
     n_y = round((s_max - s_min) / grid.ds) + 1

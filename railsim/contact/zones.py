@@ -11,23 +11,31 @@ LONG_JUMP = 0.025
 JUMP_SEARCH = 1e-4
 """Spacing of the lateral displacements at which jumps are sought [m]."""
 
+MOST_WIDENING = 0.040
+"""Widening of the gauge from which on a wheel has fallen before the other one has climbed [m]."""
+
 CROWN_SLOPE = 0.3
 """Slope of a rail up to which its surface counts as its top, the tangent of 17 degrees [1]."""
 
 MORE_INWARDS = 0.010
-"""Room of a table beyond where the other wheel has climbed its rail, for widened track [m]."""
+"""Room of a table beyond where the other wheel has climbed its rail, for rails that give way and
+irregularities of the gauge [m]."""
 
 
-def table_range(wheel: WheelCurve, rail: RailCurve) -> tuple[float, float]:
+def table_range(wheel: WheelCurve, rail: RailCurve, widening: float = 0.0) -> tuple[float, float]:
     """Range of the lateral position that a table covers, in whole millimetres [m].
 
+    `widening`: largest of the gauge [m].
+
     Outwards to where the tip of the flange stands over the top of the rail: beyond, the wheelset is
-    derailed.  Inwards as far as the other wheel's climbing lets this one go, and `MORE_INWARDS`.
+    derailed.  Inwards as far as the other wheel's climbing lets this one go, on rails that stand
+    `widening` further apart, and `MORE_INWARDS`.
     """
     tip = float(wheel.u[int(np.argmax(wheel.r))])
     top = float(rail.Y[int(np.argmax(rail.slope > -CROWN_SLOPE))])
     climbed = np.ceil(1e3 * (top - tip)) / 1e3
-    return -float(climbed) - MORE_INWARDS, float(climbed)
+    apart = np.ceil(1e3 * min(max(widening, 0.0), MOST_WIDENING) - 1e-6) / 1e3
+    return -float(climbed + apart) - MORE_INWARDS, float(climbed)
 
 
 def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:

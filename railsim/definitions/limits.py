@@ -305,6 +305,8 @@ class RunningLimits(FileDefinition):
     """Quality of the track in each zone"""
     friction: Value | None = None
     """Least coefficient of friction of the rails"""
+    gauge: Value | None = None
+    """Nominal gauge of the tracks for which the limits hold [m]"""
     statistics: Statistics
     """Factors of the statistics"""
     high_friction: HighFriction | None = None

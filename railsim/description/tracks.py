@@ -80,8 +80,7 @@ def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
     if track.cant_rotation == "inner_rail":
         lines.append("  cant turns the track about the inner rail")
     if track.gauge_widening:
-        widest = max(left + right for _, left, right in track.gauge_widening)
-        lines.append(f"  gauge widened by up to {1e3 * widest:g} mm")
+        lines.append(f"  gauge widened by up to {1e3 * track.widest:g} mm")
     if track.friction_falling:
         falling = track.friction_falling
         lines.append(f"  friction with slip down to {falling.rest:g} of it, {falling.decay:g} s/m")

@@ -10,7 +10,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -188,12 +188,19 @@ def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fa
     return Fault(str(name), "", found, allowed)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+def read_toml(path: Path, kind: str = "") -> dict[str, Any]:
+    """Read a TOML file; `kind`: what it should hold.
 
-    Raises InputError: it cannot be read, is not text or not TOML (with the line).
+    Raises InputError: it cannot be read, is not text or not TOML (with the line); where its ending
+    is that of another file too, such as a table or a result, with what is expected.
     """
-    return parse_toml(read_text(path, DEFINITION_BYTES), str(path))
+    try:
+        return parse_toml(read_text(path, DEFINITION_BYTES), str(path))
+    except InputError as error:
+        if not kind or path.suffix in ("", ".toml"):
+            raise
+        expected = f"a {kind} file in TOML is expected here"
+        raise InputError(replace(fault, allowed=expected) for fault in error.faults) from None
 
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:
@@ -251,7 +258,7 @@ def read_source(path: Path, kind: str, data: dict[str, Any] | None = None) -> So
 
     Raises InputError: a file is missing or broken, or the chain of `extends` runs in a circle.
     """
-    return _extended(data or read_toml(path), path, kind, (path.resolve(),))
+    return _extended(data or read_toml(path, kind), path, kind, (path.resolve(),))
 
 
 def text_source(text: str, file: str, kind: str) -> Source:

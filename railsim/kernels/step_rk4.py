@@ -1,10 +1,13 @@
 """The classical Runge-Kutta method of order four on the whole state; the reference."""
 
+import numpy as np
+
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.internal import MAXWELL_CURVE, PAD, hold_within, slides_together, within_table
 from railsim.kernels.rhs import internal_rates, mechanics
 from railsim.kernels.state import LAST_STEP, internal_begin
-from railsim.kernels.status import RUNNING
+from railsim.kernels.status import NOT_FINITE, RUNNING
 from railsim.kernels.support import BALANCED, support_rates
 from railsim.kernels.transient import creepage_rates, keep_creepages
 
@@ -40,6 +43,20 @@ def settle_limits(internal, curves, first, drive, state):
 
 
 @compiled(python=False)
+def first_not_finite(state):
+    """Index of the first entry that is not finite, -1 if there is none."""
+    total = 0.0
+    for k in range(state.shape[0]):
+        total += 0.0 * state[k]
+    if not rarely(total != 0.0):
+        return -1
+    for k in range(state.shape[0]):
+        if not np.isfinite(state[k]):
+            return k
+    return -1
+
+
+@compiled(python=False)
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
@@ -55,6 +72,10 @@ def step_rk4(system, work, state, derivative, stages, h):
             trial[k] = state[k] + fraction * rate[k]
         status, where, _ = all_rates(system, work, trial, rate)
         if status != RUNNING:
+            # look-ups take what is not finite for a wheel beyond its table
+            bad = first_not_finite(trial)
+            if bad >= 0:
+                return NOT_FINITE, bad
             return status, where
         weight = 2.0 if stage < 3 else 1.0
         for k in range(state.shape[0]):

@@ -18,7 +18,7 @@ from railsim.kernels.rhs import mechanics
 from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.step_fast import remember, step_fast
-from railsim.kernels.step_rk4 import all_rates, step_rk4
+from railsim.kernels.step_rk4 import all_rates, first_not_finite, step_rk4
 from railsim.kernels.support import AFTER_STEP
 from railsim.kernels.system import STEPS, WHOLE
 from railsim.kernels.vibration import high_pass, watch
@@ -45,20 +45,6 @@ class Chunk(NamedTuple):
     fresh: int = 0
     closing: int = 0
     rows: int = 0
-
-
-@compiled(python=False)
-def first_not_finite(state):
-    """Index of the first entry that is not finite, -1 if there is none."""
-    total = 0.0
-    for k in range(state.shape[0]):
-        total += 0.0 * state[k]
-    if not rarely(total != 0.0):
-        return -1
-    for k in range(state.shape[0]):
-        if not np.isfinite(state[k]):
-            return k
-    return -1
 
 
 @compiled

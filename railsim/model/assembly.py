@@ -356,6 +356,7 @@ def _contact(
                 "centre_height": -body.position[2],
                 "back_to_back": wheelset.back_to_back,
                 "tape_circle_distance": wheelset.tape_circle_distance,
+                "widening": track.widest,  # auxiliary runs stand on plain track
             }
             of_wheel, of_rail = wheelset.profile[side], track.rail[side]
             wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions import Vehicle
+from railsim.definitions import Track, Vehicle
 from railsim.definitions.base import Remark
 from railsim.definitions.elements.base import FreeLength
 from railsim.definitions.elements.friction import SideBearer
@@ -36,6 +36,9 @@ WHEEL_RADIUS = (0.1, 1.2)
 """Wheel radius [m]: roller wagons have 0.16 m, steam locomotives 1.1 m."""
 BACK_TO_BACK = 2.5
 """Distance between the backs of the flanges [m]: as the widest gauge of a track."""
+PLAY = (0.045, 0.115)
+"""Gauge less the distance of the flange backs [m]: 75 mm at 1435 mm, 80 mm at 1520 mm, 50 mm with
+the thin flanges of trams, 110 mm on the widest worn track."""
 REACH = 1.5
 """Distance along the vehicle from an axle to an element that acts on it [m]: half a wheelbase."""
 INERTIA = 1.3
@@ -64,6 +67,22 @@ def vehicle_remarks(
     found += [*_inertias(flat), *_wheel_load(flat), *_vertical_modes(flat)]
     found += _by_text(_pulling(flat))
     return [*found, *_supports(vehicle, balanced)] if supports else found
+
+
+def gauge_remarks(flat: FlatVehicle, track: Track) -> list[Remark]:
+    """Return wheelsets that are too narrow or too wide for the gauge of a track to be meant."""
+    low, high = PLAY
+    texts: dict[str, list[str]] = {}
+    for body in flat.of_kind("wheelset"):
+        assert body.wheelset is not None
+        backs = body.wheelset.back_to_back
+        if not low <= (play := track.gauge - backs) <= high:
+            text = (
+                f"back_to_back {1e3 * backs:g} mm is {1e3 * play:.4g} mm less than the gauge, "
+                f"{1e3 * track.gauge:g} mm; railways have {1e3 * low:g} to {1e3 * high:g} mm"
+            )
+            texts.setdefault(text, []).append(body.name)
+    return [gathered(text, names) for text, names in texts.items()]
 
 
 def gathered(what: str, names: Sequence[str]) -> Remark:

@@ -16,7 +16,7 @@ from railsim.kernels.state import TIME
 from railsim.model.assembly import SharedTables, assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import stored_equilibrium
-from railsim.model.plausibility import vehicle_remarks
+from railsim.model.plausibility import gauge_remarks, vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
 from railsim.result import Sink
@@ -69,8 +69,8 @@ def prepare(
         periods(vehicle),
     )
     step, _ = steps.at(speed)
-    unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
-    remarks: list[str] = [*balance.remarks, *unusual, *measured_remarks(track)]
+    unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
+    remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
     if before is None:
         state = start_state(
             model,

@@ -22,7 +22,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.cant import cant_deficiency
-from railsim.constants import CANT_BASE
+from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import StationaryLimits, Value
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
@@ -200,6 +200,11 @@ def stationary(
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
     remarks = (*balance.remarks, *left_out(vehicle, track, settings, model))
+    if abs(track.gauge - NORMAL_GAUGE) > WIDENED:
+        text = (
+            f"limits are those of {1e3 * NORMAL_GAUGE:g} mm, the gauge is {1e3 * track.gauge:g} mm"
+        )
+        remarks = (*remarks, text)
     judged = tuple(values), tuple(reasons), loops, remarks
     return Stationary(vehicle.name, limits.edition, held, *judged)
 

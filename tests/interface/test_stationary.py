@@ -169,3 +169,21 @@ def test_support_is_that_at_the_beginning_of_the_track():
     found, wanted = (stationary(coach, track, limits, **how) for track in (varied, plain))
     assert [v.value for v in found.values] == pytest.approx([v.value for v in wanted.values])
     assert any("support that varies" in one for one in found.remarks)
+
+
+def test_twisted_rails_of_another_gauge():
+    """The same difference of heights: angle and lever each as 1/2 b, the unloading as 1/(2 b)^2.
+
+    The springs stand where they stood; 2 b is 1.500 m at 1435 mm, 1.065 m at 1000 mm.
+    """
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.back_to_back"
+    limits, unloading, said = load_stationary_limits("stationary"), [], []
+    for gauge, backs in ((1.435, 1.360), (1.0, 0.925)):
+        coach = railsim.load_vehicle("benchmark_vehicle1", [f"{key}={backs}"])
+        track = railsim.load_track("straight", [f"gauge={gauge}"])
+        found = stationary(coach, track, limits, cant=0.05)
+        unloading.append([v.value for v in found.values if "permille" in v.case])
+        said.append("limits are those of 1435 mm, the gauge is 1000 mm" in found.remarks)
+    ratio = [metre / normal for normal, metre in zip(*unloading, strict=True)]
+    assert ratio == pytest.approx([(1.5 / 1.065) ** 2] * 2, rel=0.02)
+    assert said == [False, True]

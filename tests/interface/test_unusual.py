@@ -7,8 +7,10 @@ import pytest
 
 import railsim
 from railsim import cli
+from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.model.plausibility import vehicle_remarks
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.model.plausibility import gauge_remarks, vehicle_remarks
 from railsim.result import peak
 
 BODY = {"mass": 8e3, "inertia": [5e3, 9e3, 9e3], "position": [0.0, 0.0, -1.2]}
@@ -203,3 +205,24 @@ def test_twenty_equal_faults_are_one_line_with_a_count(command, tmp_path, capsys
     (line,) = capsys.readouterr().err.splitlines()
     assert "mass" in line
     assert "(and 20 more: " in line
+
+
+@pytest.mark.parametrize(
+    ("gauge", "backs", "usual"),
+    [
+        (1.435, 1.360, True),
+        (1.435, 1.353, True),
+        (1.0, 0.925, True),
+        (1.520, 1.440, True),
+        (1.668, 1.590, True),
+        (1.5, 1.360, False),  # a wheelset for 1435 mm still stands on these rails
+        (1.435, 1.400, False),
+    ],
+)
+def test_wheelset_of_another_gauge_is_remarked_on(gauge, backs, usual):
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.back_to_back"
+    coach = flatten(load_vehicle("coach_manchester", [f"{key}={backs}"]))
+    remarks = gauge_remarks(coach, load_track("straight", [f"gauge={gauge}"]))
+    assert bool(remarks) != usual
+    said = f"{1e3 * (gauge - backs):.4g} mm less than the gauge"
+    assert all(said in str(remark) and "and 1 more" in str(remark) for remark in remarks)

@@ -262,6 +262,16 @@ def test_conditions_are_met_not_met_or_not_checked():
     assert all(c.sentence in found.reasons for c in found.conditions if c.state != "met")
 
 
+@pytest.mark.parametrize("gauge", [1.0, 1.435, 1.45, 1.668])
+def test_limits_of_the_normal_gauge_pass_no_run_on_another(gauge):
+    """EN 14363, scope: standard gauge tracks (nominally 1 435 mm)."""
+    (found,) = assess(made(ON_ZONE_4.replace(gauge=gauge), 23.0))
+    normal = gauge in (1.435, 1.45)  # the second is a widened one
+    assert condition(found, "gauge").state == ("met" if normal else "not met")
+    said = f"gauge not met: {1e3 * gauge:.0f} mm; required 1435 mm, for which the limits hold"
+    assert (said in found.reasons) == (not normal)
+
+
 def test_curves_to_one_hand_only_do_not_meet_the_conditions():
     (found,) = assess(made(ON_ZONE_4, 23.0))
     assert condition(found, "curves to both hands", "zone 4").state == "not met"

@@ -98,6 +98,11 @@ def test_contradicting_track_is_refused(plan, cant, expected):
             {"vertical": [{"type": "CST", "length": 50.0, "gradient": g} for g in (0.0, 0.01)]},
             "the gradient steps",
         ),
+        ([STRAIGHT], [], {"friction": 4.0}, "friction: a coefficient of 4 is beyond"),
+        ([STRAIGHT], [], {"friction": [0.4, 1.1]}, "friction: a coefficient of 1.1 is beyond"),
+        ([STRAIGHT], [], {"friction_table": [[0.0, 0.3], [9.0, 3.0]]}, "friction_table: a coeff"),
+        # asin(100/1500) between rails 1065 mm apart: 71 mm
+        ([CIRCLE], [CANTED], {"gauge": 1.0}, "100 mm here are 71 mm between rails 1.065 m apart"),
         ([STRAIGHT], [], {"irregularities": [DIP]}, "irregularities.0: from 498 to 502 m"),
         ([STRAIGHT], [], {"irregularities": [{**RANDOM, "begin": 100.0, "end": 200.0}]}, "beyond"),
         # from 12100 to 12150 m with its shift of 100 m; its first row is at 12000 m

@@ -223,6 +223,13 @@ def test_broken_toml_is_reported_with_its_line(write, text, key, found):
     assert found in fault.found
 
 
+@pytest.mark.parametrize("content", ["run,speed\n1,20\n", "\x00" * 5_000_000])
+def test_file_of_another_kind_is_told_what_is_expected(write, content):
+    """A table or a result in place of a definition: no word on its syntax alone."""
+    (fault,) = faults(load_study, write("summary.csv", content))
+    assert fault.allowed == "a study file in TOML is expected here"
+
+
 def test_file_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "picture.toml"
     path.write_bytes(b"\xff\xfe\x00\x81")

@@ -16,13 +16,16 @@ FLANGE = 0.028  # m, height of the flange of S1002
 COACH = load_vehicle("coach_manchester")
 
 
-def test_wheel_that_climbs_is_derailed_and_stands_on_its_flange():
+@pytest.mark.parametrize("widening", [0.0, 0.015])
+def test_wheel_that_climbs_is_derailed_and_stands_on_its_flange(widening):
+    """Where the gauge is wider the inner wheel goes further inwards before the outer one is up."""
     # far too tight and dry for a coach
     track = load_track("curve_r250", ["plan.2.radius=90", "friction=0.9"])
+    track = track.replace(gauge_widening=[[0.0, 0.0, widening]])
     result = simulate(COACH, track, speed=15.0)
     assert result.status == "derailed"
     assert "front.outer.wheelset climbed" in result.attributes["status_reason"]
-    assert result.wheelset_lateral[-1, 0] < -0.020
+    assert result.wheelset_lateral[-1, 0] < -0.020 - 0.5 * widening
     # the wheelset turns about the inner wheel, 1.5 m away
     assert result.wheelset_roll[-1, 0] > 0.9 * FLANGE / 1.5
     assert np.max(result.Q) < 3.0 * np.max(result.Q0)

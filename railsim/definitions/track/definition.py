@@ -138,6 +138,11 @@ class Track(FileDefinition, Plottable):
         """Distance of the rails over which their heights differ: 1.5 m at 1435 mm of gauge [m]."""
         return CANT_BASE + (self.gauge - NORMAL_GAUGE)
 
+    @property
+    def widest(self) -> float:
+        """Largest widening of the gauge [m]."""
+        return max((left + right for _, left, right in self.gauge_widening or ()), default=0.0)
+
     def mileage_at(self, s: "ArcLength") -> "ArcLength":
         """Mileage at an arc length, or at an array of them [m]."""
         return self.mileage - s if self.falling_mileage else self.mileage + s

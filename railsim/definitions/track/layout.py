@@ -10,6 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from railsim.constants import CANT_BASE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.track.alignment_rules import alignment_remarks
@@ -25,6 +26,8 @@ STEEPEST_CANT_RAMP = 2.5e-3
 HIGHEST_CANT = 0.20
 # Cant that is remarked on where there should be none [m].
 ASTRAY_CANT = 1e-3
+# Coefficient of friction that is remarked on; dry steel on steel reaches 0.7.
+MOST_FRICTION = 1.0
 # Smallest cant that counts as cant, smallest difference of length that counts [m].
 SMALL = 1e-6
 
@@ -83,7 +86,11 @@ def track_remarks(track: "Track") -> list[Remark]:
     text = "the gradient steps without a vertical curve (LIR)"
     remarks += [Remark(behind.key, text) for _, behind in _steps(vertical)]
     remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
-    remarks += _cant_sizes(cant) + _cant_sides(cant, plan)
+    remarks += _cant_sizes(cant) + _cant_sides(cant, plan) + _cant_base(cant, track.rail_base)
+    if max(track.frictions) > MOST_FRICTION:
+        key = "friction_table" if track.friction_table else "friction"
+        text = f"a coefficient of {max(track.frictions):g} is beyond that of steel on steel, below"
+        remarks.append(Remark(key, f"{text} {MOST_FRICTION:g}"))
     if track.friction_table and track.friction != type(track).model_fields["friction"].default:
         remarks.append(Remark("friction", "has no effect: friction_table takes its place"))
     if track.speed is not None:
@@ -187,6 +194,18 @@ def _cant_sizes(cant: Sequence[Section]) -> list[Remark]:
             text = f"a ramp of {1e3 * abs(section.slope):.2f} mm/m is steeper than the usual limit"
             remarks.append(Remark(section.key, text))
     return remarks
+
+
+def _cant_base(cant: Sequence[Section], base: float) -> list[Remark]:
+    """Remark on cant at another gauge, which railways of that gauge state over its own rails."""
+    highest = max((abs(v) for s in cant for v in (s.start_value, s.end_value)), default=0.0)
+    if highest < SMALL or abs(base - CANT_BASE) <= WIDENED:
+        return []
+    text = (
+        f"is taken over {CANT_BASE:g} m at every gauge: {1e3 * highest:.0f} mm here are "
+        f"{1e3 * highest * base / CANT_BASE:.0f} mm between rails {base:.4g} m apart"
+    )
+    return [Remark("cant", text)]
 
 
 def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:
