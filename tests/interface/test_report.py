@@ -536,6 +536,18 @@ def test_assessments_of_two_vehicles_of_one_name_stand_side_by_side():
         assert large[1].startswith(f"{100.0 * 80e3 / Q0 / 0.8:.0f} %")
 
 
+def test_assessments_of_a_grid_are_told_apart_by_its_values():
+    coach, on = railsim.load_vehicle("coach_manchester"), track(*curve(300.0, 300.0), cant=0.12)
+    path = "bodies.carbody.mass"
+    texts = [coach.with_values({path: mass}).to_toml() for mass in (40e3, 41e3)]
+    runs = {f"run{k}": made(on, 23.0, vehicle=text) for k, text in enumerate(texts)}
+    _, section = assessed(runs)
+    zone = next(table for table in section.tables if "zone 4" in table.caption)
+    assert [name[-20:] for name in zone.header[1:3]] == [
+        f"(carbody mass {m})" for m in (40000, 41000)
+    ]
+
+
 def test_vehicles_are_shown_at_rest_in_their_load_case(tmp_path):
     coach = railsim.load_vehicle("coach_manchester", ["load=laden"])
     result = railsim.simulate(coach, railsim.load_track("straight"), speed=20.0, duration=0.1)

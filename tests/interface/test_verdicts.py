@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_record import Q0, curve, made, track
 
+import railsim
 from railsim.assessment import assess
 from railsim.cli import main
 from railsim.errors import InputError
@@ -260,6 +261,13 @@ def test_conditions_are_met_not_met_or_not_checked():
     assert states["friction"] == "met"
     assert states["load states"] in ("not met", "not checked")
     assert all(c.sentence in found.reasons for c in found.conditions if c.state != "met")
+
+
+def test_load_cases_of_the_vehicle_count_also_where_no_section_does():
+    text = railsim.load_vehicle("coach_manchester").to_toml()  # has a load case `laden`
+    (found,) = assess(made(track(STRAIGHT), 1.0, vehicle=text))
+    loads = condition(found, "load states")
+    assert (loads.state, loads.found) == ("not met", "none")
 
 
 def test_curves_to_one_hand_only_do_not_meet_the_conditions():
