@@ -374,6 +374,19 @@ def test_fault_of_an_overridden_value_names_the_option():
     assert {f.key for f in found} == {"bodies.carbody.mass", "bodies.carbody.weight", "reference"}
 
 
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("primary.stiffness.x=soft", "stiffness.0: 'soft'; must be a valid number"),
+        ("primary.stifness.x=1e6", "no 'stifness' in assemblies.bogie"),
+        ("primary.stiffness.q=1e6", "allowed: x, y, z or 0 to 2"),
+    ],
+)
+def test_fault_of_a_short_path_names_what_is_wrong(key, words):
+    with pytest.raises(InputError, match=words):
+        load_vehicle("coach_manchester", [key])
+
+
 def test_overrides_are_sorted_by_their_beginning():
     texts = ["vehicle.name=x", "track.friction=0.3", "settings.step=1e-3"]
     assert split_overrides(texts) == {
