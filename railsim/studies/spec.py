@@ -154,6 +154,8 @@ class Execution:
 
     longest_first : bool
         Begin with the longest runs, to balance the load of the cores.
+    beside : tuple of str
+        Files that the caller will write beside the runs: a new study refuses those of others.
     """
 
     workers: int | None = None
@@ -163,6 +165,7 @@ class Execution:
     overwrite: bool = False
     plots: bool = False
     longest_first: bool = False
+    beside: tuple[str, ...] = ()
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None
