@@ -246,6 +246,14 @@ def test_wrong_extends_or_remove_is_refused(write, line, key):
     assert fault.key == key
 
 
+def test_file_or_name_of_another_kind_is_told_so(write):
+    text = 'format = "railsim-vehicle/1"\nname = "x"\nextends = "coach_manchester"\n'
+    (fault,) = faults(load_settings, write("v.toml", text))
+    assert (fault.key, fault.found) == ("format", "'railsim-vehicle/1'")
+    (fault,) = faults(load_vehicle, "curve_r250")
+    assert fault.found == "'curve_r250' is a shipped track"
+
+
 def test_missing_file_names_what_is_shipped(tmp_path):
     (fault,) = faults(load_vehicle, "coach_mancester")
     assert "coach_manchester" in fault.allowed
