@@ -227,7 +227,9 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         else:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"
-        raise input_error(file, found, key=key) from None
+        suffix = Path(file).suffix
+        allowed = "" if suffix in ("", ".toml") else f"a file in TOML, not {suffix}"
+        raise input_error(file, found, allowed, key=key) from None
     except (ValueError, OverflowError) as error:  # a whole number of thousands of digits
         raise input_error(file, f"a value is out of range: {error}") from None
 
