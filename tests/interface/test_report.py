@@ -93,6 +93,8 @@ async function probe(frame) {
     await settle();
     const count = name => box.querySelectorAll(name).length;
     found.views.push([count("canvas"), count("svg rect"), count("svg polyline")]);
+    const texts = () => Array.from(box.querySelectorAll("svg text"), t => t.textContent);
+    if (kind === 1) { found.texts = texts(); }
   }
   const table = d.querySelector('[data-plots="runs"]'), rows = () => Array.from(
     table.querySelectorAll("tbody tr"), row => Array.from(row.cells, cell => cell.textContent));
@@ -256,6 +258,7 @@ def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp
         assert found["overflow"] <= 0
         assert found["views"][0] == [1, 0, 0]
         assert found["views"][1] == [0, 14, 0]  # seven speeds, two vehicles
+        assert {str(speed) for speed in range(10, 17)} <= set(found["texts"])  # no 11.0, 12.00
         assert found["views"][2] == [0, 0, 209]  # the failed run has no values
         assert found["heads"][:4] == ["run", "vehicle", "speed (m/s)", "friction"]
         column = found["heads"].index("wheel load change, largest (%)")
