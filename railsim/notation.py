@@ -59,10 +59,21 @@ class Quantity:
         --------
         >>> QUANTITIES["Q"].text(89123.4), QUANTITIES["Y_over_Q"].text(0.39012)
         ('89.12', '0.390')
+        >>> QUANTITIES["sum_Y"].text(-1e-9)
+        '0.00'
         """
         shown = value * self.scale
         decimals = DECIMALS.get(self.shown_unit)
-        return f"{shown:.4g}" if decimals is None else f"{shown:.{decimals}f}"
+        return f"{shown:.4g}" if decimals is None else f"{shown:z.{decimals}f}"
+
+    @property
+    def least(self) -> float:
+        """Last digit of `text` in the shown unit, below which an axis would show rounding errors.
+
+        Zero where `text` has no fixed number of digits.
+        """
+        decimals = DECIMALS.get(self.shown_unit)
+        return 0.0 if decimals is None else 10.0**-decimals
 
     @property
     def words(self) -> str:

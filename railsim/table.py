@@ -28,6 +28,7 @@ from math import isfinite, isnan
 from numbers import Real
 from typing import Any, NamedTuple
 
+from railsim.errors import nearest
 from railsim.notation import DECIMALS, SHOWN_UNITS, Quantity
 from railsim.text import printable, spreadsheet_cell
 
@@ -148,6 +149,8 @@ class Table:
         return len(self.rows)
 
     def __getitem__(self, name: str) -> list[Any]:
+        if name not in (names := [column.name for column in self.columns]):
+            raise KeyError(f"no column '{name}'; {nearest(str(name), names)}")
         return [record[name] for record in self.records()]
 
     def __repr__(self) -> str:

@@ -212,9 +212,9 @@ def _conicity(
 
 
 def _loads(reports: Sequence[ZoneReport]) -> Condition:
-    tested = [r.population.vehicle for r in reports if r.values and not r.population.fault]
-    loads = sorted({vehicle.load or "design" for vehicle in tested})
-    known = any(vehicle.loads for vehicle in tested)
+    sound = [r for r in reports if not r.population.fault]
+    loads = sorted({r.population.vehicle.load or "design" for r in sound if r.values})
+    known = any(r.population.vehicle.loads for r in sound)
     state = _stated(len(loads) > 1) if known or len(loads) > 1 else NOT_CHECKED
     words = ", ".join(loads) if known else "the vehicle's file has no load cases"
     return Condition("load states", "", state, words or "none", "empty and laden", "[R]")

@@ -11,6 +11,7 @@ from railsim.arrays import Floats
 from railsim.assessment.criteria import FORCES, RIDE_BAND, both_ends, ends, middle, rms
 from railsim.assessment.signals import Band
 from railsim.assessment.verdict import FAIL, INCOMPLETE, PASS
+from railsim.errors import nearest
 from railsim.table import Amount, Column, Table
 
 
@@ -159,7 +160,11 @@ class ModelValidation:
 
     def __getitem__(self, name: str) -> Comparison:
         """Return the comparison of a quantity, by its name in the limits file."""
-        return next(one for one in self.comparisons if one.quantity.name == name)
+        for one in self.comparisons:
+            if one.quantity.name == name:
+                return one
+        known = (one.quantity.name for one in self.comparisons)
+        raise KeyError(f"no quantity '{name}'; {nearest(str(name), known)}")
 
     def table(self) -> Table:
         """Return mean and standard deviation of the differences against their limits."""

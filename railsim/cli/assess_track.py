@@ -59,6 +59,7 @@ def command(
             out=str(output.out),
             overwrite=output.overwrite,
             progress=progress,
+            beside=("places.csv", "sections.csv", "heat_strip.png", "report.html"),
             **how,
         )
     output.written += found.write()

@@ -218,6 +218,7 @@ def command(
                 progress=progress,
                 on_record=None if output.quiet or output.as_json else lines,
                 on_remark=output.remark,
+                beside=("report.html",) * report,
             ),
         )
         if report:
@@ -262,7 +263,7 @@ def _campaign(
     of `railsim.studies.campaign`.
     """
     from railsim.assessment.tables import assessment_lines
-    from railsim.cli.assess import write_assessments
+    from railsim.cli.assess import FILES, write_assessments
     from railsim.errors import Fault, Faults
     from railsim.studies.campaign import campaign
 
@@ -282,6 +283,7 @@ def _campaign(
             progress=progress,
             on_record=None if output.quiet or output.as_json else lines,
             on_remark=output.remark,
+            beside=(*FILES, *("report.html",) * report),
             **how,
         )
     write_assessments(output, done.assessments)

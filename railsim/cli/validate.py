@@ -1,7 +1,7 @@
 """``railsim validate``: check files and list every fault."""
 
 import os
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import click
 
 from railsim.cli.common import DONE, WRONG_INPUT, Output, answer_options, remarks_on
 from railsim.cli.terminal import echo, print_json
+from railsim.errors import InputError
 from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
@@ -99,8 +100,24 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
 
         run = load_measurement(file)
         return definition.KIND, [{"key": "channels", "text": remark} for remark in run.remarks]
+    if definition.KIND == "study":
+        _check_runs(file)
     Faults(profile_faults(definition, file)).check()
     return definition.KIND, [dict(vars(remark)) for remark in remarks_on(definition)]
+
+
+def _check_runs(file: str) -> None:
+    """Check vehicles, tracks and values of all runs of a study file, as the study does first."""
+    from railsim.definitions.loading import load_study
+    from railsim.studies.plan import Plan
+    from railsim.studies.spec import StudySpec
+
+    try:
+        Plan(StudySpec.of_file(load_study(file))).cases()
+    except InputError as error:
+        # what an option would name is in the file
+        own = (replace(fault, file=file) if fault.option else fault for fault in error.faults)
+        raise InputError(own) from None
 
 
 def _is_profile(name: str) -> bool:

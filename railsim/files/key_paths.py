@@ -94,7 +94,8 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     """Return the whole path of a short one: its parts in their order, others between them.
 
     `data`: tables as read; `path`: keys, the last of them the one that is meant; `defaults`: as for
-    `descend`. Returns: the path itself where it leads somewhere, or where nothing has these parts.
+    `descend`. Returns: the path itself where it leads somewhere; where nothing has all its parts,
+    the whole path of as many of the first as there are, so that the fault says what is allowed.
     Raises KeyError: several keys have these parts.
 
     Examples
@@ -102,6 +103,8 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     >>> axle = {"elements": {"primary": {"stiffness": [1.0, 2.0, 3.0]}}}
     >>> full_path({"assemblies": {"axle": axle}}, ["primary", "stiffness", "x"])
     ['assemblies', 'axle', 'elements', 'primary', 'stiffness', 'x']
+    >>> full_path({"elements": {"primary": {"stiffness": 1.0}}}, ["primary", "stifness"])
+    ['elements', 'primary', 'stifness']
     >>> bodies = {"bodies": {"car": {"mass": 1.0}}}
     >>> full_path({**bodies, "loads": {"laden": bodies}}, ["car", "mass"])
     ['bodies', 'car', 'mass']
@@ -109,13 +112,16 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     whole = list(path)
     if len(whole) < 2 or whole[0] in data or whole[0] in (defaults or {}):
         return whole
-    found = [keys for keys in _paths(data) if _holds(keys, whole)]
-    # a load case repeats keys of bodies: a short path means the body
-    found = [keys for keys in found if keys[0] != LOADS] or found
-    if len(found) > 1:
-        shown = ", ".join(".".join(keys) for keys in found[:4])
-        raise KeyError(f"'{'.'.join(whole)}' is {len(found)} keys: {shown}")
-    return found[0] if found else whole
+    for end in range(len(whole), 0, -1):
+        found = [keys for keys in _paths(data) if _holds(keys, whole[:end])]
+        # a load case repeats keys of bodies: a short path means the body
+        found = [keys for keys in found if keys[0] != LOADS] or found
+        if len(found) > 1 and end == len(whole):
+            shown = ", ".join(".".join(keys) for keys in found[:4])
+            raise KeyError(f"'{'.'.join(whole)}' is {len(found)} keys: {shown}")
+        if len(found) == 1:
+            return [*found[0], *whole[end:]]
+    return whole
 
 
 def _paths(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
@@ -156,6 +162,7 @@ def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str
         names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
         if names:
             return f"no member '{part}' in {table}; {nearest(part, map(str, names))}"
-        indices = f"allowed: 0 to {len(node) - 1}" if node else "it is empty"
+        axes = "x, y, z or " if len(node) == len(AXES) and all(map(_is_number, node)) else ""
+        indices = f"allowed: {axes}0 to {len(node) - 1}" if node else "it is empty"
         return f"no member '{part}' in {table}; {indices}"
     return f"'{table}' is a value and has no members"

@@ -44,6 +44,8 @@ def with_values(
 
     Raises InputError: keys that lead nowhere; all of them at once.
     """
+    if not isinstance(values, Mapping):
+        raise TypeError(f"the values are {values!r}; give keys with their values: {{'key': 1.0}}")
     given = ((key, lambda _, value=value: _plain(value)) for key, value in values.items())
     return _changed(source, given, free, defaults, source.file)
 
@@ -87,8 +89,8 @@ def _changed(
                 path = full_path(data, path, defaults)
             parent, last = descend(data, path, path[0] in free, defaults)
             present = parent[last] if not isinstance(parent, dict) or last in parent else None
-            parent[last] = read(present)
             names = tuple(str(descend(data, path[:end])[1]) for end in range(1, len(path) + 1))
+            parent[last] = read(present)
             replace_origin(changed.origin, names, present, parent[last], origin)
         except KeyError as problem:
             faults.append(located_fault(origin, key, str(problem.args[0]), ""))

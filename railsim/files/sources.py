@@ -179,6 +179,9 @@ def find_any(name: str | Path) -> Path:
 
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
     found = f"'{name}' is a folder" if os.path.isdir(path) else f"no file '{name}'"
+    others = (one for one in FOLDERS if one != kind and str(name) in shipped_names(one))
+    if beside is None and (other := next(others, None)):
+        found = f"'{name}' is a shipped {other}"
     allowed = "a path"
     if kind in FOLDERS:
         names = nearest(str(name), shipped_names(kind))
@@ -231,7 +234,9 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         else:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"
-        raise input_error(file, found, key=key) from None
+        suffix = Path(file).suffix
+        allowed = "" if suffix in ("", ".toml") else f"a file in TOML, not {suffix}"
+        raise input_error(file, found, allowed, key=key) from None
     except (ValueError, OverflowError) as error:  # a whole number of thousands of digits
         raise input_error(file, f"a value is out of range: {error}") from None
 
@@ -272,7 +277,9 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
     own = Source(str(path), data, dict.fromkeys(_paths(data, ()), str(path)))
     if base_name is None:
         return own
-    base_path = find_file(base_name, kind, beside=path)
+    # the file's own kind, so that a file of a wrong kind is told by its format, not by its base
+    stated = str(data.get("format")).removeprefix("railsim-").partition("/")[0]
+    base_path = find_file(base_name, stated if stated in FOLDERS else kind, beside=path)
     if base_path.resolve() in chain:
         names = " -> ".join(p.name for p in (*chain, base_path))
         raise input_error(str(path), f"a circle: {names}", "a chain with an end", key="extends")

@@ -21,7 +21,7 @@ from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import argument_error
+from railsim.errors import argument_error, nearest
 from railsim.identification.parameters import Model, Parameter, parsed
 from railsim.identification.variants import Workers
 from railsim.measurement.counterpart import outputs_for, series
@@ -88,6 +88,9 @@ class Sensitivity:
 
     def __getitem__(self, key: tuple[str, str]) -> Floats:
         """Return the derivative of an output to a parameter, ``[output, parameter]``."""
+        if key not in self.derivatives:
+            known = map(str, self.derivatives)
+            raise KeyError(f"no derivative {key!r}; {nearest(str(key), known)}")
         return self.derivatives[key].value
 
     def table(self) -> Table:

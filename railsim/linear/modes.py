@@ -12,7 +12,7 @@ import numpy as np
 from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
-from railsim.errors import argument_error
+from railsim.errors import argument_error, nearest
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
@@ -95,7 +95,9 @@ class Modes(Plottable):
         for mode in self.modes:
             if mode.name == name:
                 return mode
-        raise KeyError(name)
+        names = [mode.name for mode in self.modes]
+        similar = [known for known in names if str(name) in known]
+        raise KeyError(f"no mode '{name}'; {nearest(str(name), similar or names)}")
 
     @property
     def oscillations(self) -> tuple[Mode, ...]:

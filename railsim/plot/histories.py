@@ -162,7 +162,16 @@ def _draw(
         heading = f"{heading}: {names[0]}"
     axes.set(title=heading, ylabel=unit_label(quantity))
     axes.margins(x=0.0)
+    widen(axes, quantity)
     draw_limit(axes, quantity, [result])
+
+
+def widen(axes: Axes, quantity: Quantity) -> None:
+    """Let a vertical axis show two of the last digits of printed values at least, not noise."""
+    low, high = axes.get_ylim()
+    if high - low < 2.0 * quantity.least:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - quantity.least, middle + quantity.least)
 
 
 def capitalised(quantity: Quantity) -> str:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from railsim.compare import Difference
 from railsim.definitions.track.layout import curvature_sections
 from railsim.notation import Quantity
-from railsim.plot.histories import capitalised, check_not_empty, draw_limit, unit_label
+from railsim.plot.histories import capitalised, check_not_empty, draw_limit, unit_label, widen
 from railsim.plot.selection import STUDY, Panel, panels
 from railsim.plot.style import (
     SIDE_LINES,
@@ -137,3 +137,4 @@ def _label(axes: Axes, quantity: Quantity, heading: str) -> None:
     axes.set(title=heading, ylabel=unit_label(quantity))
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     axes.margins(x=0.0)
+    widen(axes, quantity)

@@ -111,7 +111,7 @@ def _quantity(
         "name": name, "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
         "symbol": plain_symbol(quantity.symbol), "unit": quantity.shown_unit.replace("-", ""),
         "sign": quantity.sign, "sides": sides, "low": low, "high": high,
-        "limit": limit[0] * quantity.scale if limit else None,
+        "least": quantity.least, "limit": limit[0] * quantity.scale if limit else None,
         "limit_words": limit[1] if limit else "", "codes": codes,
     }  # fmt: skip
 

@@ -120,6 +120,8 @@ def track_svg(track: Track) -> str:
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, POINTS + 1)
     width, height = 1000.0, 78.0
+    below = height + 16.0  # where the cant begins, below the line with the radii
+    whole = below + height
     across = s / track.length * width
     shapes = []
     for section in curvature_sections(track):
@@ -129,7 +131,7 @@ def track_svg(track: Track) -> str:
         shade = "curve" if section.type == "CIR" else "transition"
         shapes.append(
             f'<rect class="{shade}" x="{begin:.1f}" y="0" width="{end - begin:.1f}" '
-            f'height="{2 * height:.0f}"/>'
+            f'height="{whole:.0f}"/>'
         )
         if section.type == "CIR" and end - begin > 60.0:
             radius = f"R {1.0 / section.start_value:.6g} m"
@@ -139,7 +141,7 @@ def track_svg(track: Track) -> str:
             )
     rows = (
         ("curvature", 1e3 * alignment.curvature(s), "1/km", 0.0),
-        ("cant", 1e3 * alignment.cant(s), "mm", height),
+        ("cant", 1e3 * alignment.cant(s), "mm", below),
     )
     for words, values, unit, top in rows:
         low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
@@ -154,6 +156,6 @@ def track_svg(track: Track) -> str:
     words = f"s = 0 to {track.length:.6g} m"
     shapes.append(f'<text x="{width - 4:.0f}" y="14" text-anchor="end">{words}</text>')
     return (
-        f'<svg class="strip" viewBox="0 0 {width:.0f} {2 * height:.0f}" role="img" '
+        f'<svg class="strip" viewBox="0 0 {width:.0f} {whole:.0f}" role="img" '
         f'aria-label="curvature and cant over 0 to {track.length:.6g} m">{"".join(shapes)}</svg>'
     )

@@ -140,20 +140,23 @@ def _rails(track: Track) -> str:
 
 def _differences(vehicles: Mapping[str, Any]) -> Table:
     """Return the keys in which vehicles differ."""
-    flat = {name: dict(_flat(vehicle.model_dump())) for name, vehicle in vehicles.items()}
-    keys = dict.fromkeys(key for values in flat.values() for key in values)
-    rows = [
-        [key, *(in_words(values.get(key, "—")) for values in flat.values())]
-        for key in keys
-        if key not in ("name", "source")
-        and len({str(values.get(key)) for values in flat.values()}) > 1
-    ]
+    rows = [[key, *values] for key, values in differing(list(vehicles.values())).items()]
     more = len(rows) - MOST_DIFFERENCES
     return Table(
         ["key", *map(printable, vehicles)], rows[:MOST_DIFFERENCES],
         "Differences between the vehicles (SI)", range(len(vehicles) + 1),
         note=f"{more} more keys differ." if more > 0 else "",
     )  # fmt: skip
+
+
+def differing(vehicles: Sequence[Any]) -> dict[str, list[str]]:
+    """Return the keys in which vehicles differ, each with the value of every vehicle in words."""
+    flat = [dict(_flat(vehicle.model_dump())) for vehicle in vehicles]
+    return {
+        key: [in_words(values.get(key, "—")) for values in flat]
+        for key in dict.fromkeys(key for values in flat for key in values)
+        if key not in ("name", "source") and len({str(values.get(key)) for values in flat}) > 1
+    }
 
 
 def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:

@@ -1,7 +1,6 @@
 """Tables of the values of runs with the limits of standards and the meaning of each limit."""
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,6 +15,7 @@ from railsim.assessment.zones import ZoneReport
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, listed
+from railsim.report.inputs import differing
 from railsim.result import Result
 from railsim.result.sensors import sensors
 from railsim.text import printable
@@ -34,6 +34,7 @@ NOTE = (
     "standard."
 )
 METHOD = {"one": "1-dim.", "two": "2-dim.", "largest": "largest value", "smallest": "smallest"}
+MOST_TOLD = 3  # values that tell vehicles of one name apart; else the names of their runs do
 MOST = 256  # runs that are assessed; more would take long
 
 
@@ -50,7 +51,7 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Sect
         found.details.append(remark_table([words]))
         return verdicts, found
     running, remarks = _assessed(runs, "en14363")
-    running = _told_apart(running)
+    running = _told_apart(running, runs)
     derailment, more = _assessed(runs, "safety")
     for one in running:
         parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
@@ -90,15 +91,19 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
     return found, [*remarks, *(remark for one in found for remark in one.remarks)]
 
 
-def _told_apart(assessments: Sequence[Assessment]) -> list[Assessment]:
-    """Assessments of vehicles of one name, which differ in their files, with their runs' names."""
-    count = Counter(one.vehicle for one in assessments)
-    return [
-        replace(one, vehicle=f"{one.vehicle} ({listed(one.runs)})")
-        if count[one.vehicle] > 1
-        else one
-        for one in assessments
-    ]
+def _told_apart(assessments: Sequence[Assessment], runs: Mapping[str, Result]) -> list[Assessment]:
+    """Assessments of vehicles of one name, with the values that differ or their runs' names."""
+    found = list[Assessment]()
+    for one in assessments:
+        same = [other for other in assessments if other.vehicle == one.vehicle]
+        values = differing([runs[other.runs[0]].vehicle() for other in same])
+        parts = [
+            f"{' '.join(key.split('.')[-2:]).replace('_', ' ')} {words[same.index(one)]}"
+            for key, words in values.items()
+        ]
+        apart = "; ".join(parts) if 0 < len(parts) <= MOST_TOLD else listed(one.runs)
+        found.append(replace(one, vehicle=f"{one.vehicle} ({apart})") if len(same) > 1 else one)
+    return found
 
 
 def _reasons(one: Assessment) -> Table:

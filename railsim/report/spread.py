@@ -184,7 +184,8 @@ def _shown(value: float, column: Mapping[str, Any]) -> str:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """Four digits, as the table of the runs has them: 16000, not 1.6e+04."""
+    return f"{float(f'{value:.4g}'):.12g}" if isinstance(value, float) else str(value)
 
 
 def worst_runs(records: Sequence[Record], most: int) -> list[str]:

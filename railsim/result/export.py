@@ -21,6 +21,7 @@ from railsim.result.filters import even_step, low_passed
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
+MOST_INSTANTS = 10_000_000  # of an export at equal times
 POSITIONS = ("time", "distance", "mileage", "wheelset_distance")  # quantities that are not filtered
 
 
@@ -75,6 +76,12 @@ def selected(
     chosen = {name: quantity for name, quantity in result.quantities.items() if name in wanted}
     instants = time[rows]
     if rate is not None and len(rows):
+        if (number := rate * (instants[-1] - instants[0])) > MOST_INSTANTS:
+            found, allowed = (
+                f"{rate:g} per s: {number:.3g} instants",
+                f"{MOST_INSTANTS:.0e} at most",
+            )
+            raise InputError([argument_fault("rate", "", found, allowed, "--rate")])
         instants = np.arange(instants[0], instants[-1] + 1e-9, 1.0 / rate)
     arrays = {}
     for name, quantity in chosen.items():

@@ -188,7 +188,8 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
         words = words if len(words) <= 160 else f"{words[:157]}..."
         is_hdf5 = isinstance(error, OSError) and "signature not found" in words
         found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
-        allowed = "give a result of railsim; " + REMEDY
+        allowed = "give a result file of railsim (.h5)"
+        allowed += "" if is_hdf5 and path.suffix != ".h5" else f"; {REMEDY}"
         raise input_error(str(path), found, allowed, name) from None
 
 

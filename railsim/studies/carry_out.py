@@ -70,7 +70,8 @@ def carry_out(
         if not (execution.resume or execution.overwrite):
             _refuse_another_study(folder, known, inputs)
         if known is None and not execution.overwrite:
-            _refuse_files_of_others(folder)
+            pictures = (f"{point.name}.png" for point in points if execution.plots)
+            _refuse_files_of_others(folder, (*execution.beside, *pictures))
         state = State(folder, points, load, spec, known, execution)
         client = None if execution.scheduler is None else execute.cluster(execution.scheduler)
         make_folder(folder)
@@ -159,19 +160,20 @@ def _refuse_another_study(
         raise argument_error("out", found, f"{allowed}or another `out`")
 
 
-def _refuse_files_of_others(folder: Path) -> None:
-    """Refuse files that a study would replace and that are of none."""
-    index, table = folder / "study.json", folder / "summary.csv"
+def _refuse_files_of_others(folder: Path, beside: Sequence[str]) -> None:
+    """Refuse files that a study, or what comes `beside` it, would replace and that are of none."""
+    index, names = folder / "study.json", ("summary.csv", *beside)
     if is_file(index):
         try:
             read_index(index)
             return
         except InputError as error:
             name, found = index.name, f"is not the index of a study ({error.faults[0].found})"
-    elif is_file(table):
-        name, found = table.name, "is not of a study"
     else:
-        return
+        found = "is not of a study"
+        name = next((one for one in names if os.path.lexists(folder / one)), "")
+        if not name:
+            return
     allowed = "choose another `out`, or give `overwrite`"
     raise argument_error("out", found, allowed, key=str(folder / name))
 

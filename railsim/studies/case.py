@@ -13,6 +13,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.study.analyses import Analysis, needs_run, needs_speed
 from railsim.errors import Fault, Faults, InputError
+from railsim.files.key_paths import AXES
 from railsim.files.overrides import split_overrides
 from railsim.files.sources import OVERRIDE
 from railsim.profiles import load_profile
@@ -80,6 +81,19 @@ LOADERS: dict[str, Callable[..., Any]] = {
 }
 
 
+def _leads_to(name: str, key: str) -> bool:
+    """Whether a path, perhaps a short one, is that of a key or of a table that holds it.
+
+    Examples
+    --------
+    >>> key = "vehicle.elements.primary.stiffness.0"
+    >>> [_leads_to(f"vehicle.{rest}", key) for rest in ("primary.stiffness.x", "secondary.mass")]
+    [True, False]
+    """
+    parts = iter(key.split("."))
+    return all((str(AXES.index(p)) if p in AXES else p) in parts for p in name.split("."))
+
+
 class Loader:
     """Loads the definitions of runs, each once, and gathers everything that is wrong with them.
 
@@ -117,7 +131,7 @@ class Loader:
         if fault.file != OVERRIDE:
             return fault
         key = f"{kind}.{fault.key}" if kind else fault.key
-        of_grid = any(key == name or key.startswith(f"{name}.") for name in self._grid)
+        of_grid = any(_leads_to(name, key) for name in self._grid)
         parameter, option = ("grid", "--grid") if of_grid else ("assignments", "--set")
         return replace(fault, file=parameter, option=option, key=key)
 

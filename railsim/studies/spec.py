@@ -146,6 +146,7 @@ class Execution:
     overwrite: bool = False
     plots: bool = False
     longest_first: bool = False  # to balance the load of the cores
+    beside: tuple[str, ...] = ()  # files written beside the runs: those of others are refused
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None

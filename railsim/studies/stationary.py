@@ -26,7 +26,7 @@ from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import StationaryLimits, Value
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import Fault, InputError, argument_error, input_error
 from railsim.linear.circle import circle, left_out
 from railsim.linear.sliding import has_pads
 from railsim.linear.stationary import (
@@ -158,7 +158,7 @@ def stationary(
             raise InputError([Fault(name, "service", "missing", allowed, name)])
         cant = vehicle.service.cant_deficiency
     if not 0.0 < cant <= 0.5:
-        raise input_error("cant", f"{cant:g} m", "above 0, up to 0.5 m")
+        raise argument_error("cant", f"found {cant:g} m", "above 0, up to 0.5 m")
     twists = twist_heights(flat, limits)
     settings = settings or Settings()
     model = assemble(vehicle, circle(track), settings.in_steady_rolling())

@@ -8,6 +8,7 @@ from example_result import example_result
 
 import railsim
 from railsim.cli import main
+from railsim.errors import InputError
 from railsim.result.export import selected
 
 
@@ -62,6 +63,11 @@ def test_a_wheel_that_lifts_spoils_no_other_values_at_a_lower_rate(result):
     assert np.isnan(part.contact_y[:, 0, 0]).sum() <= 2
     there = ~np.isnan(part.contact_y)
     np.testing.assert_allclose(part.contact_y[there], whole.contact_y[there], atol=1e-3)
+
+
+def test_a_rate_of_more_values_than_a_file_should_hold_is_refused(result):
+    with pytest.raises(InputError, match=r"instants; 1e\+07 at most"):
+        selected(result, ["Q"], rate=1e9)
 
 
 def test_all_that_is_wrong_is_named_at_once(result, tmp_path, capsys):

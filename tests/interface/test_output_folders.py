@@ -160,3 +160,17 @@ def test_a_file_in_the_current_folder_is_not_in_its_own_way(tmp_path, monkeypatc
     with PartialFile(Path("run.h5"), alone=True) as partial:
         partial.path.write_text("whole")
         assert partial.finish() == Path("run.h5")
+
+
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [("--report", "report.html"), ("--plots", "coach_manchester_straight_20.png")],
+)
+def test_new_study_keeps_the_page_and_the_picture_of_somebody_else(tmp_path, capsys, option, name):
+    there = tmp_path / name
+    there.write_text("mine")
+    given = ["--vehicles", "coach_manchester", "--tracks", "straight", "--speeds", "20", option]
+    assert main(["study", *given, "--duration", "1", "--out", str(tmp_path)]) == 2
+    assert f"{name}: is not of a study" in capsys.readouterr().err
+    assert there.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [there]

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 from example_result import WHEELSETS, example_result
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 from railsim.cli import main
 from railsim.definitions.excitations.measured_file import recordings
 from railsim.definitions.loading import load_track
 from railsim.errors import InputError
 from railsim.files.sources import read_source
-from railsim.plot.histories import STUDY, histories
+from railsim.notation import QUANTITIES
+from railsim.plot.histories import STUDY, histories, widen
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
 from railsim.plot.style import HUES, SHADES, wheelset_colours
@@ -65,6 +67,18 @@ def test_sides_and_wheelsets_are_told_apart(result):
     assert {line.get_linestyle() for line in lines[0::2]} == {"-"}  # left
     assert {line.get_linestyle() for line in lines[1::2]} == {"--"}  # right
     assert len({to_hex(line.get_color()) for line in lines}) == 4
+
+
+def test_axes_of_rounding_errors_show_the_last_digit_of_tables():
+    axes = Figure().subplots()
+    axes.plot([0.0, 1.0], [-3e-13, 2e-13])
+    widen(axes, QUANTITIES["sum_Y"])
+    np.testing.assert_allclose(axes.get_ylim(), (-0.01, 0.01), rtol=1e-9)  # kN
+    axes.plot([0.0, 1.0], [0.0, 5.0])
+    axes.autoscale()
+    before = axes.get_ylim()
+    widen(axes, QUANTITIES["sum_Y"])
+    assert axes.get_ylim() == before
 
 
 def test_bogies_have_a_hue_and_their_leading_wheelsets_the_dark_shade():

@@ -14,6 +14,9 @@ import pytest
 import railsim
 from railsim.cli import main
 from railsim.errors import InputError
+from railsim.linear.modes import Mode, Modes
+from railsim.linear.vehicle import Contact
+from railsim.table import Table
 
 COACH = "coach_manchester"
 
@@ -255,3 +258,13 @@ def test_definitions_and_results_cannot_be_changed(coach, result):
     assert pickle.loads(pickle.dumps(coach)) == coach == copy.deepcopy(coach)
     with pytest.raises(ValueError, match="WRITEABLE"):
         result.Q.setflags(write=True)
+
+
+def test_name_that_is_not_there_says_which_are():
+    mode = Mode("upper sway", -1.0 + 6.0j, {}, {})
+    with pytest.raises(KeyError, match=r"no mode 'sway'; .*upper sway"):
+        Modes(20.0, Contact(), (mode,))["sway"]
+    with pytest.raises(KeyError, match="no column 'spede'; did you mean 'speed'"):
+        Table(["speed"], [[20.0]])["spede"]
+    with pytest.raises(TypeError, match="give keys with their values"):
+        railsim.load_vehicle("coach_manchester").with_values("mass")

@@ -93,6 +93,8 @@ async function probe(frame) {
     await settle();
     const count = name => box.querySelectorAll(name).length;
     found.views.push([count("canvas"), count("svg rect"), count("svg polyline")]);
+    const texts = () => Array.from(box.querySelectorAll("svg text"), t => t.textContent);
+    if (kind === 1) { found.texts = texts(); }
   }
   const table = d.querySelector('[data-plots="runs"]'), rows = () => Array.from(
     table.querySelectorAll("tbody tr"), row => Array.from(row.cells, cell => cell.textContent));
@@ -256,6 +258,7 @@ def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp
         assert found["overflow"] <= 0
         assert found["views"][0] == [1, 0, 0]
         assert found["views"][1] == [0, 14, 0]  # seven speeds, two vehicles
+        assert {str(speed) for speed in range(10, 17)} <= set(found["texts"])  # no 11.0, 12.00
         assert found["views"][2] == [0, 0, 209]  # the failed run has no values
         assert found["heads"][:4] == ["run", "vehicle", "speed (m/s)", "friction"]
         column = found["heads"].index("wheel load change, largest (%)")
@@ -534,6 +537,18 @@ def test_assessments_of_two_vehicles_of_one_name_stand_side_by_side():
         assert quotient in zone.failed
         large = zone.rows[quotient][1 + forces.index(80e3)]
         assert large[1].startswith(f"{100.0 * 80e3 / Q0 / 0.8:.0f} %")
+
+
+def test_assessments_of_a_grid_are_told_apart_by_its_values():
+    coach, on = railsim.load_vehicle("coach_manchester"), track(*curve(300.0, 300.0), cant=0.12)
+    path = "bodies.carbody.mass"
+    texts = [coach.with_values({path: mass}).to_toml() for mass in (40e3, 41e3)]
+    runs = {f"run{k}": made(on, 23.0, vehicle=text) for k, text in enumerate(texts)}
+    _, section = assessed(runs)
+    zone = next(table for table in section.tables if "zone 4" in table.caption)
+    assert [name[-20:] for name in zone.header[1:3]] == [
+        f"(carbody mass {m})" for m in (40000, 41000)
+    ]
 
 
 def test_vehicles_are_shown_at_rest_in_their_load_case(tmp_path):

@@ -47,6 +47,17 @@ def test_every_fault_is_one_line_on_stderr(write, capsys):
     assert out == "curve_r500: track, no faults\n"
 
 
+def test_study_is_checked_with_the_vehicles_and_values_that_it_names(write, capsys):
+    head = 'format = "railsim-study/1"\nname = "s"\ntracks = ["straight"]\nspeeds = [20.0]\n'
+    grid = '[grid]\n"vehicle.carbody.mass" = ["heavy"]\n'
+    mass = write("mass.toml", head + 'vehicles = ["coach_manchester"]\n' + grid)
+    name = write("name.toml", head + 'vehicles = ["nowhere"]\n')
+    assert cli.main(["validate", mass, name]) == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith(f"{mass}: vehicle.bodies.carbody.mass: 'heavy'")
+    assert second.startswith("nowhere: no file 'nowhere'")
+
+
 def test_json_lists_faults_and_remarks(write, capsys):
     bad = write("bad.toml", COACH + "[bodies.carbody]\nmass = -1\n")
     track = 'format = "railsim-track/1"\nname = "t"\n'

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_record import Q0, curve, made, track
 
+import railsim
 from railsim.assessment import assess
 from railsim.cli import main
 from railsim.errors import InputError
@@ -270,6 +271,13 @@ def test_limits_of_the_normal_gauge_pass_no_run_on_another(gauge):
     assert condition(found, "gauge").state == ("met" if normal else "not met")
     said = f"gauge not met: {1e3 * gauge:.0f} mm; required 1435 mm, for which the limits hold"
     assert (said in found.reasons) == (not normal)
+
+
+def test_load_cases_of_the_vehicle_count_also_where_no_section_does():
+    text = railsim.load_vehicle("coach_manchester").to_toml()  # has a load case `laden`
+    (found,) = assess(made(track(STRAIGHT), 1.0, vehicle=text))
+    loads = condition(found, "load states")
+    assert (loads.state, loads.found) == ("not met", "none")
 
 
 def test_curves_to_one_hand_only_do_not_meet_the_conditions():

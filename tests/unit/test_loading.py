@@ -253,6 +253,16 @@ def test_wrong_extends_or_remove_is_refused(write, line, key):
     assert fault.key == key
 
 
+def test_file_or_name_of_another_kind_is_told_so(write):
+    text = 'format = "railsim-vehicle/1"\nname = "x"\nextends = "coach_manchester"\n'
+    (fault,) = faults(load_settings, write("v.toml", text))
+    assert (fault.key, fault.found) == ("format", "'railsim-vehicle/1'")
+    (fault,) = faults(load_vehicle, "curve_r250")
+    assert fault.found == "'curve_r250' is a shipped track"
+    (fault,) = faults(load_vehicle, write("run.csv", "t,Q\n0,1\n"))
+    assert fault.allowed == "a file in TOML, not .csv"
+
+
 def test_missing_file_names_what_is_shipped(tmp_path):
     (fault,) = faults(load_vehicle, "coach_mancester")
     assert "coach_manchester" in fault.allowed
@@ -379,6 +389,19 @@ def test_fault_of_an_overridden_value_names_the_option():
     assert {fault.file for fault in found} == {"overrides"}
     assert {fault.on_command_line().file for fault in found} == {"--set"}
     assert {f.key for f in found} == {"bodies.carbody.mass", "bodies.carbody.weight", "reference"}
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("primary.stiffness.x=soft", "stiffness.0: 'soft'; must be a valid number"),
+        ("primary.stifness.x=1e6", "no 'stifness' in assemblies.bogie"),
+        ("primary.stiffness.q=1e6", "allowed: x, y, z or 0 to 2"),
+    ],
+)
+def test_fault_of_a_short_path_names_what_is_wrong(key, words):
+    with pytest.raises(InputError, match=words):
+        load_vehicle("coach_manchester", [key])
 
 
 def test_overrides_are_sorted_by_their_beginning():

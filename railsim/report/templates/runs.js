@@ -95,6 +95,7 @@
     return function (u, low, high) {
       if (low === null) { return [0, 1]; }
       low = Math.min(0, low); high = Math.max(0, high);
+      if (high - low < q.least) { low = -q.least; high = q.least; } /* rounding errors */
       if (q.limit > 0 && high > 0.5 * q.limit) { high = Math.max(high, q.limit); }
       if (q.limit < 0 && low < 0.5 * q.limit) { low = Math.min(low, q.limit); }
       var more = 0.06 * (high - low || 1);

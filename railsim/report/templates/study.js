@@ -17,7 +17,7 @@ window.railsimStudy = function (data, tools) {
   function classes(c, most) {
     var values = Array.from(new Set(c.values)).sort(compare);
     if (values.length <= most || !isNumber(c)) {
-      return { labels: values.map(text), at: values, of: function (v) { return values.indexOf(v); }, ranges: false };
+      return { labels: values.map(function (v) { return text(v); }), at: values, of: function (v) { return values.indexOf(v); }, ranges: false };
     }
     var n = Math.min(most, BINS), low = values[0], width = (values[values.length - 1] - low) / n, labels = [], at = [];
     for (var k = 0; k < n; k++) {
@@ -115,7 +115,7 @@ window.railsimStudy = function (data, tools) {
         var cell = svg("rect", picture, { x: left + i * wide, y: top, width: wide - 1, height: high - 1 });
         cell.style.fill = tint(share(v, ends[0], ends[1]));
         svg("title", cell, {}, across.labels[i] + ", " + up.labels[j] + ": " + shown(v) + " in " + cells[j][i].length + " runs");
-        if (n <= 14) { svg("text", picture, { x: left + (i + 0.5) * wide, y: top + 0.5 * high + 4, "text-anchor": "middle", class: "cell" }, shown(v)); }
+        if (n <= 14) { svg("text", picture, { x: left + (i + 0.5) * wide, y: top + 0.5 * high + 4, "text-anchor": "middle", class: "cell" }, text(v, value.decimals)); }
       });
     });
     across.labels.forEach(function (label, i) {
