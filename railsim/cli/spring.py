@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Output, faults_in, flag, option, output_options, set_option, together
+from railsim.cli import common as cli
 from railsim.cli.terminal import echo
 from railsim.files.access import TABLES, is_file, write_text
 
@@ -36,17 +36,17 @@ def command() -> None:
 
 
 # a command of the group with a file, a folder for pages and the common options
-_spring_command = together(
+_spring_command = cli.together(
     command.command(),
     click.argument("file"),
-    set_option,
-    output_options(f"Folder for the pictures and the page {REPORT}."),
+    cli.set_option,
+    cli.output_options(f"Folder for the pictures and the page {REPORT}."),
 )
 
 
 @_spring_command
-@flag("--search", "Also search the nests that fit the table [search].")
-def design(file: str, search: bool, assignments: tuple[str, ...], output: Output) -> None:
+@cli.flag("--search", "Also search the nests that fit the table [search].")
+def design(file: str, search: bool, assignments: tuple[str, ...], output: cli.Output) -> None:
     """Find the springs for two required deflections.
 
     Prints their stiffnesses and numbers of coils. With --search, also the nests of standard wires
@@ -63,7 +63,7 @@ def design(file: str, search: bool, assignments: tuple[str, ...], output: Output
     from railsim.springs.tables import design_table, search_table
 
     suspension = _loaded(file, assignments, output)
-    with faults_in(file, "spring", suspension.name):
+    with cli.faults_in(file, "spring", suspension.name):
         result = designed(suspension)
         found = None
         if search:
@@ -89,7 +89,7 @@ def design(file: str, search: bool, assignments: tuple[str, ...], output: Output
 
 
 @_spring_command
-def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
+def verify(file: str, assignments: tuple[str, ...], output: cli.Output) -> None:
     """Verify a suspension under all its loads.
 
     Equilibrium, heights, stresses, buckling. A check that is not met is a result: the exit status
@@ -109,7 +109,7 @@ def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
     from railsim.springs.verification import verify as verified
 
     suspension = _loaded(file, assignments, output)
-    with faults_in(file, "spring", suspension.name):
+    with cli.faults_in(file, "spring", suspension.name):
         result = verified(suspension)
         heights = ride_heights(suspension) if suspension.tolerances is not None else ()
         _write_pages(suspension, output)
@@ -124,7 +124,7 @@ def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
 
 
 @_spring_command
-def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
+def fatigue(file: str, assignments: tuple[str, ...], output: cli.Output) -> None:
     """Compare stress ranges with the Goodman-Smith line.
 
     \b
@@ -138,7 +138,7 @@ def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
     from railsim.springs.verification import fatigue as fatigue_of
 
     suspension = _loaded(file, assignments, output)
-    with faults_in(file, "spring", suspension.name):
+    with cli.faults_in(file, "spring", suspension.name):
         result = fatigue_of(suspension)
         loads = dynamic_loads(suspension)
         _write_pages(suspension, output)
@@ -149,13 +149,17 @@ def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
 
 @command.command()
 @click.argument("file")
-@option("--out", "Vehicle file to write; by default to stdout.", "F.toml")
-@option("--load", "Load at which the stiffness of the springs is taken.", "NAME")
-@option("--extends", "Vehicle to extend instead of vehicle.extends.", "VEHICLE")
-@set_option
-@output_options()
+@cli.option("--out", "Vehicle file to write; by default to stdout.", "F.toml")
+@cli.option("--load", "Load at which the stiffness of the springs is taken.", "NAME")
+@cli.option("--extends", "Vehicle to extend instead of vehicle.extends.", "VEHICLE")
+@cli.set_option
+@cli.output_options()
 def vehicle(
-    file: str, load: str | None, extends: str | None, assignments: tuple[str, ...], output: Output
+    file: str,
+    load: str | None,
+    extends: str | None,
+    assignments: tuple[str, ...],
+    output: cli.Output,
 ) -> None:
     """Write a vehicle file with this primary suspension.
 
@@ -172,7 +176,7 @@ def vehicle(
 
     suspension = load_spring(file, assignments)
     out = output.file(output.out, TABLES) if output.out else None
-    with faults_in(file, "spring", suspension.name):
+    with cli.faults_in(file, "spring", suspension.name):
         if load is not None and load not in suspension.loads:
             valid = nearest(load, suspension.loads)
             raise input_error("--load", f"no load '{load}' in [loads]", valid)
@@ -185,17 +189,12 @@ def vehicle(
     for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
         if not output.quiet:
             echo(remark, err=True)
-    record = {
-        "file": output.out,
-        "assembly": part.assembly,
-        "axleboxes": part.axleboxes,
-        "elements": part.elements,
-        "load": part.case.name,
-    }
+    record = {"file": output.out, "assembly": part.assembly, "axleboxes": part.axleboxes}
+    record |= {"elements": part.elements, "load": part.case.name}
     output.answer(record, [] if out else [text.rstrip("\n")])
 
 
-def _loaded(file: str, assignments: Sequence[str], output: Output) -> "TrailingArmSuspension":
+def _loaded(file: str, assignments: Sequence[str], output: cli.Output) -> "TrailingArmSuspension":
     """Load a file; refuse a folder before anything is computed."""
     from railsim.definitions.loading import load_spring
 
@@ -204,7 +203,7 @@ def _loaded(file: str, assignments: Sequence[str], output: Output) -> "TrailingA
 
 
 def _write_pages(
-    suspension: "TrailingArmSuspension", output: Output, search: "SearchResult | None" = None
+    suspension: "TrailingArmSuspension", output: cli.Output, search: "SearchResult | None" = None
 ) -> None:
     """Write pictures and page into the folder of ``--out``, if there is one."""
     if output.folder is None:
