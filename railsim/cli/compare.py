@@ -53,16 +53,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
             "results": list(results),
             "remarks": {label: list(result.remarks) for label, result in results.items()},
             "rows": [row.record() for row in rows],
-            "along_the_track": [
-                {
-                    "quantity": one.quantity.name,
-                    **one.labels,
-                    "result": one.result,
-                    "largest_difference": one.largest[0],
-                    "distance": one.largest[1],
-                }
-                for one in differing
-            ],
+            "along_the_track": [one.record() for one in differing],
         }
         records.append({"group": title, **record} if title else record)
         table, data, picture, differences = (_named(name, title) for name in FILES)

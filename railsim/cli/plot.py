@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from railsim.plot.study import Column
 
 # default quantities of the picture of a study
+Text = str | None
 RECORDING = "recording"  # instead of a quantity, of a track
 DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 
@@ -72,7 +73,7 @@ def command(
     path = output.file(default, PICTURES, suffix=".png")
     options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
-        figure = _study_figure(str(folder), selections, against, family, kind)
+        figure = _study_figure(str(folder), selections, *options.values())
     elif wrong := [option for option, value in options.items() if value]:
         found = f"'{file}' is no study's folder"
         raise input_error(wrong[0], found, "a folder of results")
@@ -88,11 +89,7 @@ def command(
 
 
 def _study_figure(
-    file: str,
-    selections: tuple[str, ...],
-    against: str | None,
-    family: str | None,
-    kind: str | None,
+    file: str, selections: tuple[str, ...], against: Text, family: Text, kind: Text
 ) -> "Figure":
     from railsim.plot.study import curves_figure, map_figure, ranking_figure
     from railsim.report.spread import columns, parameters
