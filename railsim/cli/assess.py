@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from railsim.definitions.vehicle.tables import Service
     from railsim.result import Result
 
-STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
+STANDARDS = "en14363|uic518|comfort|wear|safety"
 CATEGORIES = "passenger|freight|locomotive|multiple_unit"
 SERVICE = ("admissible_speed", "cant_deficiency", "category")  # keys of the service table
 ENDINGS = (".json", ".csv", ".png", "_sections.png", "_regression.png")
@@ -24,7 +24,7 @@ FILES = [f"assessment{ending}" for ending in ENDINGS]
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="R.h5|DIR ...")
-@cli.choice("--standard", "What to assess.", "|".join(STANDARDS), default="en14363")
+@cli.choice("--standard", "What to assess.", STANDARDS)
 @cli.option("--limits", "Limits file, or the name of a shipped one.", "F")
 @cli.option("--law", "Law of wear; by default all that need no constants.", "NAME_OR_FILE")
 @cli.choice("--method", "With wheel forces, or with accelerations only.", "normal|simplified")

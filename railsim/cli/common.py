@@ -156,9 +156,9 @@ def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
 
 
 _permission: dict[str, Any] = {"expose_value": False, "callback": _allow}
-allow_code_option = flag("--allow-code", "Execute the laws that files name.", **_permission)
+allow_code_option = flag("--allow-code", "Execute the Python code of files' laws.", **_permission)
 code_options = together(
-    allow_code_option, repeated("--law", "Execute this file's laws.", "FILE", **_permission)
+    allow_code_option, repeated("--law", "Execute laws by file or name.", "FILE", **_permission)
 )
 
 

@@ -37,24 +37,17 @@ def command(
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
     """
     from railsim.errors import argument_error
-    from railsim.fmi import OUTPUTS, fmu
+    from railsim.fmi import fmu
     from railsim.studies.case import load_case
 
     out = output.file("", (".fmu",))
     extent["start"] = extent["start"] or 0.0
     case = load_case(given.run(speed, **extent))
+    named = {"inputs": inputs, "outputs": outputs}
+    how: dict[str, Any] = {n: text.split(",") for n, text in named.items() if text is not None}
+    how |= {"speed": case.speed, "settings": case.settings, **extent}
     try:
-        path = fmu(
-            case.vehicle,
-            case.track,
-            out,
-            inputs=None if inputs is None else inputs.split(","),
-            outputs=OUTPUTS if outputs is None else outputs.split(","),
-            overwrite=output.overwrite,
-            speed=case.speed,
-            settings=case.settings,
-            **extent,
-        )
+        path = fmu(case.vehicle, case.track, out, overwrite=output.overwrite, **how)
     except ImportError as error:
         raise argument_error("fmu", str(error)) from None
     output.wrote(path)

@@ -62,11 +62,12 @@ def command(
     how |= {"band": _band(band), "place": not fixed_place, "folder": folder and folder / KEPT}
     found = identify(vehicle, measured, keys, progress=progress, **how)
     if folder:
-        from railsim.report.measured import identification_figures, identification_page
+        from railsim.report import measured as report
 
-        figures = identification_figures(found)
+        figures = report.identification_figures(found)
+        part = report.of_identification(found.record(), report.drawn(figures))
         pictures = figures["fits"], figures["residuals"]
-        content = found.record(), identification_page(found), *pictures
+        content = found.record(), report.measured_page([part]), *pictures
         output.written.append(found.save_vehicle(folder / FILES[0], vehicle, overwrite=True))
         for name, one in zip(FILES[1:], content, strict=True):
             output.write(name, one)

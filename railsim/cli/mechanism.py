@@ -29,12 +29,11 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
 def command(
     files: tuple[str, ...],
     searched: bool,
-    starts: int | None,
-    seed: int | None,
     case: str | None,
     at: tuple[str, ...],
     assignments: tuple[str, ...],
     output: cli.Output,
+    **search: int | None,
 ) -> None:
     """Compute planar linkages with one degree of freedom: positions, forces, components.
 
@@ -51,7 +50,7 @@ def command(
     """
     if searched and len(files) > 1:
         raise click.UsageError("--optimise takes one FILE")
-    if not searched and (starts is not None or seed is not None):
+    if not searched and any(value is not None for value in search.values()):
         raise click.UsageError("--starts and --seed go with --optimise")
     from railsim.definitions.loading import load_mechanism
     from railsim.mechanisms.analysis import analyse
@@ -66,7 +65,7 @@ def command(
         with cli.faults_in(file, "mechanism", mechanism.name):
             if searched:
                 chosen, cores = mechanism.in_case(case), available_cores()
-                optimum = optimise(chosen, starts=starts, seed=seed, workers=cores)
+                optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
             at_values.append(_values_at(results[-1], at))
             if len(results) == 1 and mechanism.cases and case is None and not searched:

@@ -98,7 +98,8 @@ def command(
 ) -> int:
     """Run every combination of vehicles, tracks, speeds and the values of a grid.
 
-    They are given as options or by a STUDY file, which can also link and sample values.
+    They are given as options or by a STUDY file, which can also link and sample values; keys of
+    --grid and --set begin with vehicle., track. or settings.
 
     DIR receives one HDF5 file per run, summary.csv and study.json.  A finished run with the
     same inputs is not computed again, so the same command can be repeated after an interruption.

@@ -49,11 +49,11 @@ def command(
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
     found = validate_model(runs, results, limits=limits)
     if output.folder:
-        from railsim.report.measured import validation_figures, validation_page
+        from railsim.report.measured import measured_page, of_validation, validation_figures
 
-        figures = validation_figures(found)
+        figures, page = validation_figures(found), measured_page([of_validation(found)])
         pictures = figures["scatter"], figures["overlays"]
-        content = found.record(), found.section_table(), validation_page(found), *pictures
+        content = found.record(), found.section_table(), page, *pictures
         for name, one in zip(FILES, content, strict=True):
             output.write(name, one)
     verdict = f"{found.vehicle} against {', '.join(found.runs)}: {found.verdict}"
