@@ -155,10 +155,11 @@ def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
         allow(*(read_text(path, DEFINITION_BYTES) for path in paths))
 
 
-_permission: dict[str, Any] = {"expose_value": False, "callback": _allow}
-allow_code_option = flag("--allow-code", "Execute the Python code of files' laws.", **_permission)
+_allowed: dict[str, Any] = {"expose_value": False, "callback": _allow}
+allow_code_option = flag("--allow-code", "Execute Python code of laws that files name.", **_allowed)
 code_options = together(
-    allow_code_option, repeated("--law", "Execute laws by file or name.", "FILE", **_permission)
+    allow_code_option,
+    repeated("--law", "Execute the laws of this file or name.", "FILE", **_allowed),
 )
 
 
@@ -182,8 +183,8 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
 
 
 linearisation_options = together(
-    choice("--linearisation", "Contact: derivative or first harmonic.", "tangent|harmonic"),
-    option("--amplitude", "Of the wheelsets in m, for harmonic.", "A", float, default=3e-3),
+    choice("--linearisation", "Contact: its derivative or first harmonic.", "tangent|harmonic"),
+    option("--amplitude", "Lateral, of the wheelsets, for harmonic, m.", "A", float, default=3e-3),
 )
 
 

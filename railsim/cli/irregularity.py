@@ -16,8 +16,12 @@ FILES = ("irregularity.json", "irregularity.png")
 @cli.rails_option
 @cli.option("--spectrum", "Assumed spectrum of the track.", "NAME", default="erri_b176_low")
 @cli.option("--scale", "Factor on it.", "X", float, default=1.0)
-@cli.option("--wavelengths", "Shortest, longest, m.", "A B", float, nargs=2, default=(3.0, 100.0))
-@cli.option("--noise", "rms of sensors, unless in MEASURED, m/s2.", "A", float, default=0.05)
+@cli.option(
+    "--wavelengths", "Shortest and longest in m.", "A B", float, nargs=2, default=(3.0, 100.0)
+)
+@cli.option(
+    "--noise", "rms of an accelerometer in m/s2, unless MEASURED has it.", "A", float, default=0.05
+)
 @cli.option("--simulations", "Most runs for 2 km; 0: linear estimate.", "N", cli.FROM_0, default=25)
 @cli.set_option
 @cli.output_options("Folder for recording, track, estimates, forces.")

@@ -79,7 +79,7 @@ def _is_number(text: str) -> bool:
 )
 @cli.scheduler_option
 @cli.flag("--resume", "Continue the study in DIR; compute what has changed.")
-@cli.option("--keep", "all; summary: no files; or quantities: Q,Y,body_*.", "WHAT", default="all")
+@cli.option("--keep", "all; summary: no result files; or quantities: Q,Y.", "WHAT", default="all")
 @cli.flag("--compress", "Store arrays compressed, without loss.")
 @cli.flag("--single", "Store arrays with 4 bytes a number: 7 digits.")
 @cli.flag("--plots", "Plot every run, and the vehicles against each other.")
