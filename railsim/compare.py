@@ -16,6 +16,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, Faults
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
+from railsim.result.tables import PLACE
 from railsim.table import Amount, Column, Table
 
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
@@ -39,28 +40,18 @@ class Comparison:
     def record(self) -> dict[str, Any]:
         """Return the comparison as plain numbers and strings, SI."""
         differences = self.differences.values()
-        return {
-            "quantity": self.quantity.name,
-            "where": self.where,
-            "values": {
-                label: peak.record() | {"difference": None if isnan(share) else share}
-                for (label, peak), share in zip(self.peaks.items(), differences, strict=True)
-            },
+        values = {
+            label: peak.record() | {"difference": None if isnan(share) else share}
+            for (label, peak), share in zip(self.peaks.items(), differences, strict=True)
         }
+        return {"quantity": self.quantity.name, "where": self.where, "values": values}
 
 
 def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
-    """Compare the peaks and the full-curve values of results.
+    """Compare the peaks and the full-curve values of results, by what they are called.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-        Results by what they are called; the first is what the others are compared with.
-
-    Returns
-    -------
-    tuple of Comparison
-        Peaks first, then the medians over every full curve that the first result passed.
+    The first is what the others are compared with.  Returns: peaks first, then the medians over
+    every full curve that the first result passed.
     """
     rows: dict[tuple[str, str], dict[str, Peak]] = {}
     for label, result in results.items():
@@ -96,6 +87,11 @@ class Difference:
     result: str  # what the result is called
     distance: Floats
     values: Floats  # value of this result less that of the first [SI], float64[position]
+
+    def record(self) -> dict[str, Any]:
+        """Return the largest difference as plain numbers and strings, SI."""
+        where = {"quantity": self.quantity.name, **self.labels, "result": self.result}
+        return where | dict(zip(("largest_difference", "distance"), self.largest, strict=True))
 
     @property
     def largest(self) -> tuple[float, float]:
@@ -174,16 +170,8 @@ def comparison_tables(rows: Sequence[Comparison], results: Mapping[str, Result])
     ]
 
 
-_COLUMNS = (
-    Column("words", " "),
-    Column("result"),
-    Column("wheelset"),
-    Column("side"),
-    Column("value", format=">"),
-    Column("time", "t", "s", ".2f"),
-    Column("distance", "s", "m", ".1f"),
-    Column("difference", "difference", "%", "+.2f"),
-)
+_PLACE: tuple[Any, ...] = ("result", "wheelset", "side", Column("value", format=">"), *PLACE)
+_COLUMNS = (Column("words", " "), *_PLACE, Column("difference", "difference", "%", "+.2f"))
 
 
 def _compared(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iterator[list[Any]]:
@@ -211,4 +199,4 @@ def difference_table(found: Sequence[Difference]) -> Table:
         value = Amount(one.largest[0], Column.of(one.quantity))
         side = one.labels.get("side", "")
         rows.append([one.quantity.words, one.result, side, value, one.largest[1]])
-    return Table([*where, largest, Column("distance", "s", "m", ".1f")], rows)
+    return Table([*where, largest, PLACE[1]], rows)

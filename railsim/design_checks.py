@@ -59,14 +59,8 @@ def check_table(checks: Sequence[Check], *, notes: bool = False) -> Table:
         met = "-" if check.sense == "about" else "pass" if check.ok else "fail"
         limit = f"{signs[check.sense]} {column.text(check.limit)}"
         rows.append([check.name, Amount(check.value, column), limit, unit, met, check.note])
-    columns = [
-        Column("check"),
-        Column("value", format=".2f"),
-        Column("must be", format=">"),
-        Column("unit"),
-        Column("met"),
-        Column("comparison"),
-    ]
+    numbers = Column("value", format=".2f"), Column("must be", format=">")
+    columns: list[Column | str] = ["check", *numbers, "unit", "met", "comparison"]
     count = len(columns) if notes else len(columns) - 1
     return Table(columns[:count], [row[:count] for row in rows])
 

@@ -48,15 +48,11 @@ class Fault:
         """Return the fault as the command line names it: by options, also those in backquotes."""
         if not self.option:
             return self
-        found, allowed = (_PARAMETER.sub(_option, text) for text in (self.found, self.allowed))
+        found, allowed = (
+            re.sub(r"`(\w+)`", lambda name: "--" + name[1].replace("_", "-"), text)
+            for text in (self.found, self.allowed)
+        )
         return replace(self, file=self.option, found=found, allowed=allowed)
-
-
-_PARAMETER = re.compile(r"`(\w+)`")
-
-
-def _option(parameter: re.Match[str]) -> str:
-    return "--" + parameter[1].replace("_", "-")
 
 
 def argument_fault(

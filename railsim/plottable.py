@@ -57,24 +57,9 @@ class Plottable:
     def plot(
         self, path: str | Path | None = None, *, title: str = "", overwrite: bool = False
     ) -> "Figure":
-        """Draw the result.
+        """Draw the result, under a title of one's own; also into the file of `path`.
 
-        Parameters
-        ----------
-        path : str or Path, optional
-            Where the picture is written too; the suffix tells its kind.
-        title : str
-            What was analysed.
-        overwrite : bool
-            Whether a file may be replaced.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-
-        Raises
-        ------
-        InputError
-            The file exists or cannot be written.
+        The suffix of the file tells its kind.  Raises InputError: it exists and may not be
+        overwritten, or cannot be written.
         """
         return picture_of(self, path, overwrite, title=title)

@@ -19,14 +19,9 @@ from typing import Any, cast
 import click
 from click.shell_completion import CompletionItem
 
+from railsim.cli import interrupts
 from railsim.cli.common import DONE, ENDED_EARLY, FAILED, LIMIT_EXCEEDED, WRONG_INPUT
-from railsim.cli.interrupts import (
-    Interrupted,
-    raise_pending_signal,
-    remembered_interrupts,
-    silence,
-    usable_streams,
-)
+from railsim.cli.interrupts import Interrupted
 from railsim.cli.terminal import echo, print_json
 from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
 from railsim.threads import use_one_thread
@@ -141,7 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger("railsim").addHandler(logging.NullHandler())
     # without a home matplotlib says at every start where it keeps its fonts instead
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    usable_streams()
+    interrupts.usable_streams()
     if arguments is None and COMPLETE in os.environ:
         from click.shell_completion import shell_complete
 
@@ -153,10 +148,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             echo(f"remark: {sentence}", err=True)
         sys.stdout.flush()
     except BrokenPipeError:
-        silence(sys.stdout)
+        interrupts.silence(sys.stdout)
         return DONE
     except OSError as error:  # nobody can read what is printed: a full disk behind `>`
-        silence(sys.stdout)
+        interrupts.silence(sys.stdout)
         with suppress(OSError):
             echo(f"railsim: {words_of(error)}", err=True)
         return FAILED
@@ -166,7 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(given: Sequence[str] | None) -> int:
     """Call a command and return the exit status that its end stands for."""
     arguments = sys.argv[1:] if given is None else list(given)
-    with remembered_interrupts(last=given is None):
+    with interrupts.remembered_interrupts(last=given is None):
         try:
             return _called(arguments)
         except InputError as error:
@@ -217,8 +212,8 @@ def _called(arguments: list[str]) -> int:
         echo(f"railsim: {error.format_message()}", err=True)
         status = _failed(arguments, WRONG_INPUT, {"error": error.format_message()})
     except Exception:
-        raise_pending_signal()
+        interrupts.raise_pending_signal()
         raise
     if status not in (DONE, ENDED_EARLY, LIMIT_EXCEEDED):
-        raise_pending_signal()
+        interrupts.raise_pending_signal()
     return int(status)

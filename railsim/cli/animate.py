@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Output, option, output_options
+from railsim.cli import common as cli
 from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import TABLE_BYTES, read_text
 
@@ -17,21 +17,15 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 
 @click.command()
 @click.argument("file", metavar="R.h5|modes.json")
-@option("--out", "Page (.html), .gif or .mp4; default: next to the input.", "F")
-@option("--vehicle", "Vehicle of the modes: a file or a name.", "F")
-@option("--mode", "Mode by name or number; default the first.", "NAME")
-@option("--between", "Section of the run to show, distance in m.", "S1 S2", float, nargs=2)
-@option("--frames", "Maximum number of frames.", "N", click.IntRange(2, 20_000))
-@option("--fps", "Frames per second of a film.", "N", click.IntRange(1, 100), default=20)
-@option(
-    "--gain",
-    "Magnification of the motion of the bodies in a film.",
-    "G",
-    click.FloatRange(0.0, 1000.0),
-    default=1.0,
-)
-@output_options()
-def command(file: str, fps: int, gain: float, output: Output, **how: Any) -> None:
+@cli.option("--out", "Page (.html), .gif or .mp4; default: next to the input.", "F")
+@cli.option("--vehicle", "Vehicle of the modes: a file or a name.", "F")
+@cli.option("--mode", "Mode by name or number; default the first.", "NAME")
+@cli.option("--between", "Section of the run to show, distance in m.", "S1 S2", float, nargs=2)
+@cli.option("--frames", "Maximum number of frames.", "N", click.IntRange(2, 20_000))
+@cli.option("--fps", "Frames per second of a film.", "N", click.IntRange(1, 100), default=20)
+@cli.option("--gain", "Magnification in a film.", "G", click.FloatRange(0.0, 1000.0), default=1.0)
+@cli.output_options()
+def command(file: str, fps: int, gain: float, output: cli.Output, **how: Any) -> None:
     """Animate a run or a mode as one HTML page or as a film.
 
     The page is self-contained: it plays, zooms and rotates in any browser, also without a network.
@@ -45,7 +39,7 @@ def command(file: str, fps: int, gain: float, output: Output, **how: Any) -> Non
 
     path, overwrite = output.file(file, ENDINGS, suffix=".html"), output.overwrite
     film = path.suffix.lower() in (".gif", ".mp4")
-    scene = _scene(Path(file), film=film, **how)
+    scene = _scene(Path(file), film, **how)
     if film:
         write_movie(scene, path, frames_per_second=fps, gain=gain, overwrite=overwrite)
     else:
@@ -54,13 +48,7 @@ def command(file: str, fps: int, gain: float, output: Output, **how: Any) -> Non
 
 
 def _scene(
-    file: Path,
-    *,
-    film: bool,
-    vehicle: str | None,
-    mode: str | None,
-    between: tuple[float, float] | None,
-    frames: int | None,
+    file: Path, film: bool, vehicle: str | None, mode: str | None, between: Any, frames: int | None
 ) -> "Scene":
     from railsim.animation import mode_scene, result_scene
     from railsim.animation.scene import FRAMES, chosen_mode
@@ -73,9 +61,8 @@ def _scene(
             for option, value in (("--vehicle", vehicle), ("--mode", mode))
             if value
         ).check()
-        return result_scene(
-            open_run(file), frames=frames or (200 if film else FRAMES), between=between
-        )
+        frames = frames or (200 if film else FRAMES)
+        return result_scene(open_run(file), frames=frames, between=between)
     from railsim.definitions.loading import load_vehicle
 
     data = _read(file)

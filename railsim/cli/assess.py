@@ -7,17 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    DONE,
-    LIMIT_EXCEEDED,
-    Output,
-    allow_code_option,
-    as_speed,
-    fail_option,
-    flag,
-    option,
-    output_options,
-)
+from railsim.cli import common as cli
 from railsim.errors import Fault, Faults, InputError
 
 if TYPE_CHECKING:
@@ -25,42 +15,31 @@ if TYPE_CHECKING:
     from railsim.definitions.vehicle.tables import Service
     from railsim.result import Result
 
-STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
+STANDARDS = "en14363|uic518|comfort|wear|safety"
+CATEGORIES = "passenger|freight|locomotive|multiple_unit"
 SERVICE = ("admissible_speed", "cant_deficiency", "category")  # keys of the service table
-FILES = (
-    "assessment.json",
-    "assessment.csv",
-    "assessment.png",
-    "assessment_sections.png",
-    "assessment_regression.png",
-)
+ENDINGS = (".json", ".csv", ".png", "_sections.png", "_regression.png")
+FILES = [f"assessment{ending}" for ending in ENDINGS]
 
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="R.h5|DIR ...")
-@option("--standard", "What to assess.", kind=click.Choice(STANDARDS), default="en14363")
-@option("--limits", "Limits file, or the name of a shipped one.", "F")
-@option("--law", "Law of wear; by default all that need no constants.", "NAME_OR_FILE")
-@option(
-    "--method",
-    "With wheel forces, or with accelerations only.",
-    kind=click.Choice(["normal", "simplified"]),
-    default="normal",
-)
-@option("--admissible-speed", "Admissible speed in m/s, instead of the vehicle's.", "V", as_speed)
-@option("--cant-deficiency", "Admissible cant deficiency in m.", "I", float)
-@option(
-    "--category",
-    "Category, instead of the vehicle's.",
-    kind=click.Choice(["passenger", "freight", "locomotive", "multiple_unit"]),
-)
-@flag("--causal", "Causal filters, with phase, as in measuring amplifiers.")
-@flag("--coarse", "Also accept results below 1000 samples per second.")
-@flag("--all-sections", "Also use sections outside a zone's conditions.")
-@fail_option
-@output_options("Folder for assessment.json, .csv and .png.")
-@allow_code_option
-def command(files: tuple[str, ...], standard: str, fail: bool, output: Output, **how: Any) -> int:
+@cli.choice("--standard", "What to assess.", STANDARDS)
+@cli.option("--limits", "Limits file, or the name of a shipped one.", "F")
+@cli.option("--law", "Law of wear; by default all that need no constants.", "NAME_OR_FILE")
+@cli.choice("--method", "With wheel forces, or with accelerations only.", "normal|simplified")
+@cli.option("--admissible-speed", "Speed in m/s, instead of the vehicle's.", "V", cli.as_speed)
+@cli.option("--cant-deficiency", "Admissible cant deficiency in m.", "I", float)
+@cli.choice("--category", "Instead of the vehicle's.", CATEGORIES, default=None)
+@cli.flag("--causal", "Causal filters, with phase, as in measuring amplifiers.")
+@cli.flag("--coarse", "Also accept results below 1000 samples per second.")
+@cli.flag("--all-sections", "Also use sections outside a zone's conditions.")
+@cli.fail_option
+@cli.output_options("Folder for assessment.json, .csv and .png.")
+@cli.allow_code_option
+def command(
+    files: tuple[str, ...], standard: str, fail: bool, output: cli.Output, **how: Any
+) -> int:
     """Assess results: running behaviour, comfort, wear or derailment.
 
     Runs of one vehicle are assessed together, those of several vehicles one after the other; a
@@ -83,7 +62,7 @@ def command(files: tuple[str, ...], standard: str, fail: bool, output: Output, *
     write_assessments(output, assessments)
     lines = [line for one in assessments for line in assessment_lines(one, quiet=output.quiet)]
     output.answer([assessment.record() for assessment in assessments], lines)
-    return LIMIT_EXCEEDED if fail and any(a.exceeded for a in assessments) else DONE
+    return cli.LIMIT_EXCEEDED if fail and any(a.exceeded for a in assessments) else cli.DONE
 
 
 def _paths(files: Sequence[str]) -> list[Path]:
@@ -117,17 +96,15 @@ def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service 
         ) from None
 
 
-def write_assessments(output: Output, assessments: "Sequence[Assessment]") -> None:
+def write_assessments(output: cli.Output, assessments: "Sequence[Assessment]") -> None:
     """Write the record, the table and the pictures."""
     if output.folder is None:
         return
     from railsim.assessment.tables import assessment_csv
     from railsim.plot.assessment import assessment_figure, regression_figure, sections_figure
 
-    record, rows, *pictures = FILES
-    output.write(record, [assessment.record() for assessment in assessments])
-    output.write(rows, assessment_csv(assessments))
     draw = (assessment_figure, sections_figure, regression_figure)
-    for name, figure in zip(pictures, (one(assessments) for one in draw), strict=True):
-        if figure is not None:
-            output.write(name, figure)
+    content: list[Any] = [[one.record() for one in assessments], assessment_csv(assessments)]
+    for name, one in zip(FILES, [*content, *(of(assessments) for of in draw)], strict=True):
+        if one is not None:
+            output.write(name, one)

@@ -4,34 +4,28 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import (
-    Output,
-    code_options,
-    flag,
-    names_of,
-    option,
-    output_options,
-    workers_option,
-)
+from railsim.cli import common as cli
 from railsim.cli.study import ManyValues
 
 SHOWN = 40
 
 
 @click.command(cls=ManyValues)
-@click.argument("recording", shell_complete=names_of("track"))
-@option("--vehicles", "Vehicles: files or names.", "F [F ...]", multiple=True, required=True)
-@option(
-    "--speeds", "Speeds in m/s, or with a unit: 160km/h.", "V [V ...]", multiple=True, required=True
-)
-@option("--share", "Share of a limit from which on a place is listed.", "X", float, default=0.8)
-@option("--out", "Folder of the runs and tables.", "DIR", required=True)
-@workers_option
-@flag("--resume", "Go on where this folder was left.")
-@output_options()
-@code_options
+@click.argument("recording", shell_complete=cli.names_of("track"))
+@cli.repeated("--vehicles", "Vehicles: files or names.", "F [F ...]", required=True)
+@cli.repeated("--speeds", "Speeds in m/s, or with a unit: 160km/h.", "V [V ...]", required=True)
+@cli.option("--share", "Share of a limit from which on a place is listed.", "X", float, default=0.8)
+@cli.option("--out", "Folder of the runs and tables.", "DIR", required=True)
+@cli.workers_option
+@cli.flag("--resume", "Go on where this folder was left.")
+@cli.output_options()
+@cli.code_options
 def command(
-    recording: str, vehicles: tuple[str, ...], speeds: tuple[str, ...], output: Output, **how: Any
+    recording: str,
+    vehicles: tuple[str, ...],
+    speeds: tuple[str, ...],
+    output: cli.Output,
+    **how: Any,
 ) -> None:
     """Run vehicles over a recorded track and list where they exceed a share of a limit.
 
@@ -51,17 +45,11 @@ def command(
     from railsim.studies.geometry_limits import CELL
     from railsim.studies.rows import speed_of
 
+    how |= {"out": str(output.out), "overwrite": output.overwrite}
+    driven = [speed_of(text) for text in speeds]
     with output.progress("assess-track") as progress:
-        found = assess_track(
-            recording,
-            vehicles,
-            [speed_of(text) for text in speeds],
-            out=str(output.out),
-            overwrite=output.overwrite,
-            progress=progress,
-            beside=("places.csv", "sections.csv", "heat_strip.png", "report.html"),
-            **how,
-        )
+        how["beside"] = "places.csv", "sections.csv", "heat_strip.png", "report.html"
+        found = assess_track(recording, vehicles, driven, progress=progress, **how)
     output.written += found.write()
     table, strip = found.table(), heat_strip(found.cells, found.shares, CELL)
     output.write("heat_strip.png", strip)

@@ -2,13 +2,13 @@
 
 import click
 
-from railsim.cli.common import Output, answer_options, flag
+from railsim.cli import common as cli
 
 
 @click.command()
-@flag("--quick", "No errors, which take most of the time.")
-@answer_options
-def command(quick: bool, output: Output) -> None:
+@cli.flag("--quick", "No errors, which take most of the time.")
+@cli.answer_options
+def command(quick: bool, output: cli.Output) -> None:
     """Measure the speed of railsim on this machine, and the error at that speed.
 
     Two coaches through a curve and one on irregular rails, in multiples of real time of the time

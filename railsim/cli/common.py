@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from railsim.definitions import Settings, Track, Vehicle
     from railsim.definitions.base import Remark
     from railsim.definitions.file_definition import FileDefinition
+    from railsim.studies.spec import RunSpec
     from railsim.table import Table
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-
 DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4  # exit statuses
-COUNT = click.IntRange(min=1)
+COUNT, FROM_0 = click.IntRange(min=1), click.IntRange(min=0)
 
 
 def option(
@@ -34,6 +34,26 @@ def option(
 ) -> Callable[[F], F]:
     """Return an option of a command by its name, and its parameter's where that is another."""
     return click.option(*names.split(), help=words, metavar=metavar, type=kind, **more)
+
+
+def choice(names: str, words: str, values: str, **more: Any) -> Callable[[F], F]:
+    """Return an option with one of several values, ``one|another``; by default the first."""
+    known = values.split("|")
+    return option(names, words, kind=click.Choice(known), **{"default": known[0]} | more)
+
+
+def repeated(names: str, words: str, metavar: str, *kind: Any, **more: Any) -> Callable[[F], F]:
+    """Return an option that may be given several times."""
+    return option(names, words, metavar, *kind, multiple=True, **more)
+
+
+def values(names: str, words: str, metavar: str, **more: Any) -> Callable[[F], F]:
+    """Return an option with several values, see `values_of`."""
+
+    def parsed(ctx: Any, param: click.Parameter, text: str | None) -> list[float] | None:
+        return values_of(text, param.opts[0]) if text else None
+
+    return option(names, words, metavar, callback=parsed, **more)
 
 
 def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
@@ -103,12 +123,7 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
 json_option = flag("--json as_json", "Machine-readable results on stdout.")
 quiet_option = flag("--quiet", "No progress bars; remarks only on what is damaged or left out.")
 overwrite_option = flag("--overwrite", "Replace output that exists.")
-set_option = option(
-    "--set assignments",
-    "Replace one value of the input; may be given several times.",
-    "KEY.PATH=VALUE",
-    multiple=True,
-)
+set_option = repeated("--set assignments", "Replace a value; may be repeated.", "KEY.PATH=VALUE")
 load_option = option("--load", "Load case of the vehicle; by default its design load.", "NAME")
 workers_option = option("--workers", "Number of processes; default: all cores.", "N", COUNT)
 scheduler_option = option("--scheduler", "Address of a dask scheduler to run on.", "ADDRESS")
@@ -140,24 +155,11 @@ def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
         allow(*(read_text(path, DEFINITION_BYTES) for path in paths))
 
 
-allow_code_option = flag(
-    "--allow-code",
-    "Execute the Python code of laws that the files name.",
-    expose_value=False,
-    callback=_allow,
-)
-
-
+_allowed: dict[str, Any] = {"expose_value": False, "callback": _allow}
+allow_code_option = flag("--allow-code", "Execute Python code of laws that files name.", **_allowed)
 code_options = together(
     allow_code_option,
-    option(
-        "--law",
-        "Execute the laws of this file, or of this name; may be given several times.",
-        "FILE",
-        multiple=True,
-        expose_value=False,
-        callback=_allow,
-    ),
+    repeated("--law", "Execute the laws of this file or name.", "FILE", **_allowed),
 )
 
 
@@ -181,19 +183,8 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
 
 
 linearisation_options = together(
-    option(
-        "--linearisation",
-        "Contact: its derivative, or its first harmonic for --amplitude.",
-        kind=click.Choice(["tangent", "harmonic"]),
-        default="tangent",
-    ),
-    option(
-        "--amplitude",
-        "Lateral amplitude of the wheelsets in m, for harmonic.",
-        "A",
-        float,
-        default=3e-3,
-    ),
+    choice("--linearisation", "Contact: its derivative or first harmonic.", "tangent|harmonic"),
+    option("--amplitude", "Lateral, of the wheelsets, for harmonic, m.", "A", float, default=3e-3),
 )
 
 
@@ -232,8 +223,10 @@ class Inputs(NamedTuple):
 
 @dataclass(frozen=True)
 class Given:
-    """Values of ``--load``, ``--settings``, ``--set``."""
+    """Values of VEHICLE, TRACK, ``--load``, ``--settings``, ``--set``, as far as there are any."""
 
+    vehicle: str = ""
+    track: str | None = None
     load: str | None = None
     settings: str | None = None
     assignments: tuple[str, ...] = ()
@@ -244,7 +237,7 @@ class Given:
         load = () if self.load is None else (f"vehicle.load={self.load}",)
         return (*self.assignments, *load)
 
-    def inputs(self, vehicle: str, track: str | None, changes: Sequence[str] = ()) -> Inputs:
+    def inputs(self, changes: Sequence[str] = ()) -> Inputs:
         """Load vehicle, track (by default ``straight``) and settings, with assignments of --over.
 
         Raises InputError: everything that is wrong in any of them.
@@ -256,9 +249,9 @@ class Given:
         with faults.caught():
             parts = split_overrides([*self.overrides, *changes])
         with faults.caught():
-            coach = load_vehicle(vehicle, parts["vehicle"])
+            coach = load_vehicle(self.vehicle, parts["vehicle"])
         with faults.caught():
-            rails = load_track("straight" if track is None else track, parts["track"])
+            rails = load_track("straight" if self.track is None else self.track, parts["track"])
         with faults.caught():
             settings = load_settings(self.settings, parts["settings"])
         if changes:  # without them the inputs have been loaded before, free of faults
@@ -267,20 +260,24 @@ class Given:
         faults.check()
         return Inputs(coach, rails, settings)
 
+    def run(self, speed: float | None, **extent: Any) -> "RunSpec":
+        """Return the run of the inputs at a speed."""
+        from railsim.studies.spec import RunSpec
+
+        how: Any = {"settings": self.settings, "assignments": self.overrides, **extent}
+        return RunSpec(self.vehicle, str(self.track), speed, **how)
+
 
 def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
     """Add ``--load``, ``--settings`` and ``--set``; the command takes them as `given`.
+
+    With them it takes VEHICLE and TRACK, or ``--vehicle`` and ``--track``, which it has besides.
 
     `settings`: what counts of the settings file, by default all.
     """
     words = f"Settings file: {settings}." if settings else "Settings file."
     options: list[Any] = [option("--settings", words, "F"), set_option]
     return collected("given", Given, *[load_option] * load, *options)
-
-
-def as_values(ctx: click.Context, param: click.Parameter, text: str | None) -> list[float] | None:
-    """Return the values of an option, if it is given, see `values_of`; a callback of options."""
-    return values_of(text, param.opts[0]) if text else None
 
 
 def values_of(text: str, option: str) -> list[float]:
@@ -379,13 +376,7 @@ class Output:
         for path in self.written:
             echo(path)
 
-    def finish(
-        self,
-        names: Sequence[str],
-        found: Any,
-        parts: "Iterable[str | Table]",
-        remarks: Iterable[object] = (),
-    ) -> None:
+    def finish(self, names: Any, found: Any, parts: Any, remarks: Iterable[object] = ()) -> None:
         """Write the record and the plot of a result under two names, and answer with them."""
         record = found.record()
         self.write(names[0], record)
@@ -395,6 +386,12 @@ class Output:
     def progress(self, words: str) -> AbstractContextManager[Callable[[float], None]]:
         """Show progress under these words, see `railsim.cli.progress.progress_bar`."""
         return progress_bar(words, quiet=self.quiet)
+
+    @contextmanager
+    def studying(self, words: str) -> Iterator[dict[str, Any]]:
+        """Give what studies take: whether to overwrite, whom to tell progress and remarks."""
+        with self.progress(words) as progress:
+            yield {"overwrite": self.overwrite, "progress": progress, "on_remark": self.remark}
 
     def remark(self, text: object) -> None:
         """Print a remark on stderr, also if quiet: on what is damaged or left out."""

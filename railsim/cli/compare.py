@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Output, option, output_options
+from railsim.cli import common as cli
 from railsim.cli.gathered import gather, opened
 from railsim.errors import InputError, input_error
 
@@ -22,17 +22,9 @@ Group = dict[str, "Result"]
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="R.h5|STUDY...")
-@option(
-    "--over",
-    "Horizontal axis of the picture.",
-    kind=click.Choice(["distance", "time"]),
-    default="distance",
-)
-@output_options(
-    "Folder for compare.csv, compare.json, compare.png, differences.png; of several groups a set "
-    "for each."
-)
-def command(files: tuple[str, ...], over: str, output: Output) -> None:
+@cli.choice("--over", "Horizontal axis of the picture.", "distance|time")
+@cli.output_options("Folder for compare.csv, .json, .png, differences.png; a set for each group.")
+def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     """Print peaks and mid-curve values of results side by side.
 
     The others are compared with the first result; differences are those of magnitudes, and those
@@ -61,16 +53,7 @@ def command(files: tuple[str, ...], over: str, output: Output) -> None:
             "results": list(results),
             "remarks": {label: list(result.remarks) for label, result in results.items()},
             "rows": [row.record() for row in rows],
-            "along_the_track": [
-                {
-                    "quantity": one.quantity.name,
-                    **one.labels,
-                    "result": one.result,
-                    "largest_difference": one.largest[0],
-                    "distance": one.largest[1],
-                }
-                for one in differing
-            ],
+            "along_the_track": [one.record() for one in differing],
         }
         records.append({"group": title, **record} if title else record)
         table, data, picture, differences = (_named(name, title) for name in FILES)
@@ -98,7 +81,7 @@ def _named(name: str, title: str) -> str:
     return f"{stem}_{in_a_name(title)}.{ending}" if title else name
 
 
-def _groups(files: tuple[str, ...], output: Output) -> dict[str, Group]:
+def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
     """Return what is compared with each other, by titles; a single group has none.
 
     Raises InputError: what cannot be compared, with the reason.
@@ -137,7 +120,7 @@ def _of_one(folder: str) -> dict[str, Group]:
     return pairs
 
 
-def _of_several(folders: list[str], output: Output) -> dict[str, Group]:
+def _of_several(folders: list[str], output: cli.Output) -> dict[str, Group]:
     """Return the runs of the same name in several folders."""
     runs = {folder: gather([folder]).paths for folder in folders}
     common = [name for name in runs[folders[0]] if all(name in paths for paths in runs.values())]

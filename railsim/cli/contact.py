@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import COUNT, Output, as_values, flag, option, output_options
+from railsim.cli import common as cli
 from railsim.cli.terminal import echo
 from railsim.errors import Fault, Faults, input_error
 from railsim.files.access import check_folder
 
 if TYPE_CHECKING:
-    from railsim.arrays import Floats
     from railsim.contact.creep_curves import Patch
     from railsim.contact.summary import ContactSummary
     from railsim.description import Description
@@ -24,7 +23,6 @@ CREEP = ("creep_curves.png", "traction.png", "creep_curves.csv")
 CREEP_TABLE = "creep_table.npz"
 FIELD_SIZE = 1.2
 """Magnitude of the normalised creepage of the traction fields."""
-NORMAL = ("hertz", "kik-piotrowski")
 
 RANGES = {
     "gauge": (0.3, 2.5, "m"),
@@ -39,52 +37,25 @@ RANGES = {
 
 @click.command()
 @click.argument("profiles", nargs=-1, metavar="[WHEEL] [RAIL]")
-@option(
-    "--wheel",
-    "Wheel profile, name or file; give it twice for different left and right wheels.",
-    "W",
-    multiple=True,
-    default=("S1002",),
+@cli.repeated("--wheel", "Wheel profile; twice for left and right.", "W", default=("S1002",))
+@cli.repeated("--rail", "Rail profile; twice for left and right.", "R", default=("60E1",))
+@cli.option("--gauge", "Track gauge in m.", "G", default=1.435)
+@cli.option("--inclination", "Rail inclination, 0.025 for 1:40.", "I", default=0.025)
+@cli.option("--back-to-back", "Distance between the flange backs in m.", "D", default=1.360)
+@cli.repeated("--radius radii", "Rolling radius in m; twice likewise.", "R", float, default=(0.46,))
+@cli.option("--load", "Vertical wheel load in N.", "Q", default=60e3)
+@cli.option("--max-shift", "Largest lateral displacement in m.", "Y", default=0.010)
+@cli.values("--gauges", "Also the conicity over these gauges in m.", "A:B:N")
+@cli.option("--overlay", "With --out: also a wheel or rail profile drawn over the right one.", "P")
+@cli.flag("--exact", "Check the patches by boundary elements (about ten seconds).")
+@cli.choice("--normal", "Normal contact; --exact compares both.", "hertz|kik-piotrowski")
+@cli.flag("--creep", "Creep forces of the centred wheel by every law, and traction fields.")
+@cli.option("--friction", "Friction coefficient, for --creep.", "MU", default=0.4)
+@cli.flag(
+    "--build-creep-table", "Only recompute the table of the law `table`: half an hour, resumable."
 )
-@option(
-    "--rail",
-    "Rail profile, name or file; twice for left and right.",
-    "R",
-    multiple=True,
-    default=("60E1",),
-)
-@option("--gauge", "Track gauge in m.", "G", default=1.435)
-@option("--inclination", "Rail inclination, 0.025 for 1:40.", "I", default=0.025)
-@option("--back-to-back", "Distance between the flange backs in m.", "D", default=1.360)
-@option(
-    "--radius radii",
-    "Rolling radius in m; twice for left and right.",
-    "R",
-    float,
-    multiple=True,
-    default=(0.46,),
-)
-@option("--load", "Vertical wheel load in N.", "Q", default=60e3)
-@option("--max-shift", "Largest lateral displacement in m.", "Y", default=0.010)
-@option("--gauges", "Also the conicity over N gauges from A to B m.", "A:B:N", callback=as_values)
-@option("--overlay", "With --out: also a wheel or rail profile drawn over the right one.", "P")
-@flag("--exact", "Check the patches by boundary elements (about ten seconds).")
-@option(
-    "--normal",
-    "Normal contact of the table; with --exact both are compared.",
-    kind=click.Choice(NORMAL),
-    default="hertz",
-)
-@flag(
-    "--creep", "Creep forces of the centred wheel's patch by every creep law, and traction fields."
-)
-@option("--friction", "Friction coefficient, for --creep.", "MU", default=0.4)
-@flag(
-    "--build-creep-table",
-    "Only recompute the table of the creep law `table` (half an hour; can be interrupted).",
-)
-@option("--workers", "Processes, for --build-creep-table.", "N", COUNT, default=2)
-@output_options("Folder for pictures and tables; created if it does not exist.")
+@cli.option("--workers", "Processes, for --build-creep-table.", "N", cli.COUNT, default=2)
+@cli.output_options("Folder for pictures and tables; created if it does not exist.")
 def command(
     profiles: tuple[str, ...],
     wheel: tuple[str, ...],
@@ -96,10 +67,8 @@ def command(
     friction: float,
     build_creep_table: bool,
     workers: int,
-    output: Output,
-    exact: bool,
-    normal: Any,
-    **numbers: float,
+    output: cli.Output,
+    **numbers: Any,
 ) -> None:
     """Contact geometry of a wheelset on its rails.
 
@@ -131,27 +100,19 @@ def command(
     if gauges and len(gauges) == 1:
         raise click.UsageError("--gauges needs two gauges at least")
     compared = load_profile(overlay) if overlay else None
-    written = [*PICTURES, *TABLES]
-    written += [*CREEP] if creep else []
-    written += [*MAP] if gauges else []
-    written += [OVERLAY] if compared else []
-    output.reserve(*written)
+    further = CREEP * creep + MAP * bool(gauges) + (OVERLAY,) * bool(compared)
+    output.reserve(*PICTURES, *TABLES, *further)
+    numbers["radii"] = radii[0], radii[-1]
     with output.progress("contact"):
-        found = contact_summary(
-            _profiles(wheel, "wheel"),
-            _profiles(rail, "rail"),
-            radii=(radii[0], radii[-1]),
-            exact=exact,
-            normal=normal,
-            **numbers,
-        )
+        found = contact_summary(_profiles(wheel, "wheel"), _profiles(rail, "rail"), **numbers)
     described = _described(found)
-    _write(output, found)
+    by_gauge = None
     if gauges:
         by_gauge = conicity_over_gauge(found, gauges)
         described.data.update(gauges=gauges, conicity_over_gauge=by_gauge.tolist())
         described.parts.extend(["", tables.conicity_map_table(found, gauges, by_gauge)])
-        _write_map(output, found, gauges, by_gauge)
+    if output.folder:
+        _write(output, found, gauges, by_gauge, compared)
     if creep:
         patch = found.main_patch(friction)
         rows = forces_by_law(patch)
@@ -159,19 +120,13 @@ def command(
         described.parts.extend(["", tables.creep_table(patch, rows)])
         if output.folder:
             _write_creep(output, patch, rows)
-    if compared is not None:
-        from railsim.plot.contact import overlay_figure
-
-        right = found.pairs[1]
-        own = right.wheel if compared.kind == "wheel" else right.rail
-        output.write(OVERLAY, lambda: overlay_figure([compared, own]))
     if not (output.as_json or output.quiet):
         for note in found.notes:
             echo(note, err=True)
     output.answer(described.data, described.parts)
 
 
-def _check(by_side: Mapping[str, Sequence[Any]], numbers: Mapping[str, float]) -> None:
+def _check(by_side: Mapping[str, Sequence[Any]], numbers: Mapping[str, Any]) -> None:
     """Refuse more values than there are sides, and numbers that mean nothing, all at once."""
     Faults(
         Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for each side")
@@ -180,7 +135,7 @@ def _check(by_side: Mapping[str, Sequence[Any]], numbers: Mapping[str, float]) -
     ).check()
     faults = Faults()
     for name, (low, high, unit) in RANGES.items():
-        for value in by_side[name] if name in by_side else [numbers[name]]:
+        for value in by_side.get(name) or [numbers[name]]:
             if not low <= value <= high:
                 option, allowed = name.replace("_", "-"), f"{low:g} to {high:g} {unit}"
                 faults.append(Fault(f"--{option}", "", f"found {value:g}", allowed))
@@ -204,12 +159,9 @@ def _described(found: "ContactSummary") -> "Description":
     from railsim.description import Description
 
     left, right = found.pairs
-    gauge_values = gauge_table(
-        (left.wheel, right.wheel),
-        diameter=2.0 * min(found.radii),
-        back_to_back=left.back_to_back,
-        gauge=left.gauge,
-    )
+    wheels, diameter = (left.wheel, right.wheel), 2.0 * min(found.radii)
+    between = {"back_to_back": left.back_to_back, "gauge": left.gauge}
+    gauge_values = gauge_table(wheels, diameter=diameter, **between)
     steering = steering_index(found.geometry, RADIUS, min(found.radii))
     data: dict[str, Any] = {name: values.tolist() for name, values in found.functions.items()}
     data["equivalent_conicity"] = [
@@ -217,26 +169,24 @@ def _described(found: "ContactSummary") -> "Description":
         for a, v in zip(found.amplitudes, found.conicity, strict=True)
     ]
     data["jumps"] = [{"lateral": lateral, "side": side} for lateral, side in found.geometry.jumps()]
-    data |= {
-        "patches": found.patches,
-        "notes": found.notes,
-        "gauge_values": gauge_values.records(),
-        "steering_index": {"radius": RADIUS, "value": steering},
-    }
+    data |= {"patches": found.patches, "notes": found.notes}
+    data["gauge_values"] = gauge_values.records()
+    data["steering_index"] = {"radius": RADIUS, "value": steering}
     words = f"steering index at R {RADIUS:g} m: {steering:.2f}; above 1 the flange steers too"
     functions, conicity = tables.printed_functions(found), tables.printed_conicity(found)
     patches = tables.patch_table(found)
     return Description(data, [functions, "", conicity, "", gauge_values, words, "", patches])
 
 
-def _write(output: Output, found: "ContactSummary") -> None:
-    """Write the tables and the pictures that there always are."""
-    if output.folder is None:
-        return
+def _write(
+    output: cli.Output, found: "ContactSummary", gauges: Any, by_gauge: Any, compared: Any
+) -> None:
+    """Write the tables and the pictures that there always are, over the gauge, of a profile."""
     from railsim.contact import tables
     from railsim.contact.summary import OTHER_NORMAL
     from railsim.plot import contact as plot
 
+    _, right = found.pairs
     names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in found.pairs)
     other = found.with_other_normal() if found.exact else None
     labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
@@ -251,20 +201,15 @@ def _write(output: Output, found: "ContactSummary") -> None:
     )
     for name, one in zip((*TABLES, *PICTURES), content, strict=True):
         output.write(name, one)
+    if gauges:
+        output.write(MAP[0], plot.conicity_map_figure(gauges, found.amplitudes, by_gauge))
+        output.write(MAP[1], tables.conicity_map_table(found, gauges, by_gauge))
+    if compared:
+        own = right.wheel if compared.kind == "wheel" else right.rail
+        output.write(OVERLAY, plot.overlay_figure([compared, own]))
 
 
-def _write_map(
-    output: Output, found: "ContactSummary", gauges: list[float], values: "Floats"
-) -> None:
-    from railsim.contact.tables import conicity_map_table
-    from railsim.plot.contact import conicity_map_figure
-
-    picture, table = MAP
-    output.write(picture, lambda: conicity_map_figure(gauges, found.amplitudes, values))
-    output.write(table, conicity_map_table(found, gauges, values))
-
-
-def _write_creep(output: Output, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
+def _write_creep(output: cli.Output, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
     """Write pictures and table."""
     from railsim.contact.creep import LAWS
     from railsim.contact.creep_curves import CASES, exact_force
@@ -280,7 +225,7 @@ def _write_creep(output: Output, patch: "Patch", rows: Sequence[dict[str, Any]])
         output.write(name, content)
 
 
-def _build_creep_table(workers: int, output: Output) -> None:
+def _build_creep_table(workers: int, output: cli.Output) -> None:
     """Recompute the table of the full theory, in ``creep_table`` by default, and compare it."""
     import numpy as np
 

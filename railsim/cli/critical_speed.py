@@ -1,28 +1,11 @@
 """``railsim critical-speed``: linear and non-linear critical speed of a vehicle."""
 
-from collections.abc import Callable
-from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    Given,
-    Inputs,
-    Output,
-    as_speed,
-    as_values,
-    code_options,
-    given_options,
-    linearisation_options,
-    option,
-    optional_track,
-    output_options,
-    values_of,
-    vehicle_argument,
-    workers_option,
-)
+from railsim.cli import common as cli
 from railsim.errors import input_error
 
 if TYPE_CHECKING:
@@ -34,41 +17,24 @@ FILES = ("critical_speed.json", "critical_speed.png")
 
 
 @click.command(name="critical-speed")
-@vehicle_argument
-@optional_track
-@option(
-    "--method",
-    "The linear critical speed is always found.",
-    kind=click.Choice(METHODS),
-    default="ramp",
-)
-@option("--from low", "Lowest speed in m/s, or with a unit.", "V", as_speed, default=5.0)
-@option("--to high", "Highest speed in m/s, or with a unit.", "V", as_speed, default=120.0)
-@option("--points", "Speeds of a bifurcation diagram.", "N", int, default=16)
-@option(
-    "--excitation excitations",
-    "Disturbances from which hunting is sought, in m; default: 1 to 8 mm.",
-    "A,B,...",
-    callback=as_values,
-)
-@linearisation_options
-@option("--conicity", "Straight cones as wheels; several: a map.", "G or A:B:N", callback=as_values)
-@option("--friction", "Friction; several values: a map.", "MU or A:B:N", callback=as_values)
-@option(
-    "--over",
-    "A map over a key of the vehicle, track or settings; at most two parameters.",
-    "KEY.PATH=A:B:N",
-    multiple=True,
-)
-@workers_option
-@given_options("scheme, creep law, contact")
-@output_options("Folder for critical_speed.json and .png; an interrupted map is continued.")
-@code_options
+@cli.vehicle_argument
+@cli.optional_track
+@cli.choice("--method", "The linear speed is always found.", "|".join(METHODS), default="ramp")
+@cli.option("--from low", "Lowest speed in m/s, or with a unit.", "V", cli.as_speed, default=5.0)
+@cli.option("--to high", "Highest speed in m/s, or with a unit.", "V", cli.as_speed, default=120.0)
+@cli.option("--points", "Speeds of a bifurcation diagram.", "N", int, default=16)
+@cli.values("--excitation excitations", "Disturbances tried, in m; default: 1 to 8 mm.", "A,B,...")
+@cli.linearisation_options
+@cli.values("--conicity", "Straight cones as wheels; several: a map.", "G or A:B:N")
+@cli.values("--friction", "Friction; several values: a map.", "MU or A:B:N")
+@cli.repeated("--over", "A map over a key of the input; at most two parameters.", "KEY.PATH=A:B:N")
+@cli.workers_option
+@cli.given_options("scheme, creep law, contact")
+@cli.output_options("Folder for critical_speed.json and .png; an interrupted map is continued.")
+@cli.code_options
 def command(
-    vehicle: str,
-    track: str | None,
-    given: Given,
-    output: Output,
+    given: cli.Given,
+    output: cli.Output,
     method: str,
     conicity: list[float] | None,
     friction: list[float] | None,
@@ -90,13 +56,12 @@ def command(
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """
     workers = how.pop("workers")
-    load = partial(given.inputs, vehicle, track)
-    inputs, ranges = load(), _ranges(conicity, friction, over)
+    inputs, ranges = given.inputs(), _ranges(conicity, friction, over)
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))
     if how["excitations"] is None:
         del how["excitations"]
     points = [
-        _point(inputs, load, dict(zip(ranges, values, strict=True)))
+        _point(inputs, given, dict(zip(ranges, values, strict=True)))
         for values in product(*ranges.values())
     ]
     output.reserve(*FILES)
@@ -107,14 +72,8 @@ def command(
 
     at = points[0]
     with output.progress("critical speed") as progress:
-        found = critical_speed(
-            at.vehicle,
-            at.track,
-            settings=at.settings,
-            conicity=at.at.get("conicity"),
-            progress=progress,
-            **how,
-        )
+        how |= {"settings": at.settings, "conicity": at.at.get("conicity")}
+        found = critical_speed(at.vehicle, at.track, progress=progress, **how)
     output.finish(FILES, found, [found.table(), *filter(None, [found.verdict()])], found.remarks)
 
 
@@ -123,21 +82,14 @@ def _map(
     ranges: dict[str, list[float]],
     how: dict[str, Any],
     workers: int | None,
-    output: Output,
+    output: cli.Output,
 ) -> None:
     from railsim.plot.stability import map_figure
     from railsim.studies.stability_map import map_speeds, map_table, stability_map
 
-    with output.progress("critical speed") as progress:
-        found = stability_map(
-            points,
-            {**how, "over_amplitude": False},
-            folder=output.folder,
-            workers=workers,
-            overwrite=output.overwrite,
-            progress=progress,
-            on_remark=output.remark,
-        )
+    how["over_amplitude"] = False
+    with output.studying("critical speed") as studying:
+        found = stability_map(points, how, folder=output.folder, workers=workers, **studying)
     axes = {name: values for name, values in ranges.items() if len(values) > 1}
     title = f"{points[0].vehicle.name}: critical speed"
     output.write(FILES[0], found)
@@ -161,7 +113,7 @@ def _ranges(
             raise input_error("--over", f"found '{text}'", "KEY.PATH=first:last:number")
         if key in found:
             raise input_error("--over", "given twice", "each key once", key=key)
-        found[key] = values_of(values, "--over")
+        found[key] = cli.values_of(values, "--over")
     several = [name for name, values in found.items() if len(values) > 1]
     if len(several) > 2:
         words = f"found {len(several)} parameters with several values ({', '.join(several)})"
@@ -169,11 +121,11 @@ def _ranges(
     return found
 
 
-def _point(inputs: Inputs, load: Callable[..., Inputs], at: dict[str, float]) -> "MapPoint":
+def _point(inputs: cli.Inputs, given: cli.Given, at: dict[str, float]) -> "MapPoint":
     from railsim.studies.stability_map import MapPoint
 
     changes = [f"{key}={value!r}" for key, value in at.items() if key not in BY_OPTION]
-    vehicle, track, settings = load(changes) if changes else inputs
+    vehicle, track, settings = given.inputs(changes) if changes else inputs
     if "friction" in at:
         track = track.replace(friction=at["friction"], friction_table=None)
     return MapPoint(at, vehicle, track, settings)

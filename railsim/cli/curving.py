@@ -4,44 +4,22 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import (
-    Given,
-    Output,
-    as_values,
-    code_options,
-    given_options,
-    option,
-    output_options,
-    rails_option,
-    vehicle_argument,
-)
+from railsim.cli import common as cli
 
 FILES = ("curving.json", "curving.png")
 
 
 @click.command()
-@vehicle_argument
-@option(
-    "--radius",
-    "Radii in m, positive to the right.",
-    "R,R,... or A:B:N",
-    callback=as_values,
-    required=True,
-)
-@option("--cant", "Cant in m.", "H", float, default=0.15)
-@option(
-    "--cant-deficiency",
-    "Cant deficiencies in m.",
-    "I,I,... or A:B:N",
-    callback=as_values,
-    default="0",
-)
-@option("--friction", "Default: the track's.", "MU,MU,... or A:B:N", callback=as_values)
-@rails_option
-@given_options("creep law and contact")
-@output_options("Folder for curving.json and curving.png.")
-@code_options
-def command(vehicle: str, track: str | None, given: Given, output: Output, **grid: Any) -> None:
+@cli.vehicle_argument
+@cli.values("--radius", "In m, positive to the right.", "R,R,... or A:B:N", required=True)
+@cli.option("--cant", "Cant in m.", "H", float, default=0.15)
+@cli.values("--cant-deficiency", "Cant deficiencies in m.", "I,I,... or A:B:N", default="0")
+@cli.values("--friction", "Default: the track's.", "MU,MU,... or A:B:N")
+@cli.rails_option
+@cli.given_options("creep law and contact")
+@cli.output_options("Folder for curving.json and curving.png.")
+@cli.code_options
+def command(given: cli.Given, output: cli.Output, **grid: Any) -> None:
     """Compute steady curving of a vehicle for every combination of the given values.
 
     The speed follows from radius, cant and cant deficiency.  Where Newton's method fails, time
@@ -54,7 +32,7 @@ def command(vehicle: str, track: str | None, given: Given, output: Output, **gri
     """
     from railsim.stability.curving import curving
 
-    coach, rails, settings = given.inputs(vehicle, track)
+    coach, rails, settings = given.inputs()
     output.reserve(*FILES)
     with output.progress("curving") as progress:
         found = curving(coach, rails, settings=settings, progress=progress, **grid)

@@ -4,23 +4,20 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import Output, option, output_options
+from railsim.cli import common as cli
 
 
 @click.command()
 @click.argument("file", metavar="R.h5")
 @click.argument("quantities", nargs=-1, metavar="[QUANTITY]...")
-@option("--out", "File: .csv, .mat or .parquet.", "F", required=True)
-@option("--between", "Section of the track, m.", "A B", float, nargs=2)
-@option("--rate", "Values per second, low-pass filtered.", "N", float)
-@option(
-    "--units",
-    "SI, or those of tables and plots: kN, mm.",
-    kind=click.Choice(["si", "shown"]),
-    default="si",
-)
-@output_options()
-def command(file: str, quantities: tuple[str, ...], units: str, output: Output, **how: Any) -> None:
+@cli.option("--out", "File: .csv, .mat or .parquet.", "F", required=True)
+@cli.option("--between", "Section of the track, m.", "A B", float, nargs=2)
+@cli.option("--rate", "Values per second, low-pass filtered.", "N", float)
+@cli.choice("--units", "SI, or those of tables and plots: kN, mm.", "si|shown")
+@cli.output_options()
+def command(
+    file: str, quantities: tuple[str, ...], units: str, output: cli.Output, **how: Any
+) -> None:
     """Write a result, or some of its quantities, as CSV, for MATLAB and Octave, or as Parquet.
 
     CSV and Parquet have a column for each wheel, body or sensor of each quantity; a MATLAB file

@@ -4,39 +4,26 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import (
-    Given,
-    Output,
-    as_speed,
-    code_options,
-    extent_options,
-    given_options,
-    option,
-    output_options,
-    track_argument,
-    vehicle_argument,
-)
+from railsim.cli import common as cli
 
 
 @click.command()
-@vehicle_argument
-@track_argument
-@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", as_speed)
-@option("--inputs", "Actuators that are commanded; default all.", "A,B")
-@option("--outputs", "Quantities and signals; default Q, Y, lateral.", "X,Y")
-@option("--out", "The unit.", "F.fmu", required=True)
-@extent_options
-@given_options()
-@output_options()
-@code_options
+@cli.vehicle_argument
+@cli.track_argument
+@cli.option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", cli.as_speed)
+@cli.option("--inputs", "Actuators that are commanded; default all.", "A,B")
+@cli.option("--outputs", "Quantities and signals; default Q, Y, lateral.", "X,Y")
+@cli.option("--out", "The unit.", "F.fmu", required=True)
+@cli.extent_options
+@cli.given_options()
+@cli.output_options()
+@cli.code_options
 def command(
-    vehicle: str,
-    track: str,
     speed: float | None,
     inputs: str | None,
     outputs: str | None,
-    given: Given,
-    output: Output,
+    given: cli.Given,
+    output: cli.Output,
     **extent: Any,
 ) -> None:
     """Write a vehicle on its track as a unit for co-simulation by FMI 3.0.
@@ -50,28 +37,17 @@ def command(
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
     """
     from railsim.errors import argument_error
-    from railsim.fmi import OUTPUTS, fmu
+    from railsim.fmi import fmu
     from railsim.studies.case import load_case
-    from railsim.studies.spec import RunSpec
 
     out = output.file("", (".fmu",))
     extent["start"] = extent["start"] or 0.0
-    assignments = given.overrides
-    case = load_case(
-        RunSpec(vehicle, track, speed, settings=given.settings, assignments=assignments, **extent)
-    )
+    case = load_case(given.run(speed, **extent))
+    named = {"inputs": inputs, "outputs": outputs}
+    how: dict[str, Any] = {n: text.split(",") for n, text in named.items() if text is not None}
+    how |= {"speed": case.speed, "settings": case.settings, **extent}
     try:
-        path = fmu(
-            case.vehicle,
-            case.track,
-            out,
-            inputs=None if inputs is None else inputs.split(","),
-            outputs=OUTPUTS if outputs is None else outputs.split(","),
-            overwrite=output.overwrite,
-            speed=case.speed,
-            settings=case.settings,
-            **extent,
-        )
+        path = fmu(case.vehicle, case.track, out, overwrite=output.overwrite, **how)
     except ImportError as error:
         raise argument_error("fmu", str(error)) from None
     output.wrote(path)

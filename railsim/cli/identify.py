@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import Output, code_options, flag, option, output_options, vehicle_argument
+from railsim.cli import common as cli
 from railsim.errors import input_error
 from railsim.files.access import make_folder
 
@@ -15,43 +15,29 @@ KEPT = "evaluations"
 
 
 @click.command()
-@vehicle_argument
+@cli.vehicle_argument
 @click.argument("measured", nargs=-1, required=True, metavar="MEASURED.toml ...")
-@option(
+@cli.repeated(
     "--parameters -p",
-    "Keys of the vehicle or of `track.`; KEY+KEY: one factor for both; "
-    "KEY:LOW:HIGH[:SPREAD]: bounds and standard deviation known before, as factors.",
+    "Keys of the vehicle or of `track.`; KEY+KEY: one factor; KEY:LOW:HIGH[:SPREAD]: bounds, "
+    "standard deviation known before, as factors.",
     "KEY[,KEY...]",
-    multiple=True,
     required=True,
 )
-@option("--band", "Frequencies that are compared, in Hz.", "LOW:HIGH", default="0.5:30")
-@option(
-    "--form",
-    "What is compared.",
-    kind=click.Choice(["history", "spectra", "sections"]),
-    default="history",
-)
-@option(
-    "--loss",
-    "Robust ones weigh outliers less.",
-    kind=click.Choice(["linear", "soft_l1", "huber", "cauchy"]),
-    default="linear",
-)
-@flag("--fixed-place", "Do not seek the place of the runs on the track.")
-@option("--workers", "Processes; by default one for each core.", "N", click.IntRange(1, 256))
-@output_options(
-    "Folder for vehicle file, JSON, pictures and a page; an interrupted identification goes on "
-    "from what it has kept there."
-)
-@code_options
+@cli.option("--band", "Frequencies that are compared, in Hz.", "LOW:HIGH", default="0.5:30")
+@cli.choice("--form", "What is compared.", "history|spectra|sections")
+@cli.choice("--loss", "Robust ones weigh outliers less.", "linear|soft_l1|huber|cauchy")
+@cli.flag("--fixed-place", "Do not seek the place of the runs on the track.")
+@cli.option("--workers", "Processes; by default one for each core.", "N", click.IntRange(1, 256))
+@cli.output_options("Folder for results; an interrupted identification is continued from it.")
+@cli.code_options
 def command(
     vehicle: str,
     measured: tuple[str, ...],
     parameters: tuple[str, ...],
     band: str,
     fixed_place: bool,
-    output: Output,
+    output: cli.Output,
     **how: Any,
 ) -> None:
     """Identify parameters of a vehicle from measured runs, by least squares.
@@ -73,26 +59,15 @@ def command(
         if not quiet and sys.stderr.isatty():
             sys.stderr.write(f"\r{count} runs simulated")
 
-    found = identify(
-        vehicle,
-        measured,
-        keys,
-        band=_band(band),
-        place=not fixed_place,
-        folder=folder and folder / KEPT,
-        progress=progress,
-        **how,
-    )
+    how |= {"band": _band(band), "place": not fixed_place, "folder": folder and folder / KEPT}
+    found = identify(vehicle, measured, keys, progress=progress, **how)
     if folder:
-        from railsim.report.measured import identification_figures, identification_page
+        from railsim.report import measured as report
 
-        figures = identification_figures(found)
-        content = (
-            found.record(),
-            identification_page(found),
-            figures["fits"],
-            figures["residuals"],
-        )
+        figures = report.identification_figures(found)
+        part = report.of_identification(found.record(), report.drawn(figures))
+        pictures = figures["fits"], figures["residuals"]
+        content = found.record(), report.measured_page([part]), *pictures
         output.written.append(found.save_vehicle(folder / FILES[0], vehicle, overwrite=True))
         for name, one in zip(FILES[1:], content, strict=True):
             output.write(name, one)

@@ -6,18 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import (
-    Output,
-    as_speed,
-    collected,
-    flag,
-    json_option,
-    load_option,
-    option,
-    overwrite_option,
-    remarks_on,
-    set_option,
-)
+from railsim.cli import common as cli
 from railsim.cli.gathered import STUDY_FILES, described_runs
 from railsim.files.access import PICTURES, RESULTS, check_file
 
@@ -29,22 +18,13 @@ DRAWN = "--draw is for vehicles and tracks"
 
 @click.command()
 @click.argument("file", metavar="F")
-@option(
-    "--speed speeds",
-    "Speed for the cant deficiency in the curves of a track, m/s or with a unit; may be "
-    "given several times.",
-    "V",
-    as_speed,
-    multiple=True,
-)
-@flag(
-    "--static", "Also the vehicle at rest, in each load case: wheel loads, heights, springs, stops."
-)
-@option("--track", "Rails and gauge for --static; default straight.", "F")
-@option("--draw", "Draw a vehicle in three views, or a track.", "F.png")
-@load_option
-@set_option
-@collected("output", Output, overwrite_option, json_option)
+@cli.repeated("--speed speeds", "For the cant deficiency, m/s or with a unit.", "V", cli.as_speed)
+@cli.flag("--static", "Also at rest, in each load case: wheel loads, heights, springs, stops.")
+@cli.option("--track", "Rails and gauge for --static; default straight.", "F")
+@cli.option("--draw", "Draw a vehicle in three views, or a track.", "F.png")
+@cli.load_option
+@cli.set_option
+@cli.collected("output", cli.Output, cli.overwrite_option, cli.json_option)
 def command(
     file: str,
     speeds: tuple[float, ...],
@@ -53,7 +33,7 @@ def command(
     draw: str | None,
     load: str | None,
     assignments: tuple[str, ...],
-    output: Output,
+    output: cli.Output,
 ) -> None:
     """Show what a vehicle, track, settings, study or result holds: a file, a name or a folder.
 
@@ -99,5 +79,5 @@ def command(
             chosen = rest.data[definition.load or "design"]
             data = {**found.data, "static": chosen, "load_cases": rest.data}
             found = Description(data, [*found.parts, *rest.parts])
-        remarks = [] if output.as_json else remarks_on(definition, supports=static)
+        remarks = [] if output.as_json else cli.remarks_on(definition, supports=static)
     output.answer(found.data, found.parts, remarks)

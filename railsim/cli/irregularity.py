@@ -4,60 +4,35 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import (
-    Output,
-    code_options,
-    names_of,
-    option,
-    output_options,
-    rails_option,
-    set_option,
-)
+from railsim.cli import common as cli
 from railsim.errors import input_error
 
 FILES = ("irregularity.json", "irregularity.png")
 
 
 @click.command()
-@click.argument("measured", shell_complete=names_of("measurement"))
-@option("--vehicle", "The vehicle that measured; default as MEASURED says.", "F")
-@rails_option
-@option(
-    "--spectrum", "Spectrum that the track is assumed to have.", "NAME", default="erri_b176_low"
+@click.argument("measured", shell_complete=cli.names_of("measurement"))
+@cli.option("--vehicle", "The vehicle that measured; default as MEASURED says.", "F")
+@cli.rails_option
+@cli.option("--spectrum", "Assumed spectrum of the track.", "NAME", default="erri_b176_low")
+@cli.option("--scale", "Factor on it.", "X", float, default=1.0)
+@cli.option(
+    "--wavelengths", "Shortest and longest in m.", "A B", float, nargs=2, default=(3.0, 100.0)
 )
-@option("--scale", "Factor on it.", "X", float, default=1.0)
-@option(
-    "--wavelengths",
-    "Shortest and longest wavelength of the track in m.",
-    "A B",
-    float,
-    nargs=2,
-    default=(3.0, 100.0),
+@cli.option(
+    "--noise", "rms of an accelerometer in m/s2, unless MEASURED has it.", "A", float, default=0.05
 )
-@option(
-    "--noise",
-    "rms noise of an accelerometer in m/s2, where MEASURED has none.",
-    "A",
-    float,
-    default=0.05,
-)
-@option(
-    "--simulations",
-    "Most simulated runs for 2 km of the record; 0: the linear estimate.",
-    "N",
-    click.IntRange(min=0),
-    default=25,
-)
-@set_option
-@output_options("Folder for recording, track, estimates, forces.")
-@code_options
+@cli.option("--simulations", "Most runs for 2 km; 0: linear estimate.", "N", cli.FROM_0, default=25)
+@cli.set_option
+@cli.output_options("Folder for recording, track, estimates, forces.")
+@cli.code_options
 def command(
     measured: str,
     vehicle: str | None,
     track: str | None,
     simulations: int,
     assignments: tuple[str, ...],
-    output: Output,
+    output: cli.Output,
     **given: Any,
 ) -> None:
     """Irregularities of a track and wheel forces from accelerations of a vehicle.
@@ -89,15 +64,10 @@ def command(
         raise input_error("--vehicle", "not given", "the vehicle that measured")
     case = getattr(how, "load", None)
     load = [f"load={case}"] if case else []
+    coach, rails = load_vehicle(name, load), load_track(track or how.track or "straight")
     with output.progress(measurement.name) as progress:
-        found = irregularity(
-            measurement,
-            load_vehicle(name, load),
-            load_track(track or how.track or "straight"),
-            assumed=assumed,
-            simulations=simulations,
-            progress=progress,
-        )
+        more: Any = {"assumed": assumed, "simulations": simulations, "progress": progress}
+        found = irregularity(measurement, coach, rails, **more)
     if folder is not None:
         output.written += found.write(folder)
     output.write(FILES[0], found.record())

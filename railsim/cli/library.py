@@ -5,14 +5,14 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import Output, collected, json_option, option, overwrite_option
+from railsim.cli import common as cli
 
 
 @click.command()
 @click.argument("kinds", nargs=-1, metavar="[KIND]...")
-@option("--draw", "Draw every listed vehicle and track into this folder.", "DIR")
-@collected("output", Output, overwrite_option, json_option)
-def command(kinds: tuple[str, ...], draw: str | None, output: Output) -> None:
+@cli.option("--draw", "Draw every listed vehicle and track into this folder.", "DIR")
+@cli.collected("output", cli.Output, cli.overwrite_option, cli.json_option)
+def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> None:
     """List everything that can be given by its bare name: vehicles, tracks, profiles, laws ...
 
     Besides railsim's own files, the list contains those of the folders in the environment variable

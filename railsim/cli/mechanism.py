@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import COUNT, Output, faults_in, flag, option, output_options, set_option
+from railsim.cli import common as cli
 
 if TYPE_CHECKING:
     from railsim.mechanisms.analysis import Analysis
@@ -19,27 +19,21 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@flag("--optimise searched", "Search as specified in the table [optimise].")
-@option("--starts", "Number of starting points of the search.", "N", COUNT)
-@option("--seed", "Seed of the starting points.", "S", click.IntRange(min=0))
-@option("--case", "Case of the file instead of its base.", "NAME")
-@option(
-    "--at",
-    "Also print all results at a given value of one of them (SI), such as height=0.8955.",
-    "NAME=VALUE",
-    multiple=True,
-)
-@set_option
-@output_options(f"Folder for {REPORT}, pictures, animation, positions.csv.")
+@cli.flag("--optimise searched", "Search as specified in the table [optimise].")
+@cli.option("--starts", "Number of starting points of the search.", "N", cli.COUNT)
+@cli.option("--seed", "Seed of the starting points.", "S", cli.FROM_0)
+@cli.option("--case", "Case of the file instead of its base.", "NAME")
+@cli.repeated("--at", "Also print all results where one has a value (SI).", "NAME=VALUE")
+@cli.set_option
+@cli.output_options(f"Folder for {REPORT}, pictures, animation, positions.csv.")
 def command(
     files: tuple[str, ...],
     searched: bool,
-    starts: int | None,
-    seed: int | None,
     case: str | None,
     at: tuple[str, ...],
     assignments: tuple[str, ...],
-    output: Output,
+    output: cli.Output,
+    **search: int | None,
 ) -> None:
     """Compute planar linkages with one degree of freedom: positions, forces, components.
 
@@ -56,7 +50,7 @@ def command(
     """
     if searched and len(files) > 1:
         raise click.UsageError("--optimise takes one FILE")
-    if not searched and (starts is not None or seed is not None):
+    if not searched and any(value is not None for value in search.values()):
         raise click.UsageError("--starts and --seed go with --optimise")
     from railsim.definitions.loading import load_mechanism
     from railsim.mechanisms.analysis import analyse
@@ -68,10 +62,10 @@ def command(
     output.reserve()
     optimum, results, at_values, cases = None, [], [], {}
     for file, mechanism in zip(files, mechanisms, strict=True):
-        with faults_in(file, "mechanism", mechanism.name):
+        with cli.faults_in(file, "mechanism", mechanism.name):
             if searched:
                 chosen, cores = mechanism.in_case(case), available_cores()
-                optimum = optimise(chosen, starts=starts, seed=seed, workers=cores)
+                optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
             at_values.append(_values_at(results[-1], at))
             if len(results) == 1 and mechanism.cases and case is None and not searched:

@@ -1,30 +1,13 @@
 """``railsim modes``: eigenfrequencies, damping and mode shapes of a vehicle."""
 
 import math
-from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    Given,
-    Inputs,
-    Output,
-    as_speed,
-    as_values,
-    code_options,
-    flag,
-    given_options,
-    linearisation_options,
-    option,
-    optional_track,
-    output_options,
-    values_of,
-    vehicle_argument,
-)
+from railsim.cli import common as cli
 from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
@@ -37,50 +20,28 @@ CYCLE = {"frames": 40, "cycles": 1}
 
 
 @click.command()
-@vehicle_argument
-@optional_track
-@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", as_speed, default=20.0)
-@option("--speeds", "N speeds from A to B: a root locus.", "A:B:N", callback=as_values)
-@option(
-    "--over",
-    "Root locus over a key of the vehicle, track or settings at --speed.",
-    "KEY.PATH=A:B:N",
-)
-@flag("--held", "Hold the wheelsets.")
-@option(
-    "--hold",
-    "Hold this body in the moving track frame; may be given several times.",
-    "BODY",
-    multiple=True,
-)
-@linearisation_options
-@option("--conicity", "Straight cones of this slope as wheels.", "G", float)
-@option(
-    "--radius",
-    "Radius of the track in m, positive to the right; default straight.",
-    "R",
-    float,
-    default=math.inf,
-    show_default=False,
-)
-@option("--cant", "Cant of the track in m.", "H", float, default=0.0)
-@option(
-    "--animate", "Begin the animated page of --out with this mode, and call it mode.html.", "NAME"
-)
-@given_options("creep law and contact")
-@output_options(
-    "Folder for modes.json, modes.png and, at one speed, modes.html with all modes animated."
-)
-@code_options
+@cli.vehicle_argument
+@cli.optional_track
+@cli.option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", cli.as_speed, default=20.0)
+@cli.values("--speeds", "N speeds from A to B: a root locus.", "A:B:N")
+@cli.option("--over", "Root locus over a key of the input at --speed.", "KEY.PATH=A:B:N")
+@cli.flag("--held", "Hold the wheelsets.")
+@cli.repeated("--hold", "Hold this body in the moving track frame; may be repeated.", "BODY")
+@cli.linearisation_options
+@cli.option("--conicity", "Straight cones of this slope as wheels.", "G", float)
+@cli.option("--radius", "Radius in m, positive to the right; default straight.", "R", float)
+@cli.option("--cant", "Cant of the track in m.", "H", float, default=0.0)
+@cli.option("--animate", "Begin the page of --out with this mode, as mode.html.", "NAME")
+@cli.given_options("creep law and contact")
+@cli.output_options("Folder for modes.json, modes.png and, at one speed, modes.html, animated.")
+@cli.code_options
 def command(
-    vehicle: str,
-    track: str | None,
     speed: float,
     speeds: list[float] | None,
     over: str | None,
     animate: str | None,
-    given: Given,
-    output: Output,
+    given: cli.Given,
+    output: cli.Output,
     **how: Any,
 ) -> None:
     """Compute the modes of a vehicle in steady rolling.
@@ -100,17 +61,17 @@ def command(
 
     if speeds is not None and over is not None:
         raise input_error("--over", "given together with --speeds", "one of the two")
-    load = partial(given.inputs, vehicle, track)
-    coach, rails, settings = load()
+    coach, rails, settings = given.inputs()
     if animate is not None and (output.out is None or speeds is not None or over is not None):
         wrong = "given without --out" if output.out is None else "given with --speeds or --over"
         raise input_error("--animate", wrong, "one speed, and --out DIR")
     page = ALL if animate is None else ANIMATION
     folder = output.reserve(*FILES, *[page] * (speeds is None and over is None))
+    how["radius"] = math.inf if how["radius"] is None else how["radius"]
     with output.progress("modes"):
         found: Modes | RootLocus
         if over is not None:
-            found = _over(load, over, speed, how)
+            found = _over(given, over, speed, how)
         elif speeds is not None:
             found = root_locus(coach, rails, settings=settings, speeds=speeds, **how)
         else:
@@ -144,7 +105,7 @@ def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) 
     return [write_page(scene, page, modes=list(scenes.values()), overwrite=True)]
 
 
-def _over(load: Callable[..., Inputs], over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
+def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
     """Root locus over one key of the inputs."""
     from railsim.linear.modes import parameter_locus
     from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law
@@ -153,7 +114,7 @@ def _over(load: Callable[..., Inputs], over: str, speed: float, how: dict[str, A
     contact = Contact(*(how.pop(name) for name in ("linearisation", "amplitude", "conicity")))
 
     def prepared(value: float) -> LinearVehicle:
-        coach, rails, settings = load([f"{key}={value!r}"])
+        coach, rails, settings = given.inputs([f"{key}={value!r}"])
         return LinearVehicle(coach, rails, contact=contact, settings=smooth_law(settings), **how)
 
-    return parameter_locus(prepared, key, values_of(text, "--over"), speed)
+    return parameter_locus(prepared, key, cli.values_of(text, "--over"), speed)

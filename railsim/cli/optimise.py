@@ -5,17 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    COUNT,
-    Output,
-    code_options,
-    flag,
-    names_of,
-    option,
-    output_options,
-    scheduler_option,
-    workers_option,
-)
+from railsim.cli import common as cli
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
@@ -26,27 +16,23 @@ MOST_ROWS = 15
 
 
 @click.command()
-@click.argument("study", shell_complete=names_of("study"))
-@option("--out", "Folder.", "DIR", default="optimise")
-@option(
+@click.argument("study", shell_complete=cli.names_of("study"))
+@cli.option("--out", "Folder.", "DIR", default="optimise")
+@cli.choice(
     "--method",
     "Instead of the file's. nsga2 needs pip install 'railsim[optimise]'.",
-    kind=click.Choice(["surrogate", "nsga2", "differential_evolution"]),
+    "surrogate|nsga2|differential_evolution",
+    default=None,
 )
-@option("--evaluations", "Designs, instead of the file's.", "N", COUNT)
-@option("--seed", "Instead of the file's.", "N", click.IntRange(min=0))
-@option(
-    "--choose",
-    "Design that becomes a vehicle file; by default the one nearest to the best of each objective.",
-    "N",
-    int,
-)
-@workers_option
-@scheduler_option
-@flag("--resume", "Continue in DIR although STUDY has changed.")
-@output_options()
-@code_options
-def command(study: str, output: Output, **how: Any) -> None:
+@cli.option("--evaluations", "Designs, instead of the file's.", "N", cli.COUNT)
+@cli.option("--seed", "Instead of the file's.", "N", cli.FROM_0)
+@cli.option("--choose", "Design for the vehicle file; default: nearest to the best.", "N", int)
+@cli.workers_option
+@cli.scheduler_option
+@cli.flag("--resume", "Continue in DIR although STUDY has changed.")
+@cli.output_options()
+@cli.code_options
+def command(study: str, output: cli.Output, **how: Any) -> None:
     """Find the parameters of a vehicle that give the best compromises between objectives.
 
     STUDY is a study file with a table [optimise]: variables with bounds, objectives and
@@ -63,15 +49,8 @@ def command(study: str, output: Output, **how: Any) -> None:
         begin_server()  # which imports on another core while this process does
     from railsim.studies.optimise import optimise
 
-    with output.progress("optimise") as progress:
-        found = optimise(
-            study,
-            out=str(output.out),
-            overwrite=output.overwrite,
-            progress=progress,
-            on_remark=output.remark,
-            **how,
-        )
+    with output.studying("optimise") as studying:
+        found = optimise(study, out=str(output.out), **studying, **how)
     output.answer({"folder": str(found.folder), **found.record()}, _lines(found))
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import Output, option, output_options
+from railsim.cli import common as cli
 from railsim.cli.gathered import folder_of, gather
 from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files.access import PICTURES, RESULTS
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from railsim.plot.study import Column
 
 # default quantities of the picture of a study
+Text = str | None
 RECORDING = "recording"  # instead of a quantity, of a track
 DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 
@@ -24,35 +25,21 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 @click.command()
 @click.argument("file", metavar="R.h5|STUDY|TRACK")
 @click.argument("selections", nargs=-1, metavar="[QUANTITY]...")
-@option("--out", "Picture (.png, .svg, .pdf); default FILE.png.", "F.png")
-@option(
-    "--over",
-    "Horizontal axis; the distance is that of the reference body.",
-    kind=click.Choice(["distance", "time"]),
-    default="distance",
-)
-@option(
-    "--by",
-    "All wheels in one pair of axes, or one pair of axes for each wheelset.",
-    kind=click.Choice(["wheel", "wheelset"]),
-    default="wheel",
-)
-@option("--between", "Range of the horizontal axis to show.", "A B", float, nargs=2)
-@option("--against", "Of a study: the parameter of the horizontal axis.", "KEY")
-@option("--family", "Of a study: the parameter with a curve for each value.", "KEY")
-@option(
-    "--kind",
-    "Of a study: curves; colours over two parameters; the runs by their values.",
-    kind=click.Choice(["curves", "map", "ranking"]),
-)
-@output_options()
+@cli.option("--out", "Picture (.png, .svg, .pdf); default FILE.png.", "F.png")
+@cli.choice("--over", "Horizontal axis; the reference body's distance.", "distance|time")
+@cli.choice("--by", "Axes for all wheels, or for each wheelset.", "wheel|wheelset")
+@cli.option("--between", "Range of the horizontal axis to show.", "A B", float, nargs=2)
+@cli.option("--against", "Of a study: the parameter of the horizontal axis.", "KEY")
+@cli.option("--family", "Of a study: the parameter with a curve for each value.", "KEY")
+@cli.choice("--kind", "Of a study: its picture.", "curves|map|ranking", default=None)
+@cli.output_options()
 def command(
     file: str,
     selections: tuple[str, ...],
     against: str | None,
     family: str | None,
     kind: str | None,
-    output: Output,
+    output: cli.Output,
     **how: Any,
 ) -> None:
     """Draw quantities of a result or of a study, or a track with its curvature and cant.
@@ -86,7 +73,7 @@ def command(
     path = output.file(default, PICTURES, suffix=".png")
     options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
-        figure = _study_figure(str(folder), selections, against, family, kind)
+        figure = _study_figure(str(folder), selections, *options.values())
     elif wrong := [option for option, value in options.items() if value]:
         found = f"'{file}' is no study's folder"
         raise input_error(wrong[0], found, "a folder of results")
@@ -102,11 +89,7 @@ def command(
 
 
 def _study_figure(
-    file: str,
-    selections: tuple[str, ...],
-    against: str | None,
-    family: str | None,
-    kind: str | None,
+    file: str, selections: tuple[str, ...], against: Text, family: Text, kind: Text
 ) -> "Figure":
     from railsim.plot.study import curves_figure, map_figure, ranking_figure
     from railsim.report.spread import columns, parameters

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import Output, option, output_options
+from railsim.cli import common as cli
 from railsim.files.access import write_text
 
 if TYPE_CHECKING:
@@ -19,17 +19,11 @@ ENDINGS = (".html", ".htm")
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="DIR_OR_FILES...")
-@option("--out", "Page.", "F.html", default="report.html")
-@option("--title", "Title; by default the names of what is reported.", "TEXT")
-@option(
-    "--curves",
-    "Runs whose curves are shown; of more, those with the largest values.",
-    "N",
-    click.IntRange(min=1, max=16),
-    default=8,
-)
-@output_options()
-def command(files: tuple[str, ...], title: str | None, curves: int, output: Output) -> None:
+@cli.option("--out", "Page.", "F.html", default="report.html")
+@cli.option("--title", "Title; by default the names of what is reported.", "TEXT")
+@cli.option("--curves", "Runs with curves, largest first.", "N", click.IntRange(1, 16), default=8)
+@cli.output_options()
+def command(files: tuple[str, ...], title: str | None, curves: int, output: cli.Output) -> None:
     """Write one self-contained page about results, studies, comparisons with tests.
 
     Inputs, peaks, values against limits, curves to zoom, spread over the varied parameters of a
@@ -78,18 +72,9 @@ def write_report(
     more = f" and {len(files) - 4} more" if len(files) > 4 else ""
     every = found.results([record["name"] for record in with_files])
     used = [] if results or not found.inputs else _used(folder_of(files[0]))
-    text = page(
-        title or names + more,
-        found.records,
-        results,
-        found.remarks,
-        every,
-        found.inputs,
-        used,
-        assessments,
-        [as_section(part, number) for number, part in enumerate(parts, start=1)],
-    )
-    write_text(path, text)
+    measured = [as_section(part, number) for number, part in enumerate(parts, start=1)]
+    runs = found.records, results, found.remarks, every, found.inputs, used
+    write_text(path, page(title or names + more, *runs, assessments, measured))
 
 
 def _used(folder: Path) -> "list[Used]":
@@ -112,12 +97,12 @@ def _used(folder: Path) -> "list[Used]":
         return []
     return [
         Used(
-            str(case.labels["vehicle"]),
-            str(case.labels["track"]),
-            case.vehicle,
-            case.track,
-            case.settings,
-            case.speed,
+            f"{c.labels['vehicle']}",
+            f"{c.labels['track']}",
+            c.vehicle,
+            c.track,
+            c.settings,
+            c.speed,
         )
-        for case in cases
+        for c in cases
     ]

@@ -5,21 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    DONE,
-    ENDED_EARLY,
-    Given,
-    Output,
-    as_speed,
-    code_options,
-    extent_options,
-    flag,
-    given_options,
-    option,
-    output_options,
-    track_argument,
-    vehicle_argument,
-)
+from railsim.cli import common as cli
 from railsim.cli.terminal import show
 from railsim.errors import Fault, Faults
 
@@ -32,26 +18,24 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@vehicle_argument
-@track_argument
-@option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", as_speed)
-@option("--out", "Result file; default VEHICLE_TRACK_SPEED.h5.", "R.h5")
-@extent_options
-@option("--continue before", "Begin where this result of the same inputs ended.", "R.h5")
-@given_options()
-@flag("--plots", "Also plot the result; the picture is written next to the file (.png).")
-@flag("--check-step", "Run again at half the step and compare peaks.")
-@output_options()
-@code_options
+@cli.vehicle_argument
+@cli.track_argument
+@cli.option("--speed", "Speed in m/s, or with a unit: 72km/h.", "V", cli.as_speed)
+@cli.option("--out", "Result file; default VEHICLE_TRACK_SPEED.h5.", "R.h5")
+@cli.extent_options
+@cli.option("--continue before", "Begin where this result of the same inputs ended.", "R.h5")
+@cli.given_options()
+@cli.flag("--plots", "Also plot the result; the picture is written next to the file (.png).")
+@cli.flag("--check-step", "Run again at half the step and compare peaks.")
+@cli.output_options()
+@cli.code_options
 def command(
-    vehicle: str,
-    track: str,
     speed: float | None,
     before: str | None,
     plots: bool,
     check_step: bool,
-    given: Given,
-    output: Output,
+    given: cli.Given,
+    output: cli.Output,
     **extent: Any,
 ) -> int:
     """Simulate one vehicle on one track and print the peak values.
@@ -71,22 +55,20 @@ def command(
     from railsim.result.tables import result_parts
     from railsim.simulation.assumptions import assumptions
     from railsim.studies.run import run_case
-    from railsim.studies.spec import RunSpec
 
     resume = _opened(before, {"--speed": speed, "--start": extent["start"]}) if before else None
     if resume:
         *_, start, speed = map(float, resume.groups["state"]["end"])
         extent["start"] = start
     extent["start"] = extent["start"] or 0.0
-    how = {"settings": given.settings, "assignments": given.overrides, **extent}
-    case, path = _checked(RunSpec(vehicle, track, speed, **how), output, plots)
+    case, path = _checked(given.run(speed, **extent), output, plots)
     quiet, overwrite = output.quiet, output.overwrite
     if not (quiet or output.as_json):
         show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
     with output.progress(case.name) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **run_facts(result)}
-    of_track = [f"{track}: {remark}" for remark in track_remarks(case.track)]
+    of_track = [f"{given.track}: {remark}" for remark in track_remarks(case.track)]
     remarks = () if quiet else (*of_track, *result.remarks)
     parts = [*result_parts(result, remarks), "", str(path)]
     if plots and len(result["time"]):
@@ -95,20 +77,15 @@ def command(
 
         parts.append(str(save(histories(result), path.with_suffix(".png"), overwrite=overwrite)))
     if check_step and len(result["time"]):
-        from railsim.simulation.check_step import (
-            difference_record,
-            half_step,
-            step_differences,
-            step_table,
-        )
+        from railsim.simulation import check_step as by_halving
 
         with output.progress("half the step") as progress:
-            half = half_step(result, progress=progress)
-        differences = step_differences(result, half)
-        record["half_step"] = [difference_record(row) for row in differences]
-        parts += ["", step_table(result, differences)]
+            half = by_halving.half_step(result, progress=progress)
+        differences = by_halving.step_differences(result, half)
+        record["half_step"] = [by_halving.difference_record(row) for row in differences]
+        parts += ["", by_halving.step_table(result, differences)]
     output.answer(record, parts)
-    return DONE if result.status == "complete" else ENDED_EARLY
+    return cli.DONE if result.status == "complete" else cli.ENDED_EARLY
 
 
 def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
@@ -128,7 +105,7 @@ def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
     return result
 
 
-def _checked(spec: "RunSpec", output: Output, plots: bool) -> "tuple[Case, Path]":
+def _checked(spec: "RunSpec", output: cli.Output, plots: bool) -> "tuple[Case, Path]":
     """Load the case and settle its file; everything that is wrong with either at once."""
     from railsim.files.access import PICTURES, RESULTS, check_file
     from railsim.studies.case import load_case

@@ -2,13 +2,14 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from railsim.cli.common import Output, faults_in, flag, option, output_options, set_option, together
+from railsim.cli import common as cli
 from railsim.cli.terminal import echo
 from railsim.files.access import TABLES, is_file, write_text
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from railsim.springs.verification import Case
 
 REPORT = "report.html"
+Answer = tuple[Any, list[Any], "SearchResult | None"]  # data, what is printed, what was searched
 
 
 @click.group()
@@ -35,18 +37,40 @@ def command() -> None:
     """
 
 
-# a command of the group with a file, a folder for pages and the common options
-_spring_command = together(
+_options = cli.together(
     command.command(),
     click.argument("file"),
-    set_option,
-    output_options(f"Folder for the pictures and the page {REPORT}."),
+    cli.set_option,
+    cli.output_options(f"Folder for the pictures and the page {REPORT}."),
 )
 
 
+def _spring_command(function: Callable[..., Answer]) -> Callable[..., None]:
+    """Make a command of the group: a file, a folder for pictures and page, the common options.
+
+    The function gets the suspension and returns what is answered, and the search, if there is one.
+    """
+
+    @wraps(function)
+    def called(file: str, assignments: Sequence[str], output: cli.Output, **how: Any) -> None:
+        from railsim.definitions.loading import load_spring
+
+        output.reserve(REPORT)
+        suspension = load_spring(file, assignments)
+        with cli.faults_in(file, "spring", suspension.name):
+            data, parts, found = function(suspension, **how)
+            if output.folder:
+                from railsim.report.springs import files
+
+                output.write_all(files(suspension, found))
+        output.answer(data, parts, suspension.unusual())
+
+    return cast("Callable[..., None]", _options(called))
+
+
 @_spring_command
-@flag("--search", "Also search the nests that fit the table [search].")
-def design(file: str, search: bool, assignments: tuple[str, ...], output: Output) -> None:
+@cli.flag("--search", "Also search the nests that fit the table [search].")
+def design(suspension: "TrailingArmSuspension", search: bool) -> Answer:
     """Find the springs for two required deflections.
 
     Prints their stiffnesses and numbers of coils. With --search, also the nests of standard wires
@@ -62,15 +86,7 @@ def design(file: str, search: bool, assignments: tuple[str, ...], output: Output
     from railsim.springs.summary import design_data, search_data
     from railsim.springs.tables import design_table, search_table
 
-    suspension = _loaded(file, assignments, output)
-    with faults_in(file, "spring", suspension.name):
-        result = designed(suspension)
-        found = None
-        if search:
-            from railsim.springs.search import search as searched
-
-            found = searched(suspension)
-        _write_pages(suspension, output, found)
+    result, found = designed(suspension), None
     data = design_data(suspension, result)
     low, high = (load * 1e-3 for load in result.load_range)
     parts: list[Any] = [
@@ -78,18 +94,21 @@ def design(file: str, search: bool, assignments: tuple[str, ...], output: Output
         f"arm at the target: {math.degrees(result.rotation):.4f} deg; "
         f"target load possible there: {low:.3f} to {high:.3f} kN",
     ]
-    if found is not None:
+    if search:
+        from railsim.springs.search import search as searched
+
+        found = searched(suspension)
         data["search"] = search_data(found)
         tried = (
             f"{found.tried} nests tried, {found.feasible} within all limits before refinement; "
             f"ranked by {found.objective}"
         )
         parts += ["", tried, search_table(found)]
-    output.answer(data, parts, suspension.unusual())
+    return data, parts, found
 
 
 @_spring_command
-def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
+def verify(suspension: "TrailingArmSuspension") -> Answer:
     """Verify a suspension under all its loads.
 
     Equilibrium, heights, stresses, buckling. A check that is not met is a result: the exit status
@@ -108,11 +127,8 @@ def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
     from railsim.springs.tolerance import ride_heights
     from railsim.springs.verification import verify as verified
 
-    suspension = _loaded(file, assignments, output)
-    with faults_in(file, "spring", suspension.name):
-        result = verified(suspension)
-        heights = ride_heights(suspension) if suspension.tolerances is not None else ()
-        _write_pages(suspension, output)
+    result = verified(suspension)
+    heights = ride_heights(suspension) if suspension.tolerances is not None else ()
     data, sheets = verification_data(suspension, result), data_sheets(suspension, result)
     parts: list[Any] = [tables.load_table(suspension), ""] if suspension.load_notes else []
     parts += [tables.case_table(result), "", tables.loaded_table(sheets), ""]
@@ -120,11 +136,11 @@ def verify(file: str, assignments: tuple[str, ...], output: Output) -> None:
     if heights:
         data["ride_height"] = ride_height_data(heights)
         parts += ["", tables.ride_height_table(heights)]
-    output.answer(data, parts, suspension.unusual())
+    return data, parts, None
 
 
 @_spring_command
-def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
+def fatigue(suspension: "TrailingArmSuspension") -> Answer:
     """Compare stress ranges with the Goodman-Smith line.
 
     \b
@@ -137,25 +153,25 @@ def fatigue(file: str, assignments: tuple[str, ...], output: Output) -> None:
     from railsim.springs.verification import dynamic_loads
     from railsim.springs.verification import fatigue as fatigue_of
 
-    suspension = _loaded(file, assignments, output)
-    with faults_in(file, "spring", suspension.name):
-        result = fatigue_of(suspension)
-        loads = dynamic_loads(suspension)
-        _write_pages(suspension, output)
+    result, loads = fatigue_of(suspension), dynamic_loads(suspension)
     low, high = (loads[key] * 1e-3 for key in ("min_load", "max_load"))
     parts: list[Any] = [f"between {low:.3f} and {high:.3f} kN", fatigue_table(result)]
-    output.answer(fatigue_data(suspension, result, loads), parts, suspension.unusual())
+    return fatigue_data(suspension, result, loads), parts, None
 
 
 @command.command()
 @click.argument("file")
-@option("--out", "Vehicle file to write; by default to stdout.", "F.toml")
-@option("--load", "Load at which the stiffness of the springs is taken.", "NAME")
-@option("--extends", "Vehicle to extend instead of vehicle.extends.", "VEHICLE")
-@set_option
-@output_options()
+@cli.option("--out", "Vehicle file to write; by default to stdout.", "F.toml")
+@cli.option("--load", "Load at which the stiffness of the springs is taken.", "NAME")
+@cli.option("--extends", "Vehicle to extend instead of vehicle.extends.", "VEHICLE")
+@cli.set_option
+@cli.output_options()
 def vehicle(
-    file: str, load: str | None, extends: str | None, assignments: tuple[str, ...], output: Output
+    file: str,
+    load: str | None,
+    extends: str | None,
+    assignments: tuple[str, ...],
+    output: cli.Output,
 ) -> None:
     """Write a vehicle file with this primary suspension.
 
@@ -172,7 +188,7 @@ def vehicle(
 
     suspension = load_spring(file, assignments)
     out = output.file(output.out, TABLES) if output.out else None
-    with faults_in(file, "spring", suspension.name):
+    with cli.faults_in(file, "spring", suspension.name):
         if load is not None and load not in suspension.loads:
             valid = nearest(load, suspension.loads)
             raise input_error("--load", f"no load '{load}' in [loads]", valid)
@@ -185,33 +201,9 @@ def vehicle(
     for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
         if not output.quiet:
             echo(remark, err=True)
-    record = {
-        "file": output.out,
-        "assembly": part.assembly,
-        "axleboxes": part.axleboxes,
-        "elements": part.elements,
-        "load": part.case.name,
-    }
+    record = {"file": output.out, "assembly": part.assembly, "axleboxes": part.axleboxes}
+    record |= {"elements": part.elements, "load": part.case.name}
     output.answer(record, [] if out else [text.rstrip("\n")])
-
-
-def _loaded(file: str, assignments: Sequence[str], output: Output) -> "TrailingArmSuspension":
-    """Load a file; refuse a folder before anything is computed."""
-    from railsim.definitions.loading import load_spring
-
-    output.reserve(REPORT)
-    return load_spring(file, assignments)
-
-
-def _write_pages(
-    suspension: "TrailingArmSuspension", output: Output, search: "SearchResult | None" = None
-) -> None:
-    """Write pictures and page into the folder of ``--out``, if there is one."""
-    if output.folder is None:
-        return
-    from railsim.report.springs import files
-
-    output.write_all(files(suspension, search))
 
 
 def _load_remarks(

@@ -4,42 +4,23 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import (
-    DONE,
-    LIMIT_EXCEEDED,
-    Given,
-    Output,
-    code_options,
-    fail_option,
-    flag,
-    given_options,
-    option,
-    output_options,
-    rails_option,
-)
+from railsim.cli import common as cli
 
 FILES = ("stationary.json", "stationary.png")
 
 
 @click.command()
 @click.argument("vehicle")
-@option("--cant", "Default: the admissible cant deficiency, m.", "H", float)
-@flag("--rolling", "Do not hold the wheelsets across the track.")
-@option("--limits", "Limits file, or the name of a shipped one.", "F", default="stationary")
-@rails_option
-@fail_option
-@given_options("creep law and contact")
-@output_options("Folder for stationary.json and stationary.png.")
-@code_options
+@cli.option("--cant", "Default: the admissible cant deficiency, m.", "H", float)
+@cli.flag("--rolling", "Do not hold the wheelsets across the track.")
+@cli.option("--limits", "Limits file, or the name of a shipped one.", "F", default="stationary")
+@cli.rails_option
+@cli.fail_option
+@cli.given_options("creep law and contact")
+@cli.output_options("Folder for stationary.json and stationary.png.")
+@cli.code_options
 def command(
-    vehicle: str,
-    rolling: bool,
-    limits: str,
-    track: str | None,
-    fail: bool,
-    given: Given,
-    output: Output,
-    **how: Any,
+    rolling: bool, limits: str, fail: bool, given: cli.Given, output: cli.Output, **how: Any
 ) -> int:
     """Compare a vehicle on twisted track and on cant with limits.
 
@@ -55,7 +36,7 @@ def command(
     from railsim.definitions.loading import load_stationary_limits
     from railsim.studies.stationary import stationary
 
-    body, rails, settings = given.inputs(vehicle, track)
+    body, rails, settings = given.inputs()
     output.reserve(*FILES)
     found = stationary(
         body, rails, load_stationary_limits(limits), held=not rolling, settings=settings, **how
@@ -67,4 +48,4 @@ def command(
     head = [f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}"]
     reasons = [f"  {reason}" for reason in found.reasons]
     output.finish(FILES, found, [*head, *reasons, "", found.table()], remarks)
-    return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
+    return cli.LIMIT_EXCEEDED if fail and found.verdict == "fail" else cli.DONE

@@ -1,6 +1,6 @@
 """``railsim study``: every combination of vehicles, tracks and speeds."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import chdir
 from dataclasses import replace
 from functools import partial
@@ -9,29 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    COUNT,
-    DONE,
-    ENDED_EARLY,
-    FAILED,
-    Given,
-    Output,
-    code_options,
-    extent_options,
-    flag,
-    given_options,
-    names_of,
-    option,
-    output_options,
-    scheduler_option,
-    workers_option,
-)
+from railsim.cli import common as cli
 from railsim.cli.progress import RunLines
 from railsim.cli.terminal import echo, show
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
-    from railsim.studies import Outcome
     from railsim.studies.spec import StudySpec
 
 MANY = ("--vehicles", "--tracks", "--speeds", "--grid")
@@ -76,69 +59,38 @@ def _is_number(text: str) -> bool:
 
 
 @click.command(cls=ManyValues)
-@click.argument("file", required=False, metavar="[STUDY]", shell_complete=names_of("study"))
-@option(
-    "--vehicles",
-    "Vehicles: files or names.",
-    "F...",
-    multiple=True,
-    shell_complete=names_of("vehicle"),
-)
-@option(
-    "--tracks", "Tracks: files or names.", "F...", multiple=True, shell_complete=names_of("track")
-)
-@option(
-    "--speeds",
-    "Speeds in m/s, or with a unit (72km/h); ranges first:last:number; permitted: the "
-    "lower of the vehicle's and the track's speed.",
-    "V...",
-    multiple=True,
-)
-@option(
-    "--grid",
-    "Values of further keys, or ranges first:last:number; paths begin with vehicle., "
-    "track. or settings.",
-    "KEY.PATH=A,B,C...",
-    multiple=True,
-)
-@extent_options
-@option(
-    "--quantities",
-    "Function called with each result; it returns further numbers by name.",
-    "FILE.py:FUNCTION",
-)
-@option("--scenario", "Scenario instead of tracks and speeds.", "F")
-@option("--out", "Folder.", "DIR", default="study")
-@given_options()
-@workers_option
-@option(
+@click.argument("file", required=False, metavar="[STUDY]", shell_complete=cli.names_of("study"))
+@cli.repeated("--vehicles", "Files or names.", "F...", shell_complete=cli.names_of("vehicle"))
+@cli.repeated("--tracks", "Files or names.", "F...", shell_complete=cli.names_of("track"))
+@cli.repeated("--speeds", "In m/s, or with a unit; first:last:number; or `permitted`.", "V...")
+@cli.repeated("--grid", "Values of a further key, or first:last:number.", "KEY.PATH=A,B,C...")
+@cli.extent_options
+@cli.option("--quantities", "Function of each result: further numbers.", "FILE.py:FUNCTION")
+@cli.option("--scenario", "Scenario instead of tracks and speeds.", "F")
+@cli.option("--out", "Folder.", "DIR", default="study")
+@cli.given_options()
+@cli.workers_option
+@cli.option(
     "--together",
-    "Up to N runs that differ in the vehicle only are computed in one call of the time loop: "
-    "same results, 15 to 20 % less CPU time in the loop. Runs with different time steps are "
-    "computed separately.",
+    "Up to N runs that differ in the vehicle only in one call: same results, 15 to 20 % faster.",
     "N",
-    COUNT,
+    cli.COUNT,
     default=1,
 )
-@scheduler_option
-@flag("--resume", "Continue the study in DIR; compute what has changed.")
-@option(
-    "--keep",
-    "all; summary: no result files; or quantities such as Q,Y,wheelset_*.",
-    "WHAT",
-    default="all",
-)
-@flag("--compress", "Store arrays compressed, without loss.")
-@flag("--single", "Store arrays with 4 bytes a number: 7 digits.")
-@flag("--plots", "Plot every run, and the vehicles against each other.")
-@flag("--report", "Write report.html into DIR, see `railsim report`.")
-@output_options()
-@code_options
+@cli.scheduler_option
+@cli.flag("--resume", "Continue the study in DIR; compute what has changed.")
+@cli.option("--keep", "all; summary: no result files; or quantities: Q,Y.", "WHAT", default="all")
+@cli.flag("--compress", "Store arrays compressed, without loss.")
+@cli.flag("--single", "Store arrays with 4 bytes a number: 7 digits.")
+@cli.flag("--plots", "Plot every run, and the vehicles against each other.")
+@cli.flag("--report", "Write report.html into DIR, see `railsim report`.")
+@cli.output_options()
+@cli.code_options
 def command(
     file: str | None,
     scenario: str | None,
-    given: Given,
-    output: Output,
+    given: cli.Given,
+    output: cli.Output,
     report: bool,
     resume: bool,
     quantities: str | None,
@@ -146,7 +98,8 @@ def command(
 ) -> int:
     """Run every combination of vehicles, tracks, speeds and the values of a grid.
 
-    They are given as options or by a STUDY file, which can also link and sample values.
+    They are given as options or by a STUDY file, which can also link and sample values; keys of
+    --grid and --set begin with vehicle., track. or settings.
 
     DIR receives one HDF5 file per run, summary.csv and study.json.  A finished run with the
     same inputs is not computed again, so the same command can be repeated after an interruption.
@@ -168,13 +121,9 @@ def command(
     taken = {**asked, **kept, "keep": kept["keep"] != "all", "settings": given.settings}
     taken |= {"STUDY": file, "quantities": quantities, "plots": how["plots"], "vehicles": None}
     taken["together"] = how["together"] > 1
-    campaign = partial(
-        _campaign,
-        taken=[name for name, value in taken.items() if value],
-        report=report,
-        workers=how["workers"],
-        scheduler=how["scheduler"],
-    )
+    named = [name for name, value in taken.items() if value]
+    where = {name: how[name] for name in ("workers", "scheduler")}
+    campaign: Callable[..., int] = partial(_campaign, taken=named, report=report, **where)
     if scenario is not None:
         overrides = given.overrides
         return campaign(scenario, asked["vehicles"], output, assignments=overrides, resume=resume)
@@ -186,41 +135,26 @@ def command(
     from railsim.studies.study import run_study, stored_spec
     from railsim.studies.user_function import given_again
 
-    inputs = {
-        **asked,
-        "grid": _grid(asked["grid"]),
-        "assignments": given.overrides,
-        "settings": given.settings,
-        "start": asked["start"] or 0.0,
-    }
+    inputs = {**asked, "grid": _grid(asked["grid"]), "start": asked["start"] or 0.0}
+    inputs |= {"assignments": given.overrides, "settings": given.settings}
     if resume and file is None and not any(inputs.values()):
         spec, base = stored_spec(folder)
         spec = spec.changed(quantities=given_again(spec.quantities, quantities))
         folder = folder if base == Path.cwd() else folder.absolute()
         if spec.scenario is not None:
-            overrides, there = tuple(spec.assignments), replace(output, out=str(folder))
+            resumed = {"assignments": tuple(spec.assignments), "resume": True}
             with chdir(base):
-                return campaign(
-                    spec.scenario, spec.vehicles, there, assignments=overrides, resume=True
-                )
+                there = replace(output, out=str(folder))
+                return campaign(spec.scenario, spec.vehicles, there, **resumed)
     else:
         spec = _spec(file, inputs, quantities, kept)
     lines = RunLines()
     # names of files in a study that goes on count from where it was started
-    with chdir(base), output.progress("study") as progress:
-        outcome = run_study(
-            spec,
-            folder,
-            Execution(
-                **how,
-                overwrite=output.overwrite,
-                resume=resume,
-                progress=progress,
-                on_record=None if output.quiet or output.as_json else lines,
-                on_remark=output.remark,
-                beside=("report.html",) * report,
-            ),
-        )
+    with chdir(base), output.studying("study") as studying:
+        on_record = None if output.quiet or output.as_json else lines
+        beside = ("report.html",) * report
+        how |= {"resume": resume, "on_record": on_record, "beside": beside, **studying}
+        outcome = run_study(spec, folder, Execution(**how))
         if report:
             from railsim.cli.report import write_report
 
@@ -228,9 +162,17 @@ def command(
             write_report([str(outcome.folder)], output.written[0])
     if not output.as_json:
         lines.end()
-        _print_end(outcome)
+        kept_runs = len(outcome.records) - outcome.computed
+        present = f", {kept_runs} were there already" if kept_runs else ""
+        computed = outcome.computed - len(outcome.failed)
+        echo(f"{computed} of {len(outcome.records)} runs computed{present}")
+        if outcome.failed:
+            echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
+        echo(str(outcome.folder / "summary.csv"))
     output.answer({"folder": str(outcome.folder), "runs": list(outcome.records)})
-    return _status(outcome)
+    if outcome.failed:
+        return cli.FAILED
+    return cli.ENDED_EARLY if outcome.ended_early else cli.DONE
 
 
 def _grid(texts: Sequence[str]) -> dict[str, list[str]]:
@@ -250,7 +192,7 @@ def _grid(texts: Sequence[str]) -> dict[str, list[str]]:
 def _campaign(
     scenario: str,
     vehicles: Sequence[str],
-    output: Output,
+    output: cli.Output,
     *,
     taken: Sequence[str],
     report: bool,
@@ -274,18 +216,10 @@ def _campaign(
         faults.append(Fault("--vehicles", "", "not given", "give one vehicle at least"))
     faults.check()
     lines = RunLines()
-    with output.progress(scenario) as progress:
-        done = campaign(
-            scenario,
-            list(vehicles),
-            out=str(output.out),
-            overwrite=output.overwrite,
-            progress=progress,
-            on_record=None if output.quiet or output.as_json else lines,
-            on_remark=output.remark,
-            beside=(*FILES, *("report.html",) * report),
-            **how,
-        )
+    how["on_record"] = None if output.quiet or output.as_json else lines
+    how["beside"] = *FILES, *("report.html",) * report
+    with output.studying(scenario) as studying:
+        done = campaign(scenario, list(vehicles), out=str(output.out), **studying, **how)
     write_assessments(output, done.assessments)
     if report:
         from railsim.cli.report import write_report
@@ -299,7 +233,7 @@ def _campaign(
             show("", *assessment_lines(assessment, quiet=output.quiet))
     records = [assessment.record() for assessment in done.assessments]
     output.answer({"folder": str(done.folder), "assessments": records})
-    return DONE
+    return cli.DONE
 
 
 def _spec(
@@ -314,33 +248,13 @@ def _spec(
     given = {name: inputs[name] for name in OF_FILE if inputs[name]}
     if file is None:
         missing = [name for name in OF_FILE[:3] if name not in given]
-        Faults(
-            Fault(f"--{name}", "", "not given", "give one value at least") for name in missing
-        ).check()
+        words = "not given", "give one value at least"
+        Faults(Fault(f"--{name}", "", *words) for name in missing).check()
         named = {"quantities": full_name(quantities)}
         return checked(StudySpec, {**kept, **inputs, **named}, "study")
-    Faults(
-        Fault(f"--{name}", "", "given together with a study file", "the file holds it")
-        for name in given
-    ).check()
+    words = "given together with a study file", "the file holds it"
+    Faults(Fault(f"--{name}", "", *words) for name in given).check()
     study = load_study(file)
     assignments = [*study.assignments, *inputs["assignments"]]
     named = {"quantities": full_name(quantities)}
     return StudySpec.of_file(study, assignments=assignments, **named, **kept)
-
-
-def _print_end(outcome: "Outcome") -> None:
-    there = len(outcome.records) - outcome.computed
-    present = f", {there} were there already" if there else ""
-    done = outcome.computed - len(outcome.failed)
-    echo(f"{done} of {len(outcome.records)} runs computed{present}")
-    if outcome.failed:
-        echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
-    echo(str(outcome.folder / "summary.csv"))
-
-
-def _status(outcome: "Outcome") -> int:
-
-    if outcome.failed:
-        return FAILED
-    return ENDED_EARLY if outcome.ended_early else DONE

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import DONE, WRONG_INPUT, Output, answer_options, remarks_on
+from railsim.cli import common as cli
 from railsim.cli.terminal import echo, print_json
 from railsim.errors import InputError
 from railsim.files.access import RESULTS, is_file
@@ -17,8 +17,8 @@ PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="F...")
-@answer_options
-def command(files: tuple[str, ...], output: Output) -> int:
+@cli.answer_options
+def command(files: tuple[str, ...], output: cli.Output) -> int:
     """Check vehicle, track, settings, spring, mechanism, study and profile files.
 
     Every fault is listed with file, key, what was found and what is allowed; remarks point out what
@@ -39,7 +39,7 @@ def command(files: tuple[str, ...], output: Output) -> int:
     else:
         for report in reports:
             _print(report, output.quiet)
-    return WRONG_INPUT if any(report["faults"] for report in reports) else DONE
+    return cli.WRONG_INPUT if any(report["faults"] for report in reports) else cli.DONE
 
 
 def _report(file: str) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     if definition.KIND == "study":
         _check_runs(file)
     Faults(profile_faults(definition, file)).check()
-    return definition.KIND, [dict(vars(remark)) for remark in remarks_on(definition)]
+    return definition.KIND, [dict(vars(remark)) for remark in cli.remarks_on(definition)]
 
 
 def _check_runs(file: str) -> None:

@@ -6,16 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import (
-    DONE,
-    LIMIT_EXCEEDED,
-    Output,
-    code_options,
-    fail_option,
-    names_of,
-    option,
-    output_options,
-)
+from railsim.cli import common as cli
 from railsim.errors import input_error
 from railsim.files.access import RESULTS
 
@@ -28,23 +19,13 @@ FILES = ("model_validation.json", "sections.csv", "report.html", "scatter.png", 
 
 @click.command(name="validate-model")
 @click.argument("files", nargs=-1, required=True, metavar="MEASURED.toml ... [RESULT.h5|DIR ...]")
-@option(
-    "--vehicle",
-    "Vehicle to simulate, where no results are given; default: the measurement's.",
-    "F",
-    shell_complete=names_of("vehicle"),
-)
-@option(
-    "--limits",
-    "Limits of the differences: a file, or the name of a shipped one.",
-    "F",
-    default="validation_en14363_t",
-)
-@fail_option
-@output_options("Folder for JSON, CSV, pictures and a page.")
-@code_options
+@cli.option("--vehicle", "Default: the measurement's.", "F", shell_complete=cli.names_of("vehicle"))
+@cli.option("--limits", "Of the differences: file or name.", "F", default="validation_en14363_t")
+@cli.fail_option
+@cli.output_options("Folder for JSON, CSV, pictures and a page.")
+@cli.code_options
 def command(
-    files: tuple[str, ...], vehicle: str | None, limits: str, fail: bool, output: Output
+    files: tuple[str, ...], vehicle: str | None, limits: str, fail: bool, output: cli.Output
 ) -> int:
     """Compare simulated with measured runs, section by section (EN 14363, Annex T).
 
@@ -68,21 +49,16 @@ def command(
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
     found = validate_model(runs, results, limits=limits)
     if output.folder:
-        from railsim.report.measured import validation_figures, validation_page
+        from railsim.report.measured import measured_page, of_validation, validation_figures
 
-        figures = validation_figures(found)
-        content = (
-            found.record(),
-            found.section_table(),
-            validation_page(found),
-            figures["scatter"],
-            figures["overlays"],
-        )
+        figures, page = validation_figures(found), measured_page([of_validation(found)])
+        pictures = figures["scatter"], figures["overlays"]
+        content = found.record(), found.section_table(), page, *pictures
         for name, one in zip(FILES, content, strict=True):
             output.write(name, one)
     verdict = f"{found.vehicle} against {', '.join(found.runs)}: {found.verdict}"
     output.answer(found.record(), [verdict, found.table()], found.remarks)
-    return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
+    return cli.LIMIT_EXCEEDED if fail and found.verdict == "fail" else cli.DONE
 
 
 def _results(

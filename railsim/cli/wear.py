@@ -1,23 +1,13 @@
 """``railsim wear``, ``railsim rail-wear``: profiles over distance or tonnage as they wear."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from railsim.cli.common import (
-    Given,
-    Output,
-    allow_code_option,
-    as_speed,
-    given_options,
-    option,
-    output_options,
-    together,
-    track_argument,
-    vehicle_argument,
-)
+from railsim.cli import common as cli
 
 if TYPE_CHECKING:
     from railsim.studies.wear_loop import WearStep
@@ -37,35 +27,35 @@ def mix_option(name: str, what: str, amount: str) -> Decorator:
         f"A {what}, its speed in m/s or with a unit, and its share of the {amount} in any unit; "
         "may be repeated."
     )
-    form = (str, as_speed, float)
-    return option(name, text, f"{what.upper()} V SHARE", form, required=True, multiple=True)
+    form = (str, cli.as_speed, float)
+    return cli.repeated(name, text, f"{what.upper()} V SHARE", form, required=True)
 
 
 def amount_options(name: str, text: str, unit: str, profile: str) -> Decorator:
     """Options of the distance or tonnage to run, and of that of one step."""
     amount = name.split()[0].strip("-").capitalize()
     between = f"{amount} in {unit} between two updates of {profile}."
-    return together(
-        option(name, text, unit.upper(), float, required=True),
-        option("--step", between, unit.upper(), float, required=True),
+    return cli.together(
+        cli.option(name, text, unit.upper(), float, required=True),
+        cli.option("--step", between, unit.upper(), float, required=True),
     )
 
 
-law_option = option(
+law_option = cli.option(
     "--law", "Law of wear; a wrong name shows all.", "NAME_OR_FILE", default="pearce_sherratt"
 )
 
 
 @click.command()
-@vehicle_argument
+@cli.vehicle_argument
 @mix_option("--route routes", "track", "distance")
 @amount_options("--distance", "Distance to run in km.", "km", "the wheel profile")
 @law_option
-@option("--limits", "Limits of flange and tread at which the loop ends.", "F", default="wheel")
-@given_options("creep law and contact")
-@output_options("Folder for wear.json, wear.png and the profiles.")
-@allow_code_option
-def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) -> None:
+@cli.option("--limits", "Limits of flange and tread at which the loop ends.", "F", default="wheel")
+@cli.given_options("creep law and contact")
+@cli.output_options("Folder for wear.json, wear.png and the profiles.")
+@cli.allow_code_option
+def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
     """Compute the wear of the wheels of a vehicle on several tracks, updating the profile.
 
     Each step runs every track once with the wheel profile of the step, averages the wear of all
@@ -82,7 +72,7 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
     from railsim.definitions.loading import load_wheel_limits
     from railsim.studies.wear_loop import Route, wear_loop, wear_rows
 
-    inputs = [given.inputs(vehicle, track) for track, _, _ in routes]
+    inputs = [replace(given, track=track).inputs() for track, _, _ in routes]
     ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
     (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
     named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
@@ -96,14 +86,14 @@ def command(vehicle: str, routes: Mix, limits: str, given: Given, **how: Any) ->
 
 
 @click.command()
-@track_argument
+@cli.track_argument
 @mix_option("--traffic", "vehicle", "tonnage")
 @amount_options("--tonnage distance", "Traffic in Mt.", "Mt", "the rail profiles")
 @law_option
-@given_options("creep law and contact", load=False)
-@output_options("Folder for wear.json and the profiles.")
-@allow_code_option
-def rails(track: str, traffic: Mix, given: Given, **how: Any) -> None:
+@cli.given_options("creep law and contact", load=False)
+@cli.output_options("Folder for wear.json and the profiles.")
+@cli.allow_code_option
+def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
     """Compute the wear of both rails of a track under a mix of traffic, updating their profiles.
 
     The mean wear over the track is removed from the profiles, so the track should have one
@@ -117,7 +107,7 @@ def rails(track: str, traffic: Mix, given: Given, **how: Any) -> None:
     """
     from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
 
-    inputs = [given.inputs(vehicle, track) for vehicle, _, _ in traffic]
+    inputs = [replace(given, vehicle=vehicle).inputs() for vehicle, _, _ in traffic]
     mix = [Traffic(i.vehicle, v, share) for i, (_, v, share) in zip(inputs, traffic, strict=True)]
     _, worn, settings = inputs[0]
     named = [{"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix]
@@ -134,18 +124,10 @@ class Worn(NamedTuple):
     note: str  # what is averaged, and where y begins
 
 
-WHEELS = Worn(
-    "distance",
-    "km",
-    1e3,
-    "mean of all wheels; y from the nominal rolling circle, negative towards the flange",
-)
-RAILS = Worn(
-    "tonnage",
-    "Mt",
-    1e9,
-    "both rails; y from the middle of the rail, negative towards the gauge side",
-)
+OF_WHEELS = "mean of all wheels; y from the nominal rolling circle, negative towards the flange"
+OF_RAILS = "both rails; y from the middle of the rail, negative towards the gauge side"
+WHEELS = Worn("distance", "km", 1e3, OF_WHEELS)
+RAILS = Worn("tonnage", "Mt", 1e9, OF_RAILS)
 
 
 def _carry_out(
@@ -157,7 +139,7 @@ def _carry_out(
     distance: float,
     step: float,
     law: str,
-    output: Output,
+    output: cli.Output,
 ) -> None:
     """Run a study of wear, write and print it.
 
@@ -179,17 +161,11 @@ def _carry_out(
         output.remark(words)
 
     ended = None
+    told = {"law": law, "on_step": found.append, "on_remark": remark}
+    told["folder"] = folder and folder / STEPS
     try:
         with output.progress("wear") as progress:
-            loop(
-                step=of.scale * step,
-                steps=steps,
-                law=law,
-                progress=progress,
-                folder=folder and folder / STEPS,
-                on_step=found.append,
-                on_remark=remark,
-            )
+            loop(step=of.scale * step, steps=steps, progress=progress, **told)
     except RailsimError as error:
         if not found:
             raise

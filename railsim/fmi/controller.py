@@ -54,12 +54,8 @@ class Controller:
         self._give = [(_reference(name, known, one), to) for one, to in outputs.items()]
         self._period = period
         self._folder = fmpy.extract(name)
-        self._unit = slave(
-            guid=model.guid,
-            unzipDirectory=self._folder,
-            modelIdentifier=model.coSimulation.modelIdentifier,
-            instanceName=Path(name).stem,
-        )
+        about = {"guid": model.guid, "modelIdentifier": model.coSimulation.modelIdentifier}
+        self._unit = slave(unzipDirectory=self._folder, instanceName=Path(name).stem, **about)
         self._time: float | None = None
 
     def run(

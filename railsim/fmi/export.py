@@ -21,6 +21,8 @@ from railsim.version import __version__
 OUTPUTS = ("Q", "Y", "wheelset_lateral")
 """Quantities that are output unless others are named."""
 
+STATES = ("canGetAndSetFMUState", "canSerializeFMUState")
+CAPABILITIES = ("needsExecutionTool", *STATES, "canHandleVariableCommunicationStepSize")
 WRAPPER = '''"""A vehicle of railsim, called by FMI 3.0; it needs Python with railsim {version}."""
 
 from pythonfmu3 import Fmi3Slave
@@ -65,28 +67,17 @@ def fmu(
             signals = tuple(n for n in run.readable if n in (vehicle.signals or {}))
             run.step()
         result = open_run(stored)
-        facts = {
-            "railsim": __version__,
-            "description": f"{vehicle.name} on {track.name} at {result.speed:g} m/s; runs in a "
-            f"Python that has railsim {__version__}",
-            "step": step,
-            "duration": conditions.get("duration"),
-            "until": conditions.get("until"),
-            "inputs": _commands(vehicle, actuators, inputs),
-            "outputs": _variables(vehicle, result, signals, outputs),
-        }
+        where = f"{vehicle.name} on {track.name} at {result.speed:g} m/s"
+        words = f"{where}; runs in a Python that has railsim {__version__}"
+        facts = {"railsim": __version__, "description": words, "step": step}
+        facts |= {key: conditions.get(key) for key in ("duration", "until")}
+        facts["inputs"] = _commands(vehicle, actuators, inputs)
+        facts["outputs"] = _variables(vehicle, result, signals, outputs)
         variables = Path(folder) / VARIABLES
         variables.write_text(json.dumps(facts, indent=1), encoding="utf-8")
         script.write_text(WRAPPER.format(name=name, version=__version__), encoding="utf-8")
-        made = wrapper.FmuBuilder.build_FMU(
-            script,
-            dest=Path(folder) / "made",
-            project_files=[stored, variables],
-            needsExecutionTool=True,
-            canGetAndSetFMUState=True,
-            canSerializeFMUState=True,
-            canHandleVariableCommunicationStepSize=True,
-        )
+        files = {"dest": Path(folder) / "made", "project_files": [stored, variables]}
+        made = wrapper.FmuBuilder.build_FMU(script, **files, **dict.fromkeys(CAPABILITIES, True))
         with whole_file(path) as partial:
             partial.write_bytes(made.read_bytes())
     return path
@@ -107,14 +98,11 @@ def _commands(
         if name not in actuators:
             allowed = nearest(name, actuators) if actuators else "the vehicle has none"
             raise argument_error("inputs", f"no actuator '{name}'", allowed)
+    # a law knows the unit of its own command
+    units = {name: getattr(elements[name], "command_unit", "") for name in wanted}
+    words = "command of actuator "
     return [
-        {
-            "name": name,
-            "start": 0.0,
-            "unit": getattr(elements[name], "command_unit", ""),  # a law knows its own
-            "description": f"command of actuator {name}",
-        }
-        for name in wanted
+        {"name": n, "start": 0.0, "unit": u, "description": words + n} for n, u in units.items()
     ]
 
 

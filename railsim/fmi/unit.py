@@ -21,12 +21,8 @@ from railsim.version import __version__
 INPUTS = "inputs.h5"
 """A result of no length: the vehicle, track, settings and profiles with which the unit runs."""
 VARIABLES = "variables.json"
-DERIVED = {
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "J": {"kg": 1, "m": 2, "s": -2},
-    "W": {"kg": 1, "m": 2, "s": -3},
-}
+POWERS = {"N": (1, -2), "Pa": (-1, -2), "J": (2, -2), "W": (2, -3)}  # of m and s, with kg
+DERIVED = {unit: {"kg": 1, "m": m, "s": s} for unit, (m, s) in POWERS.items()}
 BASE = "kg", "m", "s", "A", "K", "mol", "cd", "rad"
 TIME_TOLERANCE = 1e-9  # s; between the time of the program that calls and that of the run
 
@@ -70,41 +66,28 @@ class Unit:
         # those of one's own outputs may be any text: what is not known has no unit in FMI
         known = {u: found for u in sorted(units - {""}) if (found := exponents(u)) is not None}
         self.register_units([wrapper.unit.Unit(u, **found) for u, found in known.items()])
-        time = wrapper.Float64(
-            "time", causality=causality.independent, getter=lambda: self._time,
-            variability=variability.continuous,
-        )  # fmt: skip
-        self.register_variable(time, nested=False)
+
+        def register(kind: Any, name: str, getter: Any, **more: Any) -> None:
+            if "unit" in more:
+                more["unit"] = more["unit"] if more["unit"] in known else None
+            self.register_variable(kind(name, getter=getter, **more), nested=False)
+
+        continuous, number = variability.continuous, wrapper.Float64
+        independent: Any = {"causality": causality.independent, "variability": continuous}
+        register(number, "time", lambda: self._time, **independent)
         for one in self._facts["inputs"]:
-            variable = wrapper.Float64(
-                one["name"],
-                unit=one["unit"] if one["unit"] in known else None,
-                description=one["description"],
-                causality=causality.input,
-                variability=variability.discrete,
-                start=one["start"],
-                getter=lambda name=one["name"]: self._commands[name],
-                setter=lambda value, name=one["name"]: self._commands.__setitem__(name, value),
-            )
-            self.register_variable(variable, nested=False)
+            more = {key: one[key] for key in ("unit", "description", "start")}
+            more |= {"causality": causality.input, "variability": variability.discrete}
+            more["setter"] = lambda value, name=one["name"]: self._commands.update({name: value})
+            register(number, one["name"], lambda name=one["name"]: self._commands[name], **more)
         for one in self._facts["outputs"]:
-            variable = wrapper.Float64(
-                one["name"],
-                unit=one["unit"] if one["unit"] in known else None,
-                description=one["description"],
-                causality=causality.output,
-                variability=variability.continuous,
-                initial=wrapper.Fmi3Initial.calculated,
-                getter=lambda name=one["name"]: self._values[name],
-            )
-            self.register_variable(variable, nested=False)
-        status = wrapper.String(
-            "status",
-            description="running, or the status of the run that has ended",
-            causality=causality.local,
-            getter=lambda: self._status,
-        )
-        self.register_variable(status, nested=False)
+            more = {key: one[key] for key in ("unit", "description")}
+            more |= {"causality": causality.output, "variability": continuous}
+            more["initial"] = wrapper.Fmi3Initial.calculated
+            register(number, one["name"], lambda name=one["name"]: self._values[name], **more)
+        words = "running, or the status of the run that has ended"
+        local = {"description": words, "causality": causality.local}
+        register(wrapper.String, "status", lambda: self._status, **local)
 
     # calls
 

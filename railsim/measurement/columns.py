@@ -15,7 +15,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.measurement import MeasurementFile
-from railsim.errors import Fault, InputError, input_error, nearest, optional_package
+from railsim.errors import Fault, Faults, InputError, input_error, nearest, optional_package
 from railsim.files.access import open_regular
 
 Wanted = Mapping[str, tuple[str, tuple[int, ...]]]
@@ -54,12 +54,11 @@ def _unreadable(path: Path, kind: str, error: Exception, allowed: str = "") -> I
 
 def _named(path: Path, wanted: Wanted, known: Sequence[str]) -> None:
     """Refuse columns that the file does not have, all at once."""
-    missing = [theirs for theirs, _ in wanted.values() if theirs not in known]
-    if missing:
-        raise InputError(
-            Fault(str(path), "columns", f"no column '{name}'", nearest(name, known))
-            for name in dict.fromkeys(missing)
-        )
+    Faults(
+        Fault(str(path), "columns", f"no column '{name}'", nearest(name, known))
+        for name in dict.fromkeys(theirs for theirs, _ in wanted.values())
+        if name not in known
+    ).check()
 
 
 def _csv(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -77,13 +78,8 @@ class Measurement:
     def part(self, begin: float, end: float) -> "Measurement":
         """Return the values between two arc lengths [m]."""
         rows = slice(*np.searchsorted(self.distance, [begin, end]).tolist())
-        return replace(
-            self,
-            time=self.time[rows],
-            distance=self.distance[rows],
-            speed=self.speed[rows],
-            channels={name: x[rows] for name, x in self.channels.items()},
-        )
+        axes: Any = {name: getattr(self, name)[rows] for name in ("time", "distance", "speed")}
+        return replace(self, channels={n: x[rows] for n, x in self.channels.items()}, **axes)
 
     def resampled(self, rate: float) -> "Measurement":
         """Return the run at another rate [1/s]; filtered before where it becomes lower.
@@ -101,13 +97,9 @@ class Measurement:
             lost = np.interp(time, self.time, np.isnan(x).astype(float)) > 0.0
             return np.where(lost, np.nan, np.interp(time, self.time, whole))
 
-        return replace(
-            self,
-            time=time,
-            distance=np.interp(time, self.time, self.distance),
-            speed=np.interp(time, self.time, self.speed),
-            channels={name: taken(x) for name, x in self.channels.items()},
-        )
+        distance, speed = (np.interp(time, self.time, x) for x in (self.distance, self.speed))
+        channels = {name: taken(x) for name, x in self.channels.items()}
+        return replace(self, time=time, distance=distance, speed=speed, channels=channels)
 
     def filtered(self, low: float = 0.0, high: float = np.inf) -> "Measurement":
         """Return the run with all channels through a Butterworth band pass without phase [Hz].
@@ -131,7 +123,7 @@ class Measurement:
         """Return the run with further remarks."""
         return replace(self, remarks=(*self.remarks, *remarks))
 
-    def _table(self) -> Table:
+    def _repr_html_(self) -> str:
         """Return the table of the channels that a notebook shows."""
         rows: list[list[object]] = []
         for name, x in self.channels.items():
@@ -139,12 +131,8 @@ class Measurement:
             spread = [known.min(), known.max()] if len(known) else [np.nan, np.nan]
             share = 100.0 * (1.0 - len(known) / len(x))
             rows.append([name, self.quantities[name], *spread, share])
-        return Table(["channel", "quantity", "least (SI)", "largest (SI)", "missing (%)"], rows)
-
-    def _repr_html_(self) -> str:
-        table = self._table()
-        table.caption = self.name
-        return table.html()
+        columns = ["channel", "quantity", "least (SI)", "largest (SI)", "missing (%)"]
+        return Table(columns, rows, self.name).html()
 
     def __repr__(self) -> str:
         length = (self.distance[-1] - self.distance[0]) / 1e3

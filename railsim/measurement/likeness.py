@@ -11,6 +11,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 
+Series = Mapping[str, Floats]
 OPPOSITE = -0.5  # correlation
 UNITS = (("1000", 1e3), ("1/1000", 1e-3), ("9.81 (g)", 9.81), ("1/9.81 (g)", 1 / 9.81))
 NEAR = 1.35  # ratio to such a factor, of signals that are alike
@@ -86,11 +87,7 @@ def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:
 
 
 def suspicions(
-    measured: Mapping[str, Floats],
-    simulated: Mapping[str, Floats],
-    step: float,
-    *,
-    clocks: bool = True,
+    measured: Series, simulated: Series, step: float, *, clocks: bool = True
 ) -> list[str]:
     """Return remarks on all channels; delays that all share are one of the place, not said here.
 
@@ -101,12 +98,10 @@ def suspicions(
     common = float(np.median(clear)) if clear else 0.0
     drifts = [one.drift for one in found.values() if np.isfinite(one.drift)]
     drift = float(np.median(drifts)) if len(drifts) > 1 else 0.0
-    said = [
-        replace(one, lag=clocks * (one.lag - common), drift=clocks * (one.drift - drift)).remark(
-            name, step
-        )
-        for name, one in found.items()
-    ]
+    said = []
+    for name, one in found.items():
+        own = {"lag": clocks * (one.lag - common), "drift": clocks * (one.drift - drift)}
+        said.append(replace(one, **own).remark(name, step))
     if clocks and abs(drift) > APART * step:
         said.append(
             f"All channels run apart from the simulation by {1e3 * drift:.3g} ms over the "

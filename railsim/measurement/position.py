@@ -10,17 +10,14 @@ from railsim.arrays import Floats
 from railsim.definitions.measurement import MeasurementFile
 from railsim.errors import input_error
 
+Origin = tuple[float, bool]  # mileage of s = 0 [m], and whether it falls
 BACKWARDS = 1.0  # m, by which a counter may step back
 APART = 0.002  # of the distance: remarked on
 WRONG = 0.5  # of the distance: refused
 
 
 def position(
-    file: str,
-    how: MeasurementFile,
-    time: Floats,
-    axes: dict[str, Floats],
-    mileage: tuple[float, bool] | None,
+    file: str, how: MeasurementFile, time: Floats, axes: dict[str, Floats], mileage: Origin | None
 ) -> tuple[Floats, Floats, list[str]]:
     """Return arc length [m], speed [m/s] and remarks of a run.
 
@@ -36,7 +33,9 @@ def position(
         speed = np.full(len(time), how.speed)
     if speed is not None:
         speed = _known(file, "speed", time, speed, remarks)
-    driven = None if speed is None else _integral(step, speed)
+    driven = None
+    if speed is not None:
+        driven = np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
     counter = axes.get("distance")
     if counter is None and "mileage" in axes:
         counter = axes["mileage"]
@@ -63,10 +62,6 @@ def position(
             f"distance, {driven[-1]:.1f} m by speed); the distance is used."
         )
     return s, speed, remarks
-
-
-def _integral(step: float, speed: Floats) -> Floats:
-    return np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
 
 
 def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) -> Floats:

@@ -193,12 +193,11 @@ class Irregularity(Estimated):
         )
 
 
+Forces = tuple[tuple[str, ...], Complexes, Floats]
+
+
 def estimate_of(
-    piece: Piece,
-    spectra: Complexes,
-    covariance: Complexes,
-    power: Floats,
-    forces: tuple[tuple[str, ...], Complexes, Floats],
+    piece: Piece, spectra: Complexes, covariance: Complexes, power: Floats, forces: Forces
 ) -> Estimate:
     """Return the estimate of a piece from spectra of fields and their covariance.
 

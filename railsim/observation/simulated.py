@@ -142,13 +142,13 @@ def _series(result: Result, name: str) -> Floats:
     return np.asarray(result.series("sensor_acceleration", sensor=kind, axis=labels[0]))
 
 
+Run = Callable[[Floats], Reading | str]
+Map = Callable[[Floats], Floats]
+Pair = tuple[Floats, Floats]
+
+
 def refined(
-    run: Callable[[Floats], Reading | str],
-    gain: Callable[[Floats], Floats],
-    seen: Callable[[Floats], Floats],
-    data: tuple[Floats, Flags],
-    first: tuple[Floats, Floats],
-    most: int,
+    run: Run, gain: Map, seen: Map, data: tuple[Floats, Flags], first: Pair, most: int
 ) -> Refined | str:
     """Solve (1), starting from the linear estimate.
 

@@ -31,25 +31,11 @@ FIGURES = {
 def plot(
     thing: object, *, path: str | Path | None = None, overwrite: bool = False, **how: Any
 ) -> "Figure":
-    """Draw a vehicle, a track, a result or the result of an analysis.
+    """Draw a vehicle, a track, a result or the result of an analysis: what has a method `plot`.
 
-    Parameters
-    ----------
-    thing : object
-        What is drawn: anything with a method `plot`.
-    path : str or Path, optional
-        Where the picture is written too; the suffix tells its kind.
-    overwrite : bool
-        Whether a file may be replaced.
-    **how
-        Options of the function in `FIGURES`.
-
-    Raises
-    ------
-    InputError
-        The file exists or cannot be written.
-    TypeError
-        Nothing draws it.
+    `path`: Where the picture is written too; the suffix tells its kind. `overwrite`: Whether a file
+    may be replaced. `**how`: Options of the function in `FIGURES`. Raises InputError: the file
+    exists or cannot be written. Raises TypeError: nothing draws it.
     """
     names = [kind.__name__ for kind in type(thing).__mro__ if kind.__name__ in FIGURES]
     if not names:

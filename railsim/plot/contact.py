@@ -17,7 +17,7 @@ from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
 from railsim.contact.summary import Pair
-from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, key, label_grid, note, styled
+from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, key, label_grid, note, single, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
 
@@ -35,15 +35,7 @@ EXPLAINED = (
 
 @styled()
 def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
-    """Wheels above their rails, with lines between the points that touch.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-        Contact functions.
-    pairs : sequence of Pair, left and right
-        What is drawn.
-    """
+    """Wheels of a left and a right pair above their rails, with lines between points that touch."""
     measured = [p for pair in pairs for p in (pair.wheel, pair.rail) if p.measured is not None]
     unique = list(dict.fromkeys(measured))
     rows, height = (2, 5.4) if unique else (1, 3.0)
@@ -155,15 +147,8 @@ def _limit(axes: Axes, values: Floats, geometry: ContactGeometry) -> None:
 
 @styled()
 def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
-    """Equivalent conicity over the amplitude.
-
-    Parameters
-    ----------
-    conicity : mapping of str to (amplitudes [m], values [1])
-        Curves by their name.
-    """
-    figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
-    axes = figure.subplots()
+    """Equivalent conicity over the amplitude: amplitudes [m] and values [1] by their name."""
+    figure, axes = single(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
     for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
         words = unformatted(name)
         axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=words)
@@ -177,17 +162,8 @@ def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
 
 @styled()
 def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Floats) -> Figure:
-    """Equivalent conicity over gauge and amplitude.
-
-    Parameters
-    ----------
-    gauges, amplitudes : sequence of float
-        [m].
-    values : float64[gauge, amplitude]
-        [1].
-    """
-    figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
-    axes = figure.subplots()
+    """Equivalent conicity, float64[gauge, amplitude], over gauge and amplitude [m]."""
+    figure, axes = single(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
     # the flange's slopes beyond would hide the tread's
     levels = np.linspace(0.0, 0.8, 17)
     x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes

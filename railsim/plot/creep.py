@@ -23,6 +23,8 @@ LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
 STICK, HELD = "#2a6f97", "stick; elsewhere slip"
 DIRECTION = "direction of the traction on the rail"
 KEY = 0.3  # inch, for the key of the traction
+Laws = Sequence[CreepLawName]
+Cells = tuple[int, int]
 LARGEST = 5.0  # end of the axis of normalised creepage
 
 
@@ -32,16 +34,8 @@ def creep_curves_figure(
 ) -> Figure:
     """Creep forces over normalised creepage, for six directions of creepage.
 
-    Parameters
-    ----------
-    patch : Patch
-        The contact ellipse.
-    laws : sequence of str
-        Laws of `railsim.contact.creep_force`.
-    nx, ny : int
-        Cells and strips of the laws that have them.
-    exact_points : int
-        Points of the full theory in each picture (half a second each); 0 for none.
+    `laws`: Of `railsim.contact.creep_force`. `nx`, `ny`: Cells and strips of the laws that have
+    them. `exact_points`: Points of the full theory in each picture (half a second each); 0: none.
     """
     scale = np.linspace(0.0, 1.0, 121) ** 1.5 * LARGEST
     figure = Picture(9.6, 6.2, edges=(0.06, 0.13, 0.99, 0.90, 0.18, 0.36))
@@ -77,12 +71,7 @@ def _components(direction: Sequence[float]) -> list[tuple[int, str]]:
 
 
 def _draw_curves(
-    panel: Axes,
-    patch: Patch,
-    direction: Sequence[float],
-    scale: Floats,
-    laws: Sequence[CreepLawName],
-    grid: tuple[int, int],
+    panel: Axes, patch: Patch, direction: Sequence[float], scale: Floats, laws: Laws, grid: Cells
 ) -> None:
     unit = patch.unit_creepages(direction)
     x, y, spin = unit[:, None] * scale
@@ -114,12 +103,8 @@ def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: in
 def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: float) -> Figure:
     """Traction on the rail within the contact ellipse, stick zone shaded.
 
-    Parameters
-    ----------
-    solutions : mapping of str to ExactCreepForce
-        Fields by their title, one picture each, of the same ellipse.
-    friction_force : float
-        mu N, for the resultants [N].
+    `solutions`: Fields by their title, one picture each, of the same ellipse. `friction_force`:
+    mu N, for the resultants [N].
     """
     columns = min(len(solutions), 3)
     rows = -(-len(solutions) // columns)

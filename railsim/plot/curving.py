@@ -22,11 +22,7 @@ WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 def curving_figure(found: Curving, title: str = "") -> Figure:
     """Leading wheelset over radius, one line for each friction; wear of all over radius.
 
-    Parameters
-    ----------
-    found : Curving
-    title : str
-        By default vehicle, cant and rails.
+    `title`: By default vehicle, cant and rails.
     """
     mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
     heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
@@ -135,16 +131,12 @@ def _plan(axes: Axes, found: Curving) -> None:
         for end in ends:
             wheel = [end - WHEEL * along, end + WHEEL * along]
             axes.plot(*np.transpose(wheel), color=colours[name], lw=4.0, zorder=3)
-    axes.set(
-        xlim=(np.min(x) - 2.0, np.max(x) + 2.0),
-        ylim=(1.9, -1.9),  # to the right is downwards
-        aspect="equal",
-        xticks=[],
-        yticks=[],
-        title=(
-            f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
-            f"running to the right; angle of attack and displacement {EXAGGERATED:g} times"
-        ),
+    # to the right is downwards
+    axes.set(xlim=(np.min(x) - 2.0, np.max(x) + 2.0), ylim=(1.9, -1.9), aspect="equal")
+    axes.set(xticks=[], yticks=[])
+    axes.set_title(
+        f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
+        f"running to the right; angle of attack and displacement {EXAGGERATED:g} times"
     )
 
 

@@ -30,29 +30,13 @@ def histories(
     by: str = "wheel",
     between: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw quantities of a result.
+    """Draw quantities of a result: a pair of axes for each, or for each and each wheelset.
 
-    Parameters
-    ----------
-    result : Result
-        What to draw.
-    selections : sequence of str
-        Quantities and labels, see `railsim.plot.selection`.
-    over : {"distance", "time"}
-        Horizontal axis; the distance is that of the reference body.
-    by : {"wheel", "wheelset"}
-        One pair of axes for all wheels, or one for each wheelset.
-    between : (float, float), optional
-        Part of the horizontal axis to show, in its unit.
-
-    Returns
-    -------
-    Figure
-        One pair of axes for each quantity, or each quantity and wheelset.
-
-    Raises
-    ------
-    InputError : a quantity or label that the result does not have, an empty part.
+    `selections`: Quantities and labels, see `railsim.plot.selection`. `over` ({"distance",
+    "time"}): Horizontal axis; the distance is that of the reference body. `by` ({"wheel",
+    "wheelset"}): One pair of axes for all wheels, or one for each wheelset. `between`: Part of the
+    horizontal axis to show, in its unit. Raises InputError: a quantity or label that the result
+    does not have, an empty part.
     """
     check_not_empty(result)
     window = slice(None) if between is None else _window(result[over], between)
@@ -197,17 +181,8 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     shown = value * quantity.scale
     axes.axhline(shown, color=style.LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
     shift, va = ((-3, 2.5), "bottom") if value < 0 else ((-3, -2.5), "top")
-    style.note(
-        axes,
-        words,
-        (1.0, shown),
-        shift,
-        "right",
-        va,
-        frame=style.BESIDE,
-        fontsize=7.5,
-        color=style.LIMIT,
-    )
+    look = {"frame": style.BESIDE, "fontsize": 7.5, "color": style.LIMIT}
+    style.note(axes, words, (1.0, shown), shift, "right", va, **look)
 
 
 def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:

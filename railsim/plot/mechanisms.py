@@ -24,8 +24,8 @@ from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.quantities import force_unit, quantity
+from railsim.plot import style
 from railsim.plot.point_names import name_points
-from railsim.plot.style import ABOVE, BESIDE, DISTINCT, LIMIT, Picture, distinct, note, styled
 
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
@@ -34,7 +34,7 @@ DASHES: tuple[Any, ...] = (
     "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (11, 3)),
     (0, (1, 3)), (0, (9, 2, 3, 2)),
 )  # fmt: skip
-MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
+MAIN, SECOND, FAINT = style.DISTINCT[0], style.DISTINCT[1], "0.75"
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
 WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8}
 WIDTHS |= {"actuator": 3.2, "spring": 1.0, "damper": 1.6}
@@ -44,7 +44,7 @@ STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
 
 def line_style(i: int) -> dict[str, Any]:
     """Colour and dashes of the line of a number."""
-    return {"color": distinct(i), "ls": DASHES[i % len(DASHES)]}
+    return {"color": style.distinct(i), "ls": DASHES[i % len(DASHES)]}
 
 
 def label_of(name: str, result: Analysis, words: str = "") -> str:
@@ -75,12 +75,6 @@ def way(result: Analysis) -> str:
     return "x" if result.model.axis == 0 else "height"
 
 
-def single(width: float, height: float) -> tuple[Picture, Axes]:
-    """A figure with one pair of axes."""
-    figure = Picture(width, height)
-    return figure, figure.subplots()
-
-
 def curves(
     axes: Axes, result: Analysis, over: str, lines: Iterable[tuple[Any, str]], label: str
 ) -> None:
@@ -94,9 +88,9 @@ def curves(
 
 def three_rows(
     over: Any, courses: Mapping[str, Course], scale: float, labels: Iterable[str]
-) -> tuple[Picture, Any]:
+) -> tuple[style.Picture, Any]:
     """A figure of courses, their first and their second derivatives."""
-    figure = Picture(7.6, 5.6)
+    figure = style.Picture(7.6, 5.6)
     rows = figure.subplots(3, 1, sharex=True)
     for i, (name, course) in enumerate(courses.items()):
         for axes, values in zip(rows, vars(course).values(), strict=True):
@@ -107,7 +101,7 @@ def three_rows(
     return figure, rows
 
 
-@styled()
+@style.styled()
 def drawing_figure(result: Analysis) -> Figure:
     """The mechanism in four positions, and its working parts with the names of their points."""
     model = result.model
@@ -122,13 +116,13 @@ def drawing_figure(result: Analysis) -> Figure:
     small = max(box[1] - box[0], box[3] - box[2]) < 0.6 * size
     flat = box[1] - box[0] > 1.6 * (box[3] - box[2])
     if small and flat:
-        figure = Picture(6.6, 7.4)
+        figure = style.Picture(6.6, 7.4)
         axes = figure.subplots(2, 1, height_ratios=[1.5, 1.0])
     elif small:
-        figure = Picture(9.0, 4.6)
+        figure = style.Picture(9.0, 4.6)
         axes = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
     else:
-        figure = Picture(6.6, 5.2)
+        figure = style.Picture(6.6, 5.2)
         axes = [figure.subplots()]
     scale = quantity("travel", result.definition)
     for k in range(4):
@@ -156,16 +150,10 @@ def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> 
     """Draw the lines of a mechanism at one of its positions [mm]."""
     made = []
     for i, line in enumerate(drawn):
-        made += axes.plot(
-            *(line.xy[k] * 1e3).T,
-            color=colour,
-            lw=WIDTHS[line.kind],
-            ms=2.5,
-            ls=STYLES.get(line.kind, "-"),
-            marker="o" if line.kind in ("body", "link") else "",
-            solid_capstyle="round",
-            label=label if i == 0 else None,
-        )
+        look: Any = {"lw": WIDTHS[line.kind], "ms": 2.5, "ls": STYLES.get(line.kind, "-")}
+        look |= {"marker": "o" if line.kind in ("body", "link") else "", "color": colour}
+        look |= {"solid_capstyle": "round", "label": label if i == 0 else None}
+        made += axes.plot(*(line.xy[k] * 1e3).T, **look)
     return made
 
 
@@ -183,7 +171,7 @@ def mark_points(axes: Axes, motion: Motion, box: Any) -> None:
     name_points(axes, named, [line.xy[0] * 1e3 for line in lines(motion)])
 
 
-@styled()
+@style.styled()
 def kinematics_figure(result: Analysis) -> Figure:
     """Angles of bodies and rods over the driver, their rates and accelerations."""
     motion, travel = result.motion, quantity("travel", result.definition)
@@ -201,7 +189,7 @@ def kinematics_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def actuators_figure(result: Analysis) -> Figure:
     """Lengths of the actuators, their speeds and accelerations; in time where there is a law."""
     courses, over = actuators(result.motion), values_of("travel", result)
@@ -214,10 +202,10 @@ def actuators_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def path_figure(result: Analysis) -> Figure:
     """Path of the output, with the zone."""
-    figure, axes = single(4.6, 5.2)
+    figure, axes = style.single(4.6, 5.2)
     axes.plot(values_of("x", result), values_of("height", result), color=MAIN)
     for name, values in result.zone.items():
         point = (values["x"] * 1e3, values["height"] * 1e3)
@@ -228,10 +216,10 @@ def path_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def angles_figure(result: Analysis) -> Figure:
     """Transmission angles, folded, with their limit, and pressure angles of cams."""
-    figure, axes = single(7.0, 3.6)
+    figure, axes = style.single(7.0, 3.6)
     lines = [(np.degrees(folded(result.output[n])), n) for n in result.definition.angles]
     cams = (n for n in result.output if n.endswith("_pressure_angle"))
     lines += [(values_of(name, result), name.replace("_", " ")) for name in cams]
@@ -239,13 +227,13 @@ def angles_figure(result: Analysis) -> Figure:
     limits = result.definition.optimise
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
-        axes.axhline(limit, color=LIMIT, lw=0.9)
-        at = (1.0, limit)
-        note(axes, "limit", at, (0, 0), "right", "bottom", frame=BESIDE, fontsize=8, color=LIMIT)
+        axes.axhline(limit, color=style.LIMIT, lw=0.9)
+        look: Any = {"frame": style.BESIDE, "fontsize": 8, "color": style.LIMIT}
+        style.note(axes, "limit", (1.0, limit), (0, 0), "right", "bottom", **look)
     return figure
 
 
-@styled()
+@style.styled()
 def cam_figure(result: Analysis) -> Figure:
     """Rate of the rocker on every arc of the cam, with the transitions."""
     motion = result.motion
@@ -256,7 +244,7 @@ def cam_figure(result: Analysis) -> Figure:
     first = int(result.model.linkage.joint[row, 4])
     scale = quantity("travel", result.definition).scale
     beyond = 0.12 * abs(result.travel)
-    figure, axes = single(7.0, 3.6)
+    figure, axes = style.single(7.0, 3.6)
     travel = values_of("travel", result)
     rate = motion.q1[:, body, 2]
     roller = cam.cam.partition(".")[0]
@@ -273,14 +261,14 @@ def cam_figure(result: Analysis) -> Figure:
         at = change.travel * scale
         axes.axvline(at, color="0.4", lw=0.8)
         value = f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm"
-        note(axes, value, (at, 1.0), (3, -10), frame=ABOVE, fontsize=8, color="k")
+        style.note(axes, value, (at, 1.0), (3, -10), frame=style.ABOVE, fontsize=8, color="k")
     mark_zone(axes, result, "travel")
     axes.set(xlabel=label_of("travel", result, "driver"), ylabel=words)
     axes.legend()
     return figure
 
 
-@styled()
+@style.styled()
 def force_figure(result: Analysis) -> Figure:
     """Ratios and force of the actuator over its length and over the height."""
     over = [name for name in ("length", way(result)) if name in result.output]
@@ -290,7 +278,7 @@ def force_figure(result: Analysis) -> Figure:
     }
     words = {"ratio": "ratio dy/dL, dx/dL", "force": "force of the unknown"}
     shown = [name for name in rows if name in result.output]
-    figure = Picture(7.8, 5.4)
+    figure = style.Picture(7.8, 5.4)
     grid = figure.subplots(len(shown), len(over), sharex="col", sharey="row", squeeze=False)
     for name, row in zip(shown, grid, strict=True):
         lines = [(values_of(n, result), label) for n, label in rows[name] if n in result.output]
@@ -302,10 +290,10 @@ def force_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def pressure_figure(result: Analysis) -> Figure:
     """Pressure that the mechanism needs, over the height."""
-    figure, axes = single(6.4, 3.4)
+    figure, axes = style.single(6.4, 3.4)
     names = (("pressure", "needed"), ("pressure_back", "needed on the way back"))
     lines = [(values_of(n, result), label) for n, label in names if n in result.output]
     if result.contact is not None:
@@ -315,12 +303,12 @@ def pressure_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def contact_figure(result: Analysis) -> Figure:
     """Static contact force at constant pressure, over the height."""
     contact = result.contact
     assert contact is not None
-    figure, axes = single(6.4, 3.4)
+    figure, axes = style.single(6.4, 3.4)
     lines = [(contact.curve, f"at {contact.pressure / 1e6:.4f} MPa")]
     if contact.rising != contact.falling:
         lines += zip(contact.bounds, ("rising", "falling"), strict=True)
@@ -331,19 +319,19 @@ def contact_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def carpet_figure(result: Analysis) -> Figure:
     """Carpet of the air spring: force over height and pressure, with the mechanism's load."""
     assert result.definition.solve is not None
     spring = result.definition.actuators[result.definition.solve.unknown]
     assert isinstance(spring, AirSpring)
     table = table_of(result.motion, spring)
-    figure, axes = single(6.6, 4.2)
+    figure, axes = style.single(6.6, 4.2)
     heights = table.heights * 1e3
     for i, pressure in enumerate(table.pressures):
         axes.plot(heights, table.forces[:, i] / 1e3, color="0.55", lw=0.9, marker=".", ms=3)
         point, value = (heights[0], table.forces[0, i] / 1e3), f"{pressure / 1e6:g} MPa"
-        note(axes, value, point, (-4, 0), "right", "center", fontsize=8, color="k")
+        style.note(axes, value, point, (-4, 0), "right", "center", fontsize=8, color="k")
     length = values_of("length", result)
     axes.plot(length, result.output["force"] / 1e3, color=MAIN, lw=2.2, label="load")
     if result.zone:
@@ -354,25 +342,24 @@ def carpet_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def gas_spring_figure(result: Analysis) -> Figure:
     """Length and force of the gas springs over the driver."""
     names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
-    figure = Picture(7.2, 3.4)
-    for axes, kind, words in zip(
-        figure.subplots(1, 2), ("length", "force"), ("length (mm)", "push (N)"), strict=True
-    ):
+    figure = style.Picture(7.2, 3.4)
+    kinds = (("length", "length (mm)"), ("force", "push (N)"))
+    for axes, (kind, words) in zip(figure.subplots(1, 2), kinds, strict=True):
         lines = [(values_of(f"{name}_{kind}", result), name) for name in names]
         curves(axes, result, "travel", lines, words)
     return figure
 
 
-@styled()
+@style.styled()
 def time_figure(result: Analysis) -> Figure:
     """Motion in time: driver, output's speed and acceleration, driving force."""
     timed = result.timed
     assert timed is not None
-    figure = Picture(7.6, 5.6)
+    figure = style.Picture(7.6, 5.6)
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
     a.plot(timed.time, timed.motion.s * quantity("travel", result.definition).scale, color=MAIN)
     a.set_ylabel(label_of("travel", result, "driver"))
@@ -392,10 +379,10 @@ def time_figure(result: Analysis) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     """Unknown force over the driver, for all cases of a mechanism."""
-    figure, axes = single(6.6, 3.6)
+    figure, axes = style.single(6.6, 3.6)
     first = next(iter(results.values()))
     assert first.definition.solve is not None
     for i, (name, result) in enumerate(results.items()):
@@ -408,14 +395,14 @@ def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) -> Figure:
     """Ratio and force of several mechanisms over the height.
 
     With `zoom`, in the zone only, and below it what they are above the first one.
     """
     first = next(iter(results.values()))
-    figure = Picture(7.6, 6.4 if zoom else 3.8)
+    figure = style.Picture(7.6, 6.4 if zoom else 3.8)
     panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
     for column, name in enumerate(("ratio", "force")):
         base = _over_height(first, name, zoom)
@@ -438,10 +425,10 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
     return figure
 
 
-@styled()
+@style.styled()
 def held_figure(results: Mapping[str, Analysis]) -> Figure:
     """Pressures that several mechanisms need, and their contact forces at the held pressures."""
-    figure = Picture(7.6, 3.8)
+    figure = style.Picture(7.6, 3.8)
     left, right = figure.subplots(1, 2)
     for i, (label, result) in enumerate(results.items()):
         if "pressure" not in result.output or "height" not in result.output:
@@ -473,10 +460,10 @@ def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Float
     return x, y
 
 
-@styled()
+@style.styled()
 def search_figure(optimum: "Optimum") -> Figure:
     """Objective at the end of every start, feasible or not, and the best."""
-    figure, axes = single(6.4, 3.6)
+    figure, axes = style.single(6.4, 3.6)
     starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
     top = max((s.objective for s in starts), default=1.0)
     lost = [replace(s, objective=top) for s in optimum.starts if not np.isfinite(s.objective)]

@@ -28,11 +28,7 @@ DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
 def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     """Damping ratio and frequency over the parameter, and the root locus.
 
-    Parameters
-    ----------
-    locus : RootLocus
-    title : str
-        By default vehicle, track and contact.
+    `title`: By default vehicle, track and contact.
     """
     figure = Picture(10.2, 7.4, title or locus.title.replace(": ", "\n", 1))
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
@@ -106,15 +102,9 @@ def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str
 
 @styled()
 def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
-    """Shapes of the least damped oscillations as bars with their phase.
+    """Shapes of the least damped oscillations, at `most` so many, as bars with their phase.
 
-    Parameters
-    ----------
-    modes : Modes
-    title : str
-        By default vehicle, track and contact.
-    most : int
-        How many modes are drawn.
+    `title`: By default vehicle, track and contact.
     """
     drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
     title = title or modes.title.replace(": ", "\n", 1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,19 +10,9 @@ from matplotlib.figure import Figure
 from railsim.compare import Difference
 from railsim.definitions.track.layout import curvature_sections
 from railsim.notation import Quantity
+from railsim.plot import style
 from railsim.plot.histories import capitalised, check_not_empty, draw_limit, unit_label, widen
 from railsim.plot.selection import STUDY, Panel, panels
-from railsim.plot.style import (
-    SIDE_LINES,
-    Picture,
-    distinct,
-    grid_of,
-    key,
-    shade,
-    side_keys,
-    spans,
-    styled,
-)
 from railsim.result import Result
 from railsim.text import unformatted
 
@@ -29,25 +20,15 @@ LEADING = tuple(f"{name}:1" for name in STUDY)
 """Default quantities of comparisons: those of the leading wheelset."""
 
 
-@styled()
+@style.styled()
 def overlay(
     results: Mapping[str, Result], selections: Sequence[str] = LEADING, *, over: str = "distance"
 ) -> Figure:
-    """Draw the same quantities of several results into the same axes.
+    """Draw the same quantities of several results into the same axes, a colour for each result.
 
-    Parameters
-    ----------
-    results : mapping of str to Result
-            Results by what they are called in the picture.
-    selections : sequence of str
-            Quantities and labels, see `railsim.plot.selection`; all results must have them.
-    over : {"distance", "time"}
-            Horizontal axis; the distance is that of the reference body.
-
-    Returns
-    -------
-    Figure
-            One pair of axes for each quantity; a colour for each result.
+    `results`: By what they are called in the picture. `selections`: Quantities and labels, see
+    `railsim.plot.selection`; all results must have them. `over` ({"distance", "time"}): Horizontal
+    axis; the distance is that of the reference body.
     """
     for label, result in results.items():
         check_not_empty(result, label)
@@ -56,7 +37,7 @@ def overlay(
     plans = [curvature_sections(result.track()) for result in results.values()]
     ends = [[(section.type, section.begin, section.end) for section in plan] for plan in plans]
     alike = all(other == ends[0] for other in ends)
-    shown = spans(plans[0], first["distance"], first[over]) if alike else []
+    shown = style.spans(plans[0], first["distance"], first[over]) if alike else []
     same_radii = all(plan == plans[0] for plan in plans)
     count, words = max(map(len, drawn.values())), first.quantities[over].label
     figure, cells, across = _cells(count, 1.3, words)
@@ -65,12 +46,12 @@ def overlay(
         for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
             for line in panel.lines if panel is not None else ():
                 side = line.labels.get("side", "left")
-                values = line.values * panel.quantity.scale
-                axes.plot(result[over], values, color=distinct(index), ls=SIDE_LINES[side])
+                look: Any = {"color": style.distinct(index), "ls": style.SIDE_LINES[side]}
+                axes.plot(result[over], line.values * panel.quantity.scale, **look)
         panel = next(panel for panel in same if panel is not None)
         _label(axes, panel.quantity, _heading(panel))
         draw_limit(axes, panel.quantity, results.values())
-        shade(axes, shown, named=same_radii and number < across)
+        style.shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     _legend(figure, list(results), {line.labels.get("side") for line in lines}, 0)
     return figure
@@ -78,10 +59,10 @@ def overlay(
 
 def _cells(
     count: int, margin: float, words: str, title: str = ""
-) -> tuple[Picture, list[Axes], int]:
+) -> tuple[style.Picture, list[Axes], int]:
     """A figure with axes for quantities, the last of a column with their words; the columns."""
     across, wide = (1, 7.0) if count < 3 else (2, 9.8)
-    figure, cells = grid_of(count, across, wide, 2.1, margin, title, sharex=True)
+    figure, cells = style.grid_of(count, across, wide, 2.1, margin, title, sharex=True)
     for axes in cells[max(0, count - across) :]:
         axes.set_xlabel(words)
         axes.tick_params(labelbottom=True)
@@ -90,24 +71,18 @@ def _cells(
 
 def _legend(figure: Figure, labels: Sequence[str], sides: set[str | None], first: int) -> None:
     """A legend below a figure, in as many columns as fit: colours from a number on, sides."""
-    handles = [key(unformatted(s), color=distinct(first + k), lw=2.0) for k, s in enumerate(labels)]
-    handles += side_keys(sides, color="0.25")
+    names = enumerate(map(unformatted, labels), start=first)
+    handles = [style.key(name, color=style.distinct(k), lw=2.0) for k, name in names]
+    handles += style.side_keys(sides, color="0.25")
     longest = max(len(str(handle.get_label())) for handle in handles)
     fitting = int(figure.get_figwidth() / (0.5 + 0.075 * longest))
     columns = max(1, min(6, len(handles), fitting))
     figure.legend(handles=handles, loc="outside lower left", ncols=columns)
 
 
-@styled()
+@style.styled()
 def difference_figure(found: Sequence[Difference], first: str) -> Figure:
-    """Differences of results from the first one along the track, an axis for each quantity.
-
-    Parameters
-    ----------
-    found : sequence of Difference
-    first : str
-            What the first result is called.
-    """
+    """Differences of results along the track from the `first` of this name, by quantity."""
     labels = list(dict.fromkeys(one.result for one in found))
     names = list(dict.fromkeys(one.quantity.name for one in found))
     title = f"Leading wheelset: difference from {unformatted(first)}"
@@ -115,9 +90,9 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     for axes, name in zip(cells, names, strict=True):
         own = [one for one in found if one.quantity.name == name]
         for one in own:
-            colour = distinct(1 + labels.index(one.result))
-            style = SIDE_LINES[one.labels.get("side", "left")]
-            axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=style)
+            colour = style.distinct(1 + labels.index(one.result))
+            line = style.SIDE_LINES[one.labels.get("side", "left")]
+            axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=line)
         _label(axes, own[0].quantity, capitalised(own[0].quantity))
     _legend(figure, labels, {one.labels.get("side") for one in found}, 1)
     return figure

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 
 from railsim.arrays import Floats
 from railsim.definitions.spring import TrailingArmSuspension
-from railsim.plot.style import ABOVE, DISTINCT, LIMIT, Picture, note, styled
+from railsim.plot.style import ABOVE, DISTINCT, LIMIT, Picture, note, single, styled
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks
 from railsim.springs.arm import Arm
@@ -92,8 +92,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
 @styled()
 def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     """Active coils that give the designed stiffness, over the wire diameter."""
-    figure = Picture(5.6, 3.7, edges=(0.1, 0.13, 0.98, 0.85))
-    axes = figure.subplots()
+    figure, axes = single(5.6, 3.7, edges=(0.1, 0.13, 0.98, 0.85))
     listed = coils_by_wire(suspension, result)
     for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True):
         colour = SPRING_COLOURS[name]
@@ -122,8 +121,7 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
     if suspension.fatigue is None:
         raise ValueError("the suspension has no fatigue table")
     line = np.array(suspension.fatigue.goodman) * 1e-6
-    figure = Picture(4.8, 4.9, edges=(0.13, 0.1, 0.97, 0.98))
-    axes = figure.subplots()
+    figure, axes = single(4.8, 4.9, edges=(0.13, 0.1, 0.97, 0.98))
     end = float(line[-1, 1])
     axes.plot([0.0, end], [0.0, end], color="0.35", lw=1.0)
     axes.plot(*line.T, color=LIMIT, lw=1.6, label="Goodman-Smith line")
@@ -166,8 +164,7 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
 @styled()
 def search_figure(result: "SearchResult") -> Figure:
     """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
-    figure = Picture(5.6, 3.6, edges=(0.11, 0.13, 0.98, 0.97))
-    axes = figure.subplots()
+    figure, axes = single(5.6, 3.6, edges=(0.11, 0.13, 0.98, 0.97))
     cloud = result.cloud[np.all(np.isfinite(result.cloud), axis=1)]
     axes.plot(*cloud.T, ".", color=FAINT, ms=4, label="feasible candidates", zorder=1)
     mass = [nest.mass for nest in result.nests]
@@ -245,12 +242,7 @@ def _mark(axes: Axes, result: Verification, over: str, what: str) -> None:
 
 
 def _draw_arm(
-    axes: Axes,
-    suspension: TrailingArmSuspension,
-    arm: Arm,
-    case: Case,
-    hinge: Floats,
-    top_edge: float,
+    axes: Axes, suspension: TrailingArmSuspension, arm: Arm, case: Case, hinge: Floats, edge: float
 ) -> None:
     """Side view in millimetres, the axle to the right of the hinge."""
     phi, length = case.rotation, 1e3 * arm.length
@@ -258,7 +250,7 @@ def _draw_arm(
     along = np.array([np.cos(phi), np.sin(phi)])
     across = np.array([-np.sin(phi), np.cos(phi)])
     axle = hinge + length * along
-    frame = hinge + top_edge * up
+    frame = hinge + edge * up
     half = 0.62e3 * suspension.outer.mean_diameter
     seats = [axle + 1e3 * float(coil.seat) * across for coil in arm.coils]
     steel = {"color": "0.25", "solid_capstyle": "butt"}

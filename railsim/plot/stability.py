@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from railsim.linear.stationary import TwistLoop
 from railsim.notation import SIDES
-from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, say, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, say, single, styled
 from railsim.stability.branches import THRESHOLD, Branch
 from railsim.stability.result import Conicity, CriticalSpeed
 
@@ -30,11 +30,7 @@ SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
     """Amplitude, frequency and track shift force of the hunting motion over speed.
 
-    Parameters
-    ----------
-    found : CriticalSpeed
-    title : str
-        By default vehicle, rails, friction and creep law.
+    `title`: By default vehicle, rails, friction and creep law.
     """
     title = title or _title(found)
     if not found.branches:
@@ -165,17 +161,11 @@ def map_figure(
 ) -> Figure:
     """Critical speeds over one parameter, or over the first with one line for each of the second.
 
-    Parameters
-    ----------
-    axes_values : mapping of str to values
-        One or two parameters.
-    speeds : mapping of str to ndarray
-        Critical speeds by method over the parameters, NaN where there is none [m/s].
-    title : str
+    `axes_values`: Of one or two parameters. `speeds`: Critical speeds by method over them, NaN
+    where there is none [m/s].
     """
     first, *others = axes_values
-    figure = Picture(8.4, 4.6, title)
-    axes = figure.subplots()
+    figure, axes = single(8.4, 4.6, title)
     for method, values in speeds.items():
         for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):
             more = f", {others[0]} {axes_values[others[0]][number]:g}" if others else ""

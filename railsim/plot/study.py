@@ -156,7 +156,8 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
     for axes, quantity in zip(grid[:, 0], quantities, strict=True):
         pairs = [(v, n) for v, n in zip(quantity.values, names, strict=True) if v is not None]
         shown = sorted(pairs, key=lambda pair: -pair[0])[:MOST_RANKED]
-        lengths, labels = [v for v, _ in shown], [unformatted(_shortened(n)) for _, n in shown]
+        names_shown = [n if len(n) <= LONGEST else f"...{n[3 - LONGEST :]}" for _, n in shown]
+        lengths, labels = [v for v, _ in shown], [*map(unformatted, names_shown)]
         bars = axes.barh(labels, lengths, color=DISTINCT[0], height=0.7)
         axes.bar_label(bars, [f"{value:.4g}" for value, _ in shown], padding=3, fontsize=7)
         axes.invert_yaxis()
@@ -166,10 +167,6 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
         more = f", the largest {len(shown)} of {len(pairs)}" if left_out else ""
         axes.set_title(quantity.words + more)
     return figure
-
-
-def _shortened(name: str) -> str:
-    return name if len(name) <= LONGEST else f"...{name[3 - LONGEST :]}"
 
 
 def _text(value: Any) -> str:
@@ -192,14 +189,8 @@ def _legend(figure: Figure, axes: Axes, title: str) -> None:
     handles, labels = axes.get_legend_handles_labels()
     longest = max(map(len, labels), default=1)
     fitting = max(1, int(figure.get_figwidth() / (0.45 + 0.075 * longest)))
-    figure.legend(
-        handles,
-        labels,
-        loc="outside lower left",
-        alignment="left",
-        title=title,
-        ncols=min(fitting, 8, len(labels)),
-    )
+    look: Any = {"loc": "outside lower left", "alignment": "left", "title": title}
+    figure.legend(handles, labels, ncols=min(fitting, 8, len(labels)), **look)
 
 
 MOST_PAIRS = 6

@@ -77,6 +77,14 @@ class Picture(Figure):
         return stream.getvalue()
 
 
+def single(
+    width: float, height: float, title: str = "", edges: Sequence[Any] = ()
+) -> tuple[Picture, Axes]:
+    """Return a figure with one pair of axes, and these."""
+    figure = Picture(width, height, title, edges)
+    return figure, figure.subplots()
+
+
 @contextmanager
 def styled() -> Iterator[None]:
     """Use the style of railsim's pictures within the block."""
@@ -194,11 +202,8 @@ def say(axes: Axes, words: str) -> None:
 def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a figure; the ending of the name says the format (.png, .svg, .pdf).
 
-    Raises
-    ------
-    InputError : the file exists and may not be overwritten, or its ending is none that can be
-        drawn.
-    OSError : the disk is full, or the folder is no longer there.
+    Raises InputError: the file exists and may not be overwritten, or its ending is none that can be
+    drawn. Raises OSError: the disk is full, or the folder is no longer there.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=PICTURES)

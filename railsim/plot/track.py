@@ -14,13 +14,8 @@ from matplotlib.figure import Figure
 from scipy.integrate import cumulative_simpson
 
 from railsim.arrays import Floats
+from railsim.definitions.track import layout
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.layout import (
-    cant_sections,
-    curvature_sections,
-    gradient_sections,
-    track_remarks,
-)
 from railsim.definitions.track.section import Section
 from railsim.laws.permission import refused
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, key, note, shade, spans, styled
@@ -46,24 +41,14 @@ class _Row:
 def track_figure(track: Track, title: str = "") -> Figure:
     """Draw a track: plan, curvature, cant, and what else is not constant along it.
 
-    Parameters
-    ----------
-    track : Track
-        What to draw.
-    title : str
-        By default the name of the track.
-
-    Returns
-    -------
-    Figure
-        The plan with equal scales, right of the track downwards; below it the functions of the
-        distance as they act, with their kinks rounded; at the end what is unusual in the
-        alignment, with the positions marked.
+    The plan with equal scales, right of the track downwards; below it the functions of the distance
+    as they act, with their kinks rounded; at the end what is unusual in the alignment, with the
+    positions marked.  `title`: By default the name of the track.
     """
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, RESOLUTION + 1)
     rows = [*_alignment_rows(track, alignment, s), *_rail_rows(track, s), *_table_rows(track, s)]
-    sections = curvature_sections(track)
+    sections = layout.curvature_sections(track)
     remarks = _marked(track)
     height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
     figure = Picture(8.0, height)
@@ -171,10 +156,10 @@ def _constants(track: Track) -> str:
 
 def _marked(track: Track) -> list[tuple[float, str]]:
     """Return position and text of what is unusual in the alignment; equal texts once."""
-    parts = curvature_sections(track), cant_sections(track), gradient_sections(track)
-    begins = {section.key: section.begin for part in parts for section in part}
+    plans = layout.curvature_sections, layout.cant_sections, layout.gradient_sections
+    begins = {section.key: section.begin for plan in plans for section in plan(track)}
     found: dict[str, list[float]] = {}
-    for remark in track_remarks(track):
+    for remark in layout.track_remarks(track):
         if remark.key in begins:
             found.setdefault(remark.text, []).append(begins[remark.key])
     times = {text: f"; {len(at)} times" if len(at) > 1 else "" for text, at in found.items()}

@@ -68,13 +68,13 @@ def differences(validation: ModelValidation) -> Figure:
 
 
 @styled()
-def overlays(validation: ModelValidation, between: tuple[float, float] | None = None) -> Figure:
+def overlays(validation: ModelValidation) -> Figure:
     """Draw measured and simulated channels of the first run over the arc length."""
     shown = _first(validation.overlays)
 
     def part(one: Overlay) -> tuple[Floats, slice]:
         middle = 0.5 * (one.s[0] + one.s[-1])
-        first, last = np.searchsorted(one.s, between or (middle - NEAR, middle + NEAR))
+        first, last = np.searchsorted(one.s, (middle - NEAR, middle + NEAR))
         return one.s, slice(first, last, max(1, (last - first) // LONGEST))
 
     return _over_arc(shown, part, {"measured": "k", "simulated": "C1"}, 0.7)

@@ -12,11 +12,12 @@ from matplotlib.patheffects import withStroke
 
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
-from railsim.definitions.vehicle.outlines import Box, body_boxes
+from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.plot.style import Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
 View = tuple[int, int]  # axes of the vehicle along the width and the height of the page
+Range = tuple[float, float]
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
 TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
 LABELS = ("$x$ (m), forward", "$y$ (m), to the right", "$z$ (m), down")
@@ -31,25 +32,13 @@ NEAR = (3.0, 0.4)
 
 @styled()
 def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
-    """Draw a vehicle in three views with its elements.
+    """Draw a vehicle in three views with its elements; `title`: by default its name.
 
     Bodies are crosses at their centres of gravity with the boxes of
     `railsim.definitions.vehicle.outlines`, axleboxes squares, wheels circles or lines; every
     element is drawn between its points, with a thin line from each point to the body that it is
-    attached to.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        What to draw.
-    title : str
-        By default the name of the vehicle.
-
-    Returns
-    -------
-    Figure
-        Side and top view of the whole, then of the leading end, and the view from behind; equal
-        scales within each.
+    attached to.  Side and top view of the whole, then of the leading end, and the view from behind;
+    equal scales within each.
     """
     flat = flatten(vehicle)
     kinds = dict.fromkeys(element.definition.kind for element in flat.elements)
@@ -62,18 +51,15 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     for cell, view, limits in zip(cells, (SIDE, TOP, SIDE, TOP, BEHIND), ends, strict=True):
         axes = figure.add_subplot(cell)
         for box in boxes.values():
-            axes.add_patch(_outline(box, view))
+            (x, y), (far_x, far_y) = np.array(box)[:, list(view)]
+            look: Any = {"fc": FILL, "ec": OUTLINE, "lw": 0.7, "zorder": 0.5}
+            axes.add_patch(Rectangle((x, y), far_x - x, far_y - y, **look))
         _draw_view(axes, view, flat, colours, limits)
     figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
     return figure
 
 
-def _outline(box: Box, view: View) -> Rectangle:
-    (x, y), (far_x, far_y) = np.array(box)[:, list(view)]
-    return Rectangle((x, y), far_x - x, far_y - y, fc=FILL, ec=OUTLINE, lw=0.7, zorder=0.5)
-
-
-def _leading_end(flat: FlatVehicle) -> tuple[float, float]:
+def _leading_end(flat: FlatVehicle) -> Range:
     """Range of x around the leading wheelset and its neighbours [m]."""
     leader, *others = flat.of_kind("wheelset")
     first = leader.position[0]
@@ -82,11 +68,7 @@ def _leading_end(flat: FlatVehicle) -> tuple[float, float]:
 
 
 def _draw_view(
-    axes: Axes,
-    view: View,
-    flat: FlatVehicle,
-    colours: dict[str, str],
-    limits: tuple[float, float] | None,
+    axes: Axes, view: View, flat: FlatVehicle, colours: dict[str, str], limits: Range | None
 ) -> None:
     across, upright = view
     if upright == 2:

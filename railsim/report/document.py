@@ -26,27 +26,14 @@ PASSED, OPEN, FAILED = "", "open", "failed"  # kinds of verdicts: green, without
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a page.
-
-    Attributes
-    ----------
-    header : sequence of str
-    rows : sequence of sequences of Cell
-    caption : str
-    words : frozenset of int
-        Columns with text.
-    failed : frozenset of int
-        Rows in red.
-    note : str
-        A sentence below it.
-    """
+    """A table of a page."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[Cell]]
     caption: str = ""
-    words: Collection[int] = (0,)
-    failed: Collection[int] = ()
-    note: str = ""
+    words: Collection[int] = (0,)  # columns with text
+    failed: Collection[int] = ()  # rows in red
+    note: str = ""  # a sentence below it
 
 
 @dataclass(frozen=True)

@@ -215,7 +215,8 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
     pairs = {", ".join((*dict.fromkeys(_wheels(runs[n])), *dict.fromkeys(runs[n].track().rail)))
              for n in one.runs}  # fmt: skip
     rows += [("profiles of wheels and rails", pair) for pair in sorted(pairs)]
-    rows.append(("runs", f"{len(one.runs)}, {sum(_seconds(runs[n]) for n in one.runs):.0f} s"))
+    times = [runs[name]["time"] for name in one.runs]
+    rows.append(("runs", f"{len(times)}, {sum(float(t[-1] - t[0]) for t in times):.0f} s"))
     if one.hunting_frequency is not None:
         rows.append(("frequency of the instability", f"{one.hunting_frequency:.2f} Hz"))
     caption = f"Vehicle, measuring points, profiles: {one.vehicle}"
@@ -236,11 +237,6 @@ def _sources(limits: Any) -> Table:
 def _wheels(result: Result) -> list[str]:
     found = flatten(result.vehicle()).of_kind("wheelset")
     return [name for body in found if body.wheelset for name in body.wheelset.profile]
-
-
-def _seconds(result: Result) -> float:
-    time = result["time"]
-    return float(time[-1] - time[0])
 
 
 def _origin(source: str, checked: bool) -> str:

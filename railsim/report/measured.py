@@ -83,7 +83,8 @@ def as_section(part: Part, number: int) -> Section:
     return found
 
 
-def _drawn(figures: Mapping[str, Figure]) -> list[Drawing]:
+def drawn(figures: Mapping[str, Figure]) -> list[Drawing]:
+    """Return figures by their names as drawings with captions."""
     return pictures({name: as_png(figure) for name, figure in figures.items()}, CAPTIONS)
 
 
@@ -101,7 +102,7 @@ def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
     text = words.get(found.verdict, "The model matches the test within all limits.")
     sections = [
         Section("Differences and limits", tables=[found.table()]),
-        Section("Pictures", drawings=[*_drawn(validation_figures(found)), *more]),
+        Section("Pictures", drawings=[*drawn(validation_figures(found)), *more]),
         Section("Values of the sections", [UNITS], [found.section_table()]),
     ]
     title = f"{found.vehicle} against {', '.join(found.runs)}"
@@ -133,16 +134,6 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
     title = f"{record['vehicle']}: identified parameters"
     good = not coloured and not unidentified
     return Part(title, text, good, record["remarks"], sections, IDENTIFICATION)
-
-
-def validation_page(found: ModelValidation) -> str:
-    """Return the page about a model against a test."""
-    return measured_page([of_validation(found)])
-
-
-def identification_page(found: Identified) -> str:
-    """Return the page about an identification."""
-    return measured_page([of_identification(found.record(), _drawn(identification_figures(found)))])
 
 
 def is_measured(file: str | Path) -> bool:

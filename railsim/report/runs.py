@@ -19,32 +19,12 @@ from railsim.assessment.tables import tables
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
 from railsim.plot.assessment import assessment_figure
+from railsim.report import document as doc
+from railsim.report import spread
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.document import (
-    FAILED,
-    PASSED,
-    Cell,
-    Drawing,
-    Section,
-    Table,
-    as_png,
-    day,
-    listed,
-    of_values,
-)
 from railsim.report.inputs import Used, inputs_of, what_was_run
 from railsim.report.limits import assessed, remark_table
 from railsim.report.published import beside_published
-from railsim.report.spread import (
-    LEAST,
-    WORDS,
-    WORST,
-    columns,
-    command,
-    parameters,
-    spread_rows,
-    worst_rows,
-)
 from railsim.result import Result
 from railsim.text import printable
 from railsim.version import __version__
@@ -66,7 +46,7 @@ def page(
     inputs: Mapping[str, Any] | None = None,
     used: Sequence[Used] = (),
     assessments: Sequence[Assessment] = (),
-    measured: Sequence[Section] = (),
+    measured: Sequence[doc.Section] = (),
 ) -> str:
     """Return the page as HTML.
 
@@ -86,15 +66,15 @@ def page(
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
     verdicts, limits = assessed(results if assessable is None else assessable)
     peaks = any(record["name"] in results for record in _done(records))
-    sections = [_peaks(records, results)] if peaks or len(records) < LEAST else []
+    sections = [_peaks(records, results)] if peaks or len(records) < spread.LEAST else []
     sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
-    if len(_done(records)) > max(LEAST, len(results)):
+    if len(_done(records)) > max(spread.LEAST, len(results)):
         sections.append(_worst(records))
     if found and (data["curves"] or peaks):
         sections.append(_curves(len(data["curves"]), records, results))
     if limits.tables or limits.details:
         sections.append(limits)
-    if len(records) >= LEAST:
+    if len(records) >= spread.LEAST:
         sections.append(_spread(records, data, inputs))
     sections += [*_published(results), *measured]
     sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs))
@@ -130,7 +110,7 @@ def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
     if versions and any(versions):
         parts.append(f"computed by railsim {', '.join(filter(None, versions))}")
     if created and created[-1]:
-        parts.append(f"last run on {day(created[-1])}")
+        parts.append(f"last run on {doc.day(created[-1])}")
     return "; ".join(parts) + "."
 
 
@@ -143,26 +123,26 @@ def _verdict(
     text = f"All {len(records)} runs are complete." if whole else f"Of {len(records)} runs {words}."
     if len(records) == 1:
         text = f"The run is {words[2:]}."
-    first = PASSED if whole else FAILED, text
+    first = doc.PASSED if whole else doc.FAILED, text
     return [{"kind": kind, "text": words} for kind, words in (first, *verdicts)]
 
 
-def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
+def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Section:
     """Peaks of the shown runs side by side, with position and time."""
     shown = [record for record in _done(records) if record["name"] in results]
-    rows: dict[tuple[str, str], list[Cell]] = {}
+    rows: dict[tuple[str, str], list[doc.Cell]] = {}
     for number, record in enumerate(shown):
         wheelsets = results[record["name"]].wheelsets
         for peak in record["peaks"]:
             quantity = QUANTITIES[peak["quantity"]]
-            words = f"{quantity.words}, {WORDS[peak['kind']]}"
+            words = f"{quantity.words}, {spread.WORDS[peak['kind']]}"
             row = rows.setdefault((quantity.name, peak["kind"]), [words])
             row += [""] * (1 + number - len(row))
             wheelset = peak.get("wheelset", "")
             where = f"wheelset {wheelsets.index(wheelset) + 1} " if wheelset in wheelsets else ""
             where += f"{peak.get('side', '')} at {peak['distance']:.1f} m"
             row.append((quantity.text(peak["value"]), where))
-    table = Table(
+    table = doc.Table(
         ["", *(printable(str(record["name"])) for record in shown)],
         [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
     )
@@ -171,60 +151,64 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
         texts = ["The study kept no results of its runs (`--keep summary`); their values follow."]
     elif len(shown) < done:
         texts.append(f"{_largest(len(shown), done)}; all others follow in the table of runs.")
-    return Section("Peaks", texts, tables=[table] if shown else [], id="peaks")
+    return doc.Section("Peaks", texts, tables=[table] if shown else [], id="peaks")
 
 
-def _worst(records: Sequence[Record]) -> Section:
+def _worst(records: Sequence[Record]) -> doc.Section:
     """The runs with the largest values, and where the study has them."""
     done = _done(records)
-    table = Table(["", *(f"{k}." for k in range(1, WORST + 1))], worst_rows(done))
+    table = doc.Table(["", *(f"{k}." for k in range(1, spread.WORST + 1))], spread.worst_rows(done))
     text = (
         f"The largest of {len(done)} runs by magnitude, over all wheels; the table of runs below "
         "has the rest, and the command of each."
     )
-    return Section("Worst runs", [text], tables=[table], id="worst")
+    return doc.Section("Worst runs", [text], tables=[table], id="worst")
 
 
 def _largest(shown: int, done: int) -> str:
     return f"{shown} of {done} runs, those with the largest values"
 
 
-def _assessed(assessment: Assessment) -> Section:
+def _assessed(assessment: Assessment) -> doc.Section:
     """An assessment of comfort, wear or safety: its picture and its tables, folded."""
-    section = Section(f"Assessment: {assessment.standard}", id=assessment.standard)
+    section = doc.Section(f"Assessment: {assessment.standard}", id=assessment.standard)
     figure = assessment_figure([assessment])
     if figure is not None:
-        code = b64encode(as_png(figure)).decode()
+        code = b64encode(doc.as_png(figure)).decode()
         words = f"{assessment.vehicle}: values of {assessment.standard}"
         image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(words, code)
-        section.drawings.append(Drawing(assessment.vehicle, "", image))
-    section.details = [of_values(one, str(one.columns[0].heading)) for one in tables(assessment)]
+        section.drawings.append(doc.Drawing(assessment.vehicle, "", image))
+    section.details = [
+        doc.of_values(one, str(one.columns[0].heading)) for one in tables(assessment)
+    ]
     if assessment.remarks:
         section.details.append(remark_table(assessment.remarks))
     return section
 
 
-def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> Section:
+def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> doc.Section:
     if not number:
         text = "The results hold none of the quantities that are drawn here."
-        return Section("Along the track", [text], id="curves")
+        return doc.Section("Along the track", [text], id="curves")
     done = len(_done(records))
     texts = [f"{_largest(len(results), done)}."] if len(results) < done else []
-    return Section("Along the track", texts, plots=[*map(str, range(number))], id="curves")
+    return doc.Section("Along the track", texts, plots=[*map(str, range(number))], id="curves")
 
 
-def _spread(records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str, Any]) -> Section:
+def _spread(
+    records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str, Any]
+) -> doc.Section:
     """Table of all runs, and what their values depend on."""
-    done, varied = _done(records), parameters(records)
+    done, varied = _done(records), spread.parameters(records)
     data["spread"] = {
         "parameters": varied,
-        "columns": columns(records),
+        "columns": spread.columns(records),
         "runs": [
             {
                 "name": printable(str(record["name"])),
                 "status": str(record["status"]),
                 "reason": printable(str(record.get("status_reason", ""))),
-                "command": printable(command(record, inputs)),
+                "command": printable(spread.command(record, inputs)),
             }
             for record in records
         ],
@@ -232,15 +216,15 @@ def _spread(records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str
     header = ["value", "smallest", "in run", "median", "largest", "in run"]
     note = "Peaks and medians over full curves by magnitude, over all wheels."
     caption = f"Spread over {len(done)} runs"
-    table = Table(header, spread_rows(done), caption, (0, 2, 5), note=note)
-    section = Section("Over the study", plots=["runs"], details=[table], id="spread")
-    if len(done) >= LEAST and varied:
+    table = doc.Table(header, spread.spread_rows(done), caption, (0, 2, 5), note=note)
+    section = doc.Section("Over the study", plots=["runs"], details=[table], id="spread")
+    if len(done) >= spread.LEAST and varied:
         section.texts = [f"Varied: {', '.join(varied)}."]
         section.plots.insert(0, "spread")
     return section
 
 
-def _published(results: Mapping[str, Result]) -> list[Section]:
+def _published(results: Mapping[str, Result]) -> list[doc.Section]:
     """Published values beside those of the runs, where there are any."""
     rows = beside_published(results)
     tables = []
@@ -258,34 +242,34 @@ def _published(results: Mapping[str, Result]) -> list[Section]:
         first = own[0].study
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
         header = ["run", "quantity", "evaluated at", "published", "computed", "difference", "rails"]
-        tables.append(Table(header, cells, first.name, (0, 1, 2), note=note))
+        tables.append(doc.Table(header, cells, first.name, (0, 1, 2), note=note))
     title = "Comparison with published values"
-    return [Section(title, tables=tables, id="published")] if tables else []
+    return [doc.Section(title, tables=tables, id="published")] if tables else []
 
 
-def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
+def _remarks(records: Sequence[Record], more: Sequence[str]) -> doc.Section:
     """Runs that failed or ended early, and remarks, equal ones once."""
-    section = Section("Failures and remarks", [*more], id="remarks")
+    section = doc.Section("Failures and remarks", [*more], id="remarks")
     ended: dict[tuple[str, str], list[Record]] = {}
     for record in records:
         if record["status"] != "complete":  # one reason for whatever numbers it tells
             kind = re.sub(r"\d+(\.\d+)?", "#", str(record.get("status_reason", "")))
             ended.setdefault((str(record["status"]), kind), []).append(record)
-    rows: list[list[Cell]] = []
+    rows: list[list[doc.Cell]] = []
     for (status, _), group in sorted(ended.items(), key=lambda item: -len(item[1])):
-        names = listed([str(record["name"]) for record in group])
+        names = doc.listed([str(record["name"]) for record in group])
         rows.append([f"{len(group)}", status, str(group[0].get("status_reason", "")), names])
     said: dict[str, list[str]] = {}
     for record in records:
         for remark in record.get("remarks", ()):
             said.setdefault(str(remark), []).append(str(record["name"]))
     short = sum(map(len, ended.values()))
-    remarks = [[remark, listed(names)] for remark, names in said.items()]
+    remarks = [[remark, doc.listed(names)] for remark, names in said.items()]
     caption = f"{short} of {len(records)} runs did not reach the requested end"
     for table, none in (
-        (Table(["runs", "status", "reason, of the first", "which"], rows, caption, range(1, 4)),
+        (doc.Table(["runs", "status", "reason, of the first", "which"], rows, caption, range(1, 4)),
          "All runs reached the requested end."),
-        (Table(["remark", "runs"], remarks, "Remarks", range(2)),
+        (doc.Table(["remark", "runs"], remarks, "Remarks", range(2)),
          "There are no remarks on the runs."),
     ):  # fmt: skip
         left = len(table.rows) - MOST_ROWS

@@ -7,6 +7,7 @@ functions beside it.  Arrays that come from a file are read when they are first 
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
@@ -101,7 +102,8 @@ class Result:
         arrays = {name: np.asarray(array) for name, array in self._arrays.items()}
         about = self._quantities, self._coordinates, self._attributes, self._profiles
         groups = {group: dict(arrays) for group, arrays in self._groups.items()}
-        return _remade, (arrays, *map(dict, about), groups, self._source)
+        made = partial(Result, source=self._source)
+        return made, (arrays, *map(dict, about), groups)
 
     # -- the arrays ---------------------------------------------------------------------------
 
@@ -156,13 +158,9 @@ class Result:
         held = [[q.name, q.long_name, q.unit, ", ".join(q.dims)] for q in self._quantities.values()]
         columns = ["name", "quantity", "unit", "dimensions"]
         run = Table(["fact", "value"], rows, self.title or "Result")
-        return f"{run.html()}{self._picture()}{Table(columns, held).html()}"
-
-    def _picture(self) -> str:
-        """Return the forces of the wheels as a picture in a page, where there are any."""
-        if not {"Q", "Y", "distance"} <= set(self) or len(self["time"]) < 2:
-            return ""
-        return image_tag(self.plot("Q", "Y"))
+        forces = {"Q", "Y", "distance"} <= set(self) and len(self["time"]) > 1
+        picture = image_tag(self.plot("Q", "Y")) if forces else ""
+        return f"{run.html()}{picture}{Table(columns, held).html()}"
 
     def _names(self) -> tuple[str, ...]:
         return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
@@ -439,11 +437,6 @@ class Result:
                 along = "component" in quantity.dims
                 unit = quantity.component(labels[-1]).unit if along else quantity.unit
                 yield ":".join((name, *labels)), unit, values
-
-
-def _remade(*parts: Any) -> Result:
-    """Return a result from its parts, see `Result.__reduce__`."""
-    return Result(*parts[:-1], source=parts[-1])
 
 
 class FrozenArrays(Mapping[str, Floats]):

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import InputError, argument_error, argument_fault, nearest
+from railsim.errors import Faults, argument_error, argument_fault, nearest
 from railsim.files.access import check_file, whole_file
 from railsim.result.data import Result
-from railsim.result.filters import even_step, low_passed
+from railsim.result.filters import even_step, low_passed, outward_quotient
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
@@ -56,22 +56,20 @@ def selected(
     of SI. Raises InputError: A quantity that the result does not have; a section that was not run;
     a rate that is no number above 0.
     """
-    words = "no such quantity"
-    missing = [name for name in quantities if name not in result]
-    faults = [
-        argument_fault("quantities", n, words, nearest(n, result), "QUANTITY") for n in missing
-    ]
+    faults = Faults(
+        argument_fault("quantities", n, "no such quantity", nearest(n, result), "QUANTITY")
+        for n in quantities
+        if n not in result
+    )
     time, distance = result["time"], result["distance"]
     low, high = between or (-np.inf, np.inf)
     rows = np.flatnonzero((distance >= low) & (distance <= high))
     if between and len(rows) < 2:
-        found = f"{low:g} to {high:g} m"
         allowed = f"within {distance[0]:.1f} to {distance[-1]:.1f} m"
-        faults.append(argument_fault("between", "", found, allowed, "--between"))
-    if rate is not None and not 0.0 < rate < np.inf:
-        faults.append(argument_fault("rate", "", f"found {rate:g}", "above 0 per s", "--rate"))
-    if faults:
-        raise InputError(faults)
+        faults.require(False, "between", f"{low:g} to {high:g} m", allowed)
+    if rate is not None:
+        faults.require(0.0 < rate < np.inf, "rate", f"found {rate:g}", "above 0 per s")
+    faults.check()
     wanted = dict.fromkeys(["time", "distance", *(quantities or result)])
     chosen = {name: quantity for name, quantity in result.quantities.items() if name in wanted}
     instants = time[rows]
@@ -81,7 +79,7 @@ def selected(
                 f"{rate:g} per s: {number:.3g} instants",
                 f"{MOST_INSTANTS:.0e} at most",
             )
-            raise InputError([argument_fault("rate", "", found, allowed, "--rate")])
+            raise argument_error("rate", "", found, allowed, "--rate")
         instants = np.arange(instants[0], instants[-1] + 1e-9, 1.0 / rate)
     arrays = {}
     for name, quantity in chosen.items():
@@ -110,8 +108,7 @@ def _smooth(result: Result, name: str, rate: float) -> Floats:
         return low_passed(x, 1.0 / step, 0.4 * rate)
 
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
-        Y, Q = passed(result["Y"]), passed(result["Q"])
-        return np.array([-1.0, 1.0]) * Y / np.where(Q > 0.0, Q, np.nan)
+        return outward_quotient(passed(result["Y"]), passed(result["Q"]))
     columns = values.reshape(len(time), -1).copy()
     for column in columns.T:
         known = np.isfinite(column)

@@ -14,7 +14,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.track.section import Section
 from railsim.notation import Quantity
 from railsim.result.data import Result
-from railsim.result.filters import even_step, low_passed
+from railsim.result.filters import even_step, low_passed, outward_quotient
 
 FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
 """Quantities whose peaks are also given after the low pass."""
@@ -38,31 +38,16 @@ BY_SIGN = ("dQ_over_Q0",)
 class Peak:
     """An extreme value over time and over all wheels, bodies or sensors of a quantity.
 
-    Attributes
-    ----------
-    quantity : Quantity
-        What it is a value of.
-    value : float
-        The value, with its sign [SI].
-    labels : mapping of str to str
-        Where: dimension to name, such as ``wheelset`` and ``side``.
-    time : float
-        When [s].
-    distance : float
-        Distance of the reference body at that time [m].
-    kind : {"abs", "max", "min"}
-        Largest magnitude, largest or smallest value.
-    smooth : float
-        The same extreme value of the quantity after a low pass of `LOW_PASS`; NaN where it is not
-        known: outputs too seldom, or not at equal times [SI].
+    `smooth`: The same extreme value of the quantity after a low pass of `LOW_PASS`; NaN where it is
+    not known: outputs too seldom, or not at equal times [SI].
     """
 
     quantity: Quantity
-    value: float
-    labels: Mapping[str, str]
-    time: float
-    distance: float
-    kind: str = "abs"
+    value: float  # with its sign [SI]
+    labels: Mapping[str, str]  # where: dimension to name, such as ``wheelset`` and ``side``
+    time: float  # [s]
+    distance: float  # of the reference body at that time [m]
+    kind: str = "abs"  # largest magnitude; or "max", "min": largest or smallest value
     smooth: float = math.nan
 
     @property
@@ -137,14 +122,10 @@ def _low_pass_of(result: Result, name: str, known: dict[str, Floats]) -> Floats 
         return known[part]
 
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
-        outwards = np.array([-1.0, 1.0])
-        Y, Q = passed("Y"), passed("Q")
-        with np.errstate(divide="ignore", invalid="ignore"):
-            smooth = np.where(Q > 0.0, outwards * Y / Q, np.nan)
+        smooth = outward_quotient(passed("Y"), passed("Q"))
+    elif np.isnan(result[name]).any():
+        return None
     else:
-        array = result[name]
-        if np.isnan(array).any():
-            return None
         smooth = passed(name)
     return np.asarray(smooth[evaluated(result)])
 
@@ -152,17 +133,8 @@ def _low_pass_of(result: Result, name: str, known: dict[str, Floats]) -> Floats 
 def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...]:
     """Return the peaks of a result: by magnitude, and by sign for `BY_SIGN`.
 
-    Parameters
-    ----------
-    result : Result
-        Result of a run.
-    names : iterable of str, optional
-        Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
-
-    Returns
-    -------
-    tuple of Peak
-        None of them where the run ended before its first instant was recorded.
+    `names`: Quantities; those of `PEAK_QUANTITIES` that the result has if not given. Returns: none
+    where the run ended before its first instant was recorded.
     """
     if not len(result["time"]):
         return ()
@@ -182,39 +154,21 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
 class MidCurve:
     """Values in a circular element: at its middle, and over the full curve.
 
-    Attributes
-    ----------
-    radius : float
-        Signed radius of the element, positive to the right [m].
-    distance : float
-        Distance of its middle along the track [m].
-    time : float
-        When the reference body is there [s].
-    values : mapping of str to ndarray
-        Quantity to its values, without the dimension time [SI].
-    peaks : tuple of Peak
-        Largest magnitude of every quantity over its dimensions.
-    medians, scatter : mapping of str to ndarray
-        Median over the full curve, and half the distance between the percentiles 15.87 and 84.13,
-        which is one standard deviation of a normal distribution [SI].
-    median_peaks : tuple of Peak
-        Largest median of every quantity over its dimensions.
-    full_curve : (float, float)
-        Where the reference body is while all wheelsets are in the full curve, without the
-        first third of it [m]; where it is shorter than that, its middle.
-    settling : bool
-        Whether the scatter is mostly that of values on their way to a steady state, on smooth
-        rails.
+    `medians`, `scatter`: Median over the full curve, and half the distance between the percentiles
+    15.87 and 84.13, which is one standard deviation of a normal distribution [SI]. `full_curve`:
+    Where the reference body is while all wheelsets are in the full curve, without the first third
+    of it [m]; where it is shorter than that, its middle. `settling`: Whether the scatter is mostly
+    that of values on their way to a steady state, on smooth rails.
     """
 
-    radius: float
-    distance: float
-    time: float
-    values: Mapping[str, Floats]
-    peaks: tuple[Peak, ...]
+    radius: float  # signed, positive to the right [m]
+    distance: float  # of its middle along the track [m]
+    time: float  # when the reference body is there [s]
+    values: Mapping[str, Floats]  # by quantity, without the dimension time [SI]
+    peaks: tuple[Peak, ...]  # largest magnitude of every quantity over its dimensions
     medians: Mapping[str, Floats]
     scatter: Mapping[str, Floats]
-    median_peaks: tuple[Peak, ...]
+    median_peaks: tuple[Peak, ...]  # largest median of every quantity over its dimensions
     full_curve: tuple[float, float]
     settling: bool
 
@@ -238,14 +192,9 @@ def mid_curves(
 
     Those at the middle are interpolated linearly between the two instants around it.
 
-    Parameters
-    ----------
-    result : Result
-        Result with ``distance``.
-    names : iterable of str, optional
-        Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
-    track : Track, optional
-        That of the result; by default it is rebuilt from the text that the result carries.
+    `result`: With ``distance``. `names`: Quantities; those of `PEAK_QUANTITIES` that the result has
+    if not given. `track`: That of the result; by default it is rebuilt from the text that the
+    result carries.
     """
     wanted = _wanted(result, names)
     distance = result["distance"]

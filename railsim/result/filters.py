@@ -161,6 +161,11 @@ def steady_start(sections: Floats, first: Floats) -> Floats:
     return np.asarray(start.reshape(*start.shape, *(1 for _ in first.shape)) * first)
 
 
+def outward_quotient(Y: Floats, Q: Floats) -> Floats:
+    """Derailment quotient Y/Q of left and right wheels, outwards positive; NaN without load."""
+    return np.array([-1.0, 1.0]) * Y / np.where(Q > 0.0, Q, np.nan)
+
+
 def integral(s: Floats, x: Floats) -> Floats:
     """Integral of a record over s, linear between its samples, from its first sample on."""
     steps = np.diff(s).reshape(-1, *(1 for _ in x.shape[1:]))

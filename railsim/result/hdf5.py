@@ -22,7 +22,7 @@ import os
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,8 @@ from railsim.result.reading import open_result
 # what is wrong with the disk rather than with the name
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG)
 _LOG = logging.getLogger(__name__)
+Named = Mapping[str, Any]
+Shape = tuple[int, ...]
 PEAKS = "peaks"  # group of largest and smallest values over all steps
 CHUNK_BYTES = 2**18
 ROWS_AT_ONCE = 2048  # of the coach 4 MB
@@ -98,25 +100,20 @@ class Hdf5Sink(sinks.Sink):
         self._crc: dict[str, int] = {}
         self._waiting = 0
         self._length = 0
-        partial = None
+        # what is written is not read again: HDF5 need not keep chunks, by itself 8 MB of each
+        # quantity; the partial file is locked already
+        how = {"track_order": True, "rdcc_nbytes": 0, "locking": False}
         try:
-            partial = self._partial = PartialFile(self.path, alone=True, option=option)
-            # what is written is not read again: HDF5 need not keep chunks, by itself 8 MB of each
-            # quantity; the partial file is locked already
-            self._file = h5py.File(
-                partial.path, "w", track_order=True, rdcc_nbytes=0, locking=False
-            )
+            with ExitStack() as undo:  # also of an interrupt, before a `with` can see to it
+                self._partial = PartialFile(self.path, alone=True, option=option)
+                undo.callback(self._partial.remove)
+                self._file = h5py.File(self._partial.path, "w", **how)
+                undo.pop_all()
         except OSError as error:
-            if partial is not None:
-                partial.remove()
             if error.errno in FULL:
                 raise OSError(error.errno, os.strerror(error.errno), str(self.path)) from None
             fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another path")
             raise InputError([fault]) from None
-        except BaseException:  # an interrupt, before a `with` can see to it
-            if partial is not None:
-                partial.remove()
-            raise
 
     def begin(
         self,
@@ -136,10 +133,8 @@ class Hdf5Sink(sinks.Sink):
     def _create_datasets(self, length: int | None = None) -> None:
         """Create what is a function of time; with chunks that fit, where the length is known."""
         for name in sorted(self._blocks, key=lambda name: name != "time"):
-            inner = self._blocks[name].shape[1:]
-            self._datasets[name] = _create(
-                self._file, self._quantities[name], inner, length, self._storage
-            )
+            how = self._blocks[name].shape[1:], length, self._storage
+            self._datasets[name] = _create(self._file, self._quantities[name], *how)
 
     def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`; rows wait until they are worth writing."""
@@ -186,12 +181,7 @@ class Hdf5Sink(sinks.Sink):
             _LOG.warning(f"{wanted} has appeared in the meantime; the result is {self.path}")
         return open_result(self.path)
 
-    def _write_rest(
-        self,
-        statics: Mapping[str, Any],
-        profiles: Mapping[str, Profile],
-        groups: Mapping[str, Mapping[str, Any]],
-    ) -> None:
+    def _write_rest(self, statics: Named, profiles: Named, groups: Named) -> None:
         if not self._datasets:
             self._create_datasets(self._waiting)
         if self._waiting:
@@ -281,11 +271,7 @@ def _write_names(file: h5py.Group, dim: str, labels: Sequence[str]) -> None:
 
 
 def _create(
-    file: h5py.File,
-    quantity: Quantity,
-    inner: tuple[int, ...],
-    length: int | None,
-    storage: Storage,
+    file: h5py.File, quantity: Quantity, inner: Shape, length: int | None, storage: Storage
 ) -> h5py.Dataset:
     """Create an empty dataset for a quantity that is a function of time.
 

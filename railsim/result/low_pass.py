@@ -17,7 +17,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.notation import Quantity
 from railsim.result.data import Attributes
-from railsim.result.filters import steady_start
+from railsim.result.filters import outward_quotient, steady_start
 from railsim.result.sinks import ALWAYS, Sink, SinkBefore
 
 ATTENUATION = 80.0  # dB
@@ -93,9 +93,7 @@ class LowPassSink(SinkBefore):
         if not filtered or not len(filtered["time"]):
             return
         if "Y_over_Q" in self._names:
-            Q = filtered["Q"]
-            loaded = np.where(Q > 0.0, Q, np.nan)
-            filtered["Y_over_Q"] = np.array([-1.0, 1.0]) * filtered["Y"] / loaded
+            filtered["Y_over_Q"] = outward_quotient(filtered["Y"], filtered["Q"])
         for name in [name for name in filtered if name.endswith(GAPS)]:
             gaps, of = filtered.pop(name) > 0.0, name.removesuffix(GAPS)
             filtered[of] = np.where(gaps, np.nan, filtered[of])

@@ -19,13 +19,14 @@ import h5py
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import Fault, Faults, InputError, input_error
 from railsim.files.access import is_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result.data import FrozenArrays, Result, frozen
 from railsim.result.integrity import DIGEST, REMEDY, content_digest, sealed
 from railsim.result.sinks import FORMAT, peak_quantity
+from railsim.text import shortened
 
 # what the result of every run holds
 ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
@@ -55,15 +56,8 @@ AS_WRITTEN = "a result as railsim wrote it"
 def open_result(path: str | Path) -> Result:
     """Open a result file; its arrays are read when they are first asked for.
 
-    Parameters
-    ----------
-    path : str or Path
-        File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote.
-
-    Raises
-    ------
-    InputError
-        There is no such file, it is not a result of railsim, or it is damaged.
+    `path`: File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote. Raises InputError:
+    there is no such file, it is not a result of railsim, or it is damaged.
     """
     path = Path(path)
     if not is_file(path):
@@ -89,8 +83,7 @@ def open_run(path: str | Path) -> Result:
     missing = [name for name in ATTRIBUTES if name not in result.attributes]
     missing += [name for name in ARRAYS if name not in result.quantities]
     missing += [name for name in DIMENSIONS if name not in result.coordinates]
-    if missing:
-        raise InputError([Fault(str(path), name, "missing", AS_WRITTEN) for name in missing])
+    Faults(Fault(str(path), name, "missing", AS_WRITTEN) for name in missing).check()
     if result.status not in STATES:
         found = f"'{result.status}'"
         raise input_error(str(path), found, f"allowed: {', '.join(STATES)}", "status")
@@ -107,17 +100,13 @@ def check_result(path: str | Path) -> Result:
 
     Raises InputError: As `open_run`; every array and every input that cannot be used.
     """
-    result = open_run(path)
-    faults: list[Fault] = []
+    result, faults = open_run(path), Faults()
     reads: list[Callable[[], object]] = [result.vehicle, result.track, result.settings]
     reads += [partial(result.__getitem__, name) for name in result]
     for read in reads:
-        try:
+        with faults.caught():
             read()
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return result
 
 
@@ -185,7 +174,7 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
         words = " ".join(str(error).split())
         if isinstance(error, OSError) and error.errno is not None and error.strerror:
             words = os.strerror(error.errno)
-        words = words if len(words) <= 160 else f"{words[:157]}..."
+        words = shortened(words, 160)
         is_hdf5 = isinstance(error, OSError) and "signature not found" in words
         found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
         allowed = "give a result file of railsim (.h5)"
@@ -218,9 +207,14 @@ class _Reader:
             for key, member in some.items():
                 if not isinstance(member, h5py.Dataset):
                     raise self.fault(f"{name}/{key}", "a group within a group")
-        self._check_size(self._path.stat().st_size)
-        if not whole:
-            self._check_digest(facts)
+        size = self._path.stat().st_size
+        if self._declared > DEFLATE_RATIO * size + SPARE_BYTES:
+            found = f"its arrays say {self._declared / 1e9:.3g} GB, it has {size / 1e6:.3g} MB"
+            raise self.fault("", found, REMEDY)
+        if not whole and DIGEST not in facts:
+            raise self.fault(DIGEST, "missing", REMEDY)
+        if not whole and facts[DIGEST] != content_digest(file):
+            raise self.fault(DIGEST, "what it holds is not what its digest says", REMEDY)
         facts.pop(DIGEST, None)
         self._check_facts(facts)
         if known in OLDER:
@@ -275,17 +269,6 @@ class _Reader:
         if declared > held and h5py.h5z.FILTER_DEFLATE not in filters:
             raise self.fault(name, f"says {declared} bytes and holds {held}", REMEDY)
         self._declared += declared
-
-    def _check_size(self, size: int) -> None:
-        if self._declared > DEFLATE_RATIO * size + SPARE_BYTES:
-            found = f"its arrays say {self._declared / 1e9:.3g} GB, it has {size / 1e6:.3g} MB"
-            raise self.fault("", found, REMEDY)
-
-    def _check_digest(self, facts: Mapping[str, Any]) -> None:
-        if DIGEST not in facts:
-            raise self.fault(DIGEST, "missing", REMEDY)
-        if facts[DIGEST] != content_digest(self._file):
-            raise self.fault(DIGEST, "what it holds is not what its digest says", REMEDY)
 
     def _attributes(self, thing: Any, name: str) -> dict[str, Any]:
         """Return attributes as plain values; whole numbers come as numpy's."""

@@ -36,6 +36,11 @@ class Sensor:
         return self.offset + self.arm[0]
 
 
+Placed = Mapping[str, Sensor]
+Motion = Mapping[str, Floats]
+Names = tuple[str, ...]
+
+
 def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     """Sensors of a running test: on the floor and on the bogie frames, and the vehicle's own.
 
@@ -96,11 +101,7 @@ def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
 
 
 def motions(
-    placed: Mapping[str, Sensor],
-    motion: Mapping[str, Floats],
-    bodies: tuple[str, ...],
-    alignment: Alignment,
-    speed: Floats,
+    placed: Placed, motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
 ) -> dict[str, Floats]:
     """Displacements, velocities and absolute accelerations of sensors, float64[time, sensor, 3].
 
@@ -124,11 +125,7 @@ def motions(
 
 
 def readings(
-    placed: Mapping[str, Sensor],
-    motion: Mapping[str, Floats],
-    bodies: tuple[str, ...],
-    alignment: Alignment,
-    speed: Floats,
+    placed: Placed, motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
 ) -> tuple[Floats, Floats]:
     """Readings of sensors over time.
 
@@ -150,11 +147,7 @@ def readings(
 
 
 def _of_bodies(
-    sensors: Sequence[Sensor],
-    motion: Mapping[str, Floats],
-    bodies: tuple[str, ...],
-    alignment: Alignment,
-    speed: Floats,
+    sensors: Sequence[Sensor], motion: Motion, bodies: Names, alignment: Alignment, speed: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Reading at the centre of gravity, angular velocity and acceleration, all in body axes.
 
