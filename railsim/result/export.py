@@ -79,7 +79,7 @@ def selected(
                 f"{rate:g} per s: {number:.3g} instants",
                 f"{MOST_INSTANTS:.0e} at most",
             )
-            raise argument_error("rate", "", found, allowed, "--rate")
+            raise argument_error("rate", found, allowed, option="--rate")
         instants = np.arange(instants[0], instants[-1] + 1e-9, 1.0 / rate)
     arrays = {}
     for name, quantity in chosen.items():
