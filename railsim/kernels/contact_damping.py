@@ -23,10 +23,21 @@ from railsim.kernels.contact_columns import (
     T_Y,
     TURNING,
 )
-from railsim.kernels.contact_table import FLANGE_ROOT, N_PATCH
+from railsim.kernels.contact_table import (
+    FLANGE_ROOT,
+    G_ROLL,
+    G_Y,
+    G_YY,
+    K2_ROLL,
+    K2_Y,
+    K_ROLL,
+    K_Y,
+    N_PATCH,
+)
 from railsim.kernels.support import (
     D_Y_SLIP,
     D_Z_SLIP,
+    DOUBTED,
     FOOT_Y_STIFFNESS,
     FOOT_Z_STIFFNESS,
     SKIP,
@@ -35,6 +46,11 @@ from railsim.kernels.support import (
     D,
     K,
 )
+
+HEAVY = 4.0  # static wheel loads up to which the gradients of the table count in full
+# by how much a patch's change of stiffness may change its force, over its stiffness against the
+# vertical and over that along the motion
+LEAST, MOST = 0.03, 0.5
 
 
 @compiled(python=False, ordered=True)
@@ -96,6 +112,33 @@ def add_to_row(row, first, factor, vector):
     row[first] += factor * vector[0]
     row[first + 1] += factor * vector[1]
     row[first + 2] += factor * vector[2]
+
+
+@compiled(python=False)
+def note_stiffness(system, work, w, n, k, sign, p, vertical):
+    """Note how the `vertical` force of patch `n` of wheelset `w` changes with motions.
+
+    `k`: where the patch begins in `work.look_up`; `sign`: of the side; `p`: penetration [m].
+    The stiffness K of the patch changes along the profile, by the gradients of the table; they lead
+    astray deep in a rail, beyond the table and where corrections do not settle.
+    """
+    patch, t, root = work.patch, work.look_up, sqrt(p)
+    stiffness = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2])
+    patch[NORMAL_STIFFNESS, n] = stiffness / (patch[ANGLE_COS, n] * patch[ANGLE_COS, n])
+    if not system.support.elastic:
+        return
+    light = min(1.0, HEAVY * system.contact.load[w] / vertical)
+    if work.support_step[w, DOUBTED] > 0.0:
+        light = 0.0
+    along_y, along_roll = stiffness * t[k + G_Y], stiffness * t[k + G_ROLL]
+    K_y = light * p * root * (t[k + K_Y] + root * t[k + K2_Y])
+    K_roll = light * p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL])
+    most_y = LEAST * stiffness + MOST * abs(along_y)
+    most_roll = LEAST * stiffness + MOST * abs(along_roll)
+    patch[FORCE_PER_Y, n] = sign * (max(-most_y, min(most_y, K_y)) - along_y)
+    patch[FORCE_PER_Z, n] = stiffness
+    patch[FORCE_PER_ROLL, n] = sign * (max(-most_roll, min(most_roll, K_roll)) - along_roll)
+    patch[TURNING, n] = -light * vertical * t[k + G_YY]
 
 
 @compiled(python=False)

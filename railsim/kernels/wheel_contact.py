@@ -26,16 +26,11 @@ from railsim.kernels.contact_columns import (
     FOOT_X_PER_YAW,
     FOOT_Y,
     FOOT_Z,
-    FORCE_PER_ROLL,
-    FORCE_PER_Y,
-    FORCE_PER_Z,
     MU_N,
     NORMAL,
     NORMAL_DAMPING,
-    NORMAL_STIFFNESS,
     PENETRATION,
     RISE,
-    TURNING,
     W_CHECK,
     W_LIFT,
     W_Q,
@@ -43,7 +38,7 @@ from railsim.kernels.contact_columns import (
     A,
     B,
 )
-from railsim.kernels.contact_damping import couple_stiffness
+from railsim.kernels.contact_damping import couple_stiffness, note_stiffness
 from railsim.kernels.contact_table import (
     G_ROLL,
     G_W,
@@ -104,7 +99,6 @@ from railsim.kernels.wheel_surface import note_surfaces
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
 STEEP = 3.0  # of a flange
-HEAVY = 4.0  # static wheel loads
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 
 
@@ -242,12 +236,13 @@ def wheel_contact(system, work, w, side, state, n):
     if tw > 1.0:
         work.events[w, 4] += 1
     cell_weights(contact, ty, tr, above[9], work.weights)
+    coming = way_ahead(work, side, wheel)
     lift = 1.0
     for patch in range(N_PATCH):
         work.stiffness[patch] = 0.0
         work.stiffness[N_PATCH + patch] = 0.0
         approach[patch] = -1.0
-        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z + highest):
+        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z + highest + coming):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
@@ -267,7 +262,7 @@ def wheel_contact(system, work, w, side, state, n):
     clear_wheel(work.wheel, w, side, lift)
     begin = n
     for patch in range(N_PATCH):
-        if approach[patch] > -NEAR:
+        if approach[patch] > -NEAR - coming:
             n = patch_contact(system, work, w, side, patch, wheel, n)
     if elastic and n > begin + 1:
         couple_stiffness(work, contact.coupling, table, begin, n)
@@ -300,7 +295,8 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     rate = state[SPEED] + state[6 * system.bodies.kind.shape[0] + 6 * contact.body[w]]
     rate -= lever * above[7]
     # to see every zone that may touch, however steep
-    reach = wheel.z + highest + rails.lever[piece] * turned + STEEP * abs(aside)
+    coming = way_ahead(work, side, wheel)
+    reach = wheel.z + highest + rails.lever[piece] * turned + STEEP * abs(aside) + coming
     lift, nearest = 1.0, -1.0
     for number in range(count):
         first = N_PATCH * number
@@ -330,7 +326,7 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     begin = n
     for patch in range(N_PATCH * count):
         p = approach[patch]
-        if p > -NEAR:
+        if p > -NEAR - coming:
             n = patch_contact(system, work, w, side, patch, wheel, n)
         if p > 0.0:
             along = 0.4 * p * p * sqrt(p) * bump[patch, B_K] + p * p * p / 3.0 * bump[patch, B_K2]
@@ -346,6 +342,17 @@ def raise_gap(look_up, first, bump, patch, shear):
     look_up[first] -= bump[patch, B_HEIGHT]
     look_up[first + G_Y] -= bump[patch, B_ACROSS]
     look_up[first + G_ROLL] += shear * bump[patch, B_ACROSS]
+
+
+@compiled(inline=True)
+def way_ahead(work, side, wheel):
+    """How far a patch may come closer during the next step, a steep flange from the side [m]."""
+    change = work.rate_change
+    return work.watch[AHEAD] * (
+        abs(wheel.z_rate)
+        + abs(change[side, CHANGE_Z])
+        + STEEP * (abs(wheel.y_rate) + abs(change[side, CHANGE_Y]))
+    )
 
 
 @compiled(python=False)
@@ -422,16 +429,7 @@ def patch_contact(system, work, w, side, patch, wheel, n):
             column[FOOT_Z, n] = c_z + work.bump[patch, B_RADIUS]
             column[RISE, n] = work.bump[patch, B_RISE]
             column[PENETRATION, n] = p
-            stiffness = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2])
-            # deep in a rail the gradients of the table lead astray
-            light = min(1.0, HEAVY * contact.load[w] / vertical)
-            K_y = light * p * root * (t[k + K_Y] + root * t[k + K2_Y])
-            K_roll = light * p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL])
-            column[NORMAL_STIFFNESS, n] = stiffness / cos_2
-            column[FORCE_PER_Y, n] = wheel.sign * (K_y - stiffness * t[k + G_Y])
-            column[FORCE_PER_Z, n] = stiffness
-            column[FORCE_PER_ROLL, n] = wheel.sign * (K_roll - stiffness * t[k + G_ROLL])
-            column[TURNING, n] = -light * vertical * t[k + G_YY]
+            note_stiffness(system, work, w, n, k, wheel.sign, p, vertical)
             column[NORMAL_DAMPING, n] = contact.damping * fade
             work.patch_index[n, 0] = w
             work.patch_index[n, 1] = side
