@@ -24,6 +24,7 @@ from railsim.cli.common import DONE, ENDED_EARLY, FAILED, LIMIT_EXCEEDED, WRONG_
 from railsim.cli.interrupts import Interrupted
 from railsim.cli.terminal import echo, print_json
 from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
+from railsim.files.access import remove_partial_files
 from railsim.threads import use_one_thread
 from railsim.version import __version__
 
@@ -177,6 +178,7 @@ def _status(given: Sequence[str] | None) -> int:
             return _failed(arguments, FAILED, {"error": str(error)})
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
+            remove_partial_files()  # of one just created no block has taken care yet
             echo(f"railsim: {request}", err=True)
             return request.status
         except BrokenPipeError:
