@@ -37,7 +37,6 @@ from railsim.kernels.contact_table import (
 from railsim.kernels.support import (
     D_Y_SLIP,
     D_Z_SLIP,
-    DOUBTED,
     FOOT_Y_STIFFNESS,
     FOOT_Z_STIFFNESS,
     SKIP,
@@ -47,7 +46,8 @@ from railsim.kernels.support import (
     K,
 )
 
-HEAVY = 4.0  # static wheel loads up to which the gradients of the table count in full
+# static wheel loads up to which the gradients of the table count in full, to nothing at twice that
+HEAVY = 4.0
 # by how much a patch's change of stiffness may change its force, over its stiffness against the
 # vertical and over that along the motion
 LEAST, MOST = 0.03, 0.5
@@ -120,16 +120,14 @@ def note_stiffness(system, work, w, n, k, sign, p, vertical):
 
     `k`: where the patch begins in `work.look_up`; `sign`: of the side; `p`: penetration [m].
     The stiffness K of the patch changes along the profile, by the gradients of the table; they lead
-    astray deep in a rail, beyond the table and where corrections do not settle.
+    astray deep in a rail and beyond the table.
     """
     patch, t, root = work.patch, work.look_up, sqrt(p)
     stiffness = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2])
     patch[NORMAL_STIFFNESS, n] = stiffness / (patch[ANGLE_COS, n] * patch[ANGLE_COS, n])
     if not system.support.elastic:
         return
-    light = min(1.0, HEAVY * system.contact.load[w] / vertical)
-    if work.support_step[w, DOUBTED] > 0.0:
-        light = 0.0
+    light = min(1.0, max(0.0, 2.0 - vertical / (HEAVY * system.contact.load[w])))
     along_y, along_roll = stiffness * t[k + G_Y], stiffness * t[k + G_ROLL]
     K_y = light * p * root * (t[k + K_Y] + root * t[k + K2_Y])
     K_roll = light * p * root * (t[k + K_ROLL] + root * t[k + K2_ROLL])

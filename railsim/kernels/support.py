@@ -111,8 +111,6 @@ SKIP = DOF + 9
 MOVED = DOF + 10
 # heights of wheels that are not round, left and right, and their rates
 HEIGHTS = DOF + 11
-# whether corrections do not settle: slopes are then those of stiffness and normal alone
-DOUBTED = DOF + 15
 SUPPORT_STEP = 24  # whole cache lines
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
@@ -145,7 +143,6 @@ def locate_support(system, work, s):
     for w in range(work.support_step.shape[0]):
         work.support_step[w, PENDING] = 0.0
         work.support_step[w, SKIP] = 0.0
-        work.support_step[w, DOUBTED] = 0.0
         work.support_step[w, PADS] = 1.0
         work.support_step[w, BALLAST] = 1.0
         if rarely(system.support.variation.shape[0] > 0):

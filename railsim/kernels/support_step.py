@@ -38,7 +38,6 @@ from railsim.kernels.support import (
     BY_SLOPES_Y,
     BY_SLOPES_Z,
     DOF,
-    DOUBTED,
     ERROR_Y,
     F_Y,
     FOOT_Y_STIFFNESS,
@@ -75,8 +74,6 @@ from railsim.kernels.support import (
 )
 from railsim.kernels.system import AGAIN, BODY_SIZE, RATES_SIZE, WHOLE, WHOLE_TOLERANCE, Z_0
 from railsim.kernels.wheel_surface import foreseen_heights
-
-DOUBTFUL = 8  # corrections left from which on the slopes are doubted
 
 
 @compiled(python=False)
@@ -328,7 +325,6 @@ def correct_support(system, work, state, left):
             move_rails(system, work, state, wheels, h, left == MOST_CORRECTIONS)
             for w in range(first, min(first + PAIRS, count)):
                 work.events[w, AGAIN] += np.int64(work.support_step[w, MOVED])
-                work.support_step[w, DOUBTED] = 1.0 if left <= DOUBTFUL else 0.0
     if moved:
         return True
     for first in range(0, count, PAIRS):

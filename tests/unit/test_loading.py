@@ -260,7 +260,7 @@ def test_file_or_name_of_another_kind_is_told_so(write):
     (fault,) = faults(load_vehicle, "curve_r250")
     assert fault.found == "'curve_r250' is a shipped track"
     (fault,) = faults(load_vehicle, write("run.csv", "t,Q\n0,1\n"))
-    assert fault.allowed == "a file in TOML, not .csv"
+    assert fault.allowed == "a vehicle file in TOML is expected here"
 
 
 def test_missing_file_names_what_is_shipped(tmp_path):
