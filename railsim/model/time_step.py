@@ -153,11 +153,14 @@ class Stability:
             usual = stable if growth < NEUTRAL else usual
         return min(most, usual)
 
-    def choose(self, interval: float) -> float:
-        """Longest stable step that divides the output interval, with the margin; or ModelError."""
+    def choose(self, interval: float, holds: Callable[[float], bool] | None = None) -> float:
+        """Longest stable step that divides the output interval, with the margin; or ModelError.
+
+        `holds`: says of a step whether it does; by default its own stability decides.
+        """
         n = max(1, int(np.ceil(interval / self.longest * (1.0 - 1e-9))))
         while interval / n >= SHORTEST_STEP:
-            if self.holds(interval / n, MARGIN):
+            if holds(interval / n) if holds else self.holds(interval / n, MARGIN):
                 return interval / n
             n = max(n + 1, int(n * 1.1))
         cause = "an element is too stiff for the masses it connects"
@@ -166,9 +169,13 @@ class Stability:
             cause = f"the contact of {names} is too sharp in flange contact"
         raise ModelError(f"no stable step longer than {SHORTEST_STEP:g} s: {cause}")
 
+    def holds_on_straight(self, h: float, margin: float = 1.0) -> bool:
+        """Whether a step `margin` times as long as `h` is stable on straight track."""
+        return self._within(0, *self._straight, margin * h)
+
     def holds(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable, in flange contact too."""
-        if not self._within(0, *self._straight, margin * h):
+        if not self.holds_on_straight(h, margin):
             return False
         if self._flange is None:
             self._flange = self._curving(min(h, self.longest))

@@ -3,13 +3,15 @@
 The longest step that a scheme allows is taken where it is stable for a class of runs: at the lowest
 speed and the highest friction of the class, and in flange contact also at the highest speed and the
 middle friction.  That is judged once and kept on disk: runs of a study that differ by little share
-it, and so do its processes.  Where it does not hold, the run's own speed and friction are judged.
-Either way the step depends on the inputs of the run alone, not on other runs.
+it, and so do its processes.  Where it does not hold, the run's own speed and friction are judged,
+for this step and shorter ones; unless on straight track it does not hold at the other end of the
+class either: then a shorter step is judged for the class.  The step depends on the inputs of the
+run alone, not on other runs.
 """
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -77,6 +79,7 @@ class StepChoice:
         self._inputs = inputs
         self._periods = periods
         self._known: dict[float, float] = {}
+        self._classes: dict[str, Stability] = {}
         self._states = states
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
@@ -140,9 +143,19 @@ class StepChoice:
 
     def _stable(self, speed: float, interval: float) -> float:
         """Longest stable step at a speed that divides the output interval."""
-        stability = self._stability(self._model, speed, self._states.get(speed))
-        longest = interval / max(1, math.ceil(interval / stability.longest * (1.0 - 1e-9)))
-        return longest if self._in_class(speed, longest) else stability.choose(interval)
+        own = self._stability(self._model, speed, self._states.get(speed))
+        by_class = True
+
+        def holds(step: float) -> bool:
+            nonlocal by_class
+            if by_class and self._in_class(speed, step):
+                return True
+            if self._fails_in_class(speed, step):
+                return False
+            by_class = False  # its ends do not tell, for shorter steps neither
+            return own.holds(step, MARGIN)
+
+        return own.choose(interval, holds)
 
     def _digest(self, model: Model) -> str:
         """Hash of all that a model with some friction was made of."""
@@ -153,20 +166,44 @@ class StepChoice:
 
     def _in_class(self, speed: float, step: float) -> bool:
         """Whether a step, with the margin, is stable for the class of a speed and the friction."""
-        lowest, model = class_speed(speed), with_class_friction(self._model)
-        key = f"{self._digest(model)} {lowest!r} {step!r}"
+        model = with_class_friction(self._model)
+        return self._judged("class", model, class_speed(speed), step, Stability.holds)
+
+    def _fails_in_class(self, speed: float, step: float) -> bool:
+        """Whether a step is unstable on straight track at the highest speed and lowest friction."""
+        model = with_class_friction(self._model, least=True)
+        fastest = CLASS * class_speed(speed)
+
+        def fails(stability: Stability, step: float, margin: float) -> bool:
+            return not stability.holds_on_straight(step, margin)
+
+        return self._judged("end of class", model, fastest, step, fails)
+
+    def _judged(
+        self,
+        kind: str,
+        model: Model,
+        speed: float,
+        step: float,
+        judge: Callable[[Stability, float, float], bool],
+    ) -> bool:
+        """Judgement of a step, with the margin, at one end of a class; made once."""
+        end = f"{kind} {self._digest(model)} {speed!r}"
+
+        def judgement() -> dict[str, bool]:
+            try:
+                if end not in self._classes:
+                    self._classes[end] = self._stability(model, speed, None, of_class=True)
+                return {"holds": judge(self._classes[end], step, MARGIN)}
+            except ModelError:  # no steady rolling there: the run's own speed is judged
+                return {"holds": False}
+
+        key = f"{end} {step!r}"
         if key not in _JUDGED:
             if len(_JUDGED) >= MOST_JUDGED:
                 _JUDGED.clear()
-            found = solution("class", key, lambda: {"holds": self._judged(model, lowest, step)})
-            _JUDGED[key] = bool(found["holds"])
+            _JUDGED[key] = bool(solution("class", key, judgement)["holds"])
         return _JUDGED[key]
-
-    def _judged(self, model: Model, speed: float, step: float) -> bool:
-        try:
-            return self._stability(model, speed, None, of_class=True).holds(step, MARGIN)
-        except ModelError:  # no steady rolling there: the run's own speed is judged
-            return False
 
     def _stability(
         self, model: Model, speed: float, state: Floats | None, *, of_class: bool = False
@@ -201,12 +238,13 @@ def class_speed(speed: float) -> float:
     return min(speed, max(lowest, 1.02 * STANDSTILL_SPEED))
 
 
-def with_class_friction(model: Model) -> Model:
-    """Return a model with the coefficients of friction of its track rounded up to their class."""
+def with_class_friction(model: Model, *, least: bool = False) -> Model:
+    """Return a model with the highest coefficients of friction of their class, or the `least`."""
     track = model.system.track
     rail = track.rail.copy()
     friction = rail[:, MU_LEFT : MU_RIGHT + 1, 0]
-    rail[:, MU_LEFT : MU_RIGHT + 1, 0] = FRICTION_CLASS * np.ceil(friction / FRICTION_CLASS - 1e-9)
+    number = np.ceil(friction / FRICTION_CLASS - 1e-9) - float(least)
+    rail[:, MU_LEFT : MU_RIGHT + 1, 0] = FRICTION_CLASS * number
     return replace(model, system=model.system._replace(track=track._replace(rail=rail)))
 
 

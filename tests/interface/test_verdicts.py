@@ -275,7 +275,7 @@ def test_limits_of_the_normal_gauge_pass_no_run_on_another(gauge):
 
 def test_load_cases_of_the_vehicle_count_also_where_no_section_does():
     text = railsim.load_vehicle("coach_manchester").to_toml()  # has a load case `laden`
-    (found,) = assess(made(track(STRAIGHT), 1.0, vehicle=text))
+    (found,) = assess(made(track({"type": "STR", "length": 60.0}), 1.0, vehicle=text))
     loads = condition(found, "load states")
     assert (loads.state, loads.found) == ("not met", "none")
 
