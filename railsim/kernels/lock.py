@@ -15,8 +15,7 @@ def alone(path: Path) -> Iterator[None]:
     """Hold a file of the cache as a lock within the block; a process may take it again in it.
 
     Without a word where there are no locks, or nothing can be stored: each process compiles then.
-    The lock ends with its process.  Where the file is removed while another process waits for it,
-    that one and a third may both go on: they find what was stored.
+    The lock ends with its process.
     """
     handle = None if path in _held else _locked(path)
     if handle is None:
@@ -36,17 +35,22 @@ def _locked(path: Path) -> int | None:
     """Open and lock a file; None where that cannot be done."""
     from filelock import lock_descriptor  # takes 20 ms, and is for those that compile
 
-    try:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
-    except OSError:
-        return None
-    try:
-        while not lock_descriptor(handle, blocking=False):
-            time.sleep(POLL)
-    except BaseException as error:
-        with suppress(OSError):
-            os.close(handle)
-        if not isinstance(error, OSError | NotImplementedError):  # a system without locks
-            raise
-        return None
-    return handle
+    while True:
+        try:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        except OSError:
+            return None
+        try:
+            while not lock_descriptor(handle, blocking=False):
+                time.sleep(POLL)
+            # the process that was waited for has removed the file, and others may hold the next one
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), path.stat()):
+                    return handle
+        except BaseException as error:
+            with suppress(OSError):
+                os.close(handle)
+            if not isinstance(error, OSError | NotImplementedError):  # a system without locks
+                raise
+            return None
+        os.close(handle)

@@ -4,12 +4,14 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 import railsim.kernels
+from railsim.kernels import lock
 
 # `locate_frames` lives in another file than `track_frames`, which it calls; prints the rate of turn
 # about x on straight track, and how often numba had to compile
@@ -94,6 +96,22 @@ def test_processes_that_begin_at_once_compile_once(copied_kernels):
     with ThreadPoolExecutor(3) as threads:
         found = list(threads.map(run, [folder] * 3))
     assert sorted(found) == [(0.0, 0), (0.0, 0), (0.0, 1)]
+
+
+def test_lock_whose_file_was_removed_is_no_lock(tmp_path):
+    """Who waited for the removed file does not go on beside the holder of the next one."""
+    path = tmp_path / "tables.lock"
+    first = lock._locked(path)
+    with ThreadPoolExecutor(1) as threads:
+        waiting = threads.submit(lock._locked, path)
+        time.sleep(2.0 * lock.POLL)  # it has opened the file
+        path.unlink()
+        second = lock._locked(path)
+        os.close(first)
+        time.sleep(3.0 * lock.POLL)
+        assert not waiting.done()
+        os.close(second)
+        os.close(waiting.result(timeout=10.0))
 
 
 @pytest.mark.slow
