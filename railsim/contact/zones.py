@@ -1,5 +1,7 @@
 """Zones of a wheel, each of which has a patch of its own in the contact table."""
 
+import math
+
 import numpy as np
 
 from railsim.arrays import Floats
@@ -13,6 +15,9 @@ JUMP_SEARCH = 1e-4
 
 MOST_WIDENING = 0.040
 """Widening of the gauge from which on a wheel has fallen before the other one has climbed [m]."""
+
+WIDENING_STEP = 5
+"""Tables cover widenings of the gauge up to multiples of this, so that tracks share them [mm]."""
 
 CROWN_SLOPE = 0.3
 """Slope of a rail up to which its surface counts as its top, the tangent of 17 degrees [1]."""
@@ -34,8 +39,17 @@ def table_range(wheel: WheelCurve, rail: RailCurve, widening: float = 0.0) -> tu
     tip = float(wheel.u[int(np.argmax(wheel.r))])
     top = float(rail.Y[int(np.argmax(rail.slope > -CROWN_SLOPE))])
     climbed = np.ceil(1e3 * (top - tip)) / 1e3
-    apart = np.ceil(1e3 * min(max(widening, 0.0), MOST_WIDENING) - 1e-6) / 1e3
-    return -float(climbed + apart) - MORE_INWARDS, float(climbed)
+    return -float(climbed + covered_widening(widening)) - MORE_INWARDS, float(climbed)
+
+
+def covered_widening(widening: float) -> float:
+    """Widening of the gauge that a table for the given one covers [m].
+
+    >>> [covered_widening(widening) for widening in (0.0, 0.003, 0.005, 0.0051, 0.1)]
+    [0.0, 0.005, 0.005, 0.01, 0.04]
+    """
+    asked = min(max(widening, 0.0), MOST_WIDENING)
+    return WIDENING_STEP * math.ceil(1e3 * asked / WIDENING_STEP - 1e-6) / 1e3
 
 
 def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:

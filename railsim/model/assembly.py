@@ -16,6 +16,7 @@ from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
+from railsim.contact.zones import covered_widening
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Drive as DriveDefinition
@@ -356,7 +357,7 @@ def _contact(
                 "centre_height": -body.position[2],
                 "back_to_back": wheelset.back_to_back,
                 "tape_circle_distance": wheelset.tape_circle_distance,
-                "widening": track.widest,  # auxiliary runs stand on plain track
+                "widening": covered_widening(track.widest),  # auxiliary runs stand on plain track
             }
             of_wheel, of_rail = wheelset.profile[side], track.rail[side]
             wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")
