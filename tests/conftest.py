@@ -14,6 +14,7 @@ import railsim.model.solutions
 from railsim.contact.table import TableGrid
 
 ROOT = Path(__file__).parent.parent
+SMALL_GRID = functools.partial(TableGrid, n_w=6)
 collect_ignore = ["extending"]  # modules for a copy of the package, see docs/extending.md
 
 
@@ -38,8 +39,15 @@ def small_contact_tables(monkeypatch):
 
     For tests that need another pair of profiles, another gauge or a new table, not fine values.
     """
-    grid = functools.partial(TableGrid, n_w=6)
-    monkeypatch.setattr(railsim.contact.table, "TableGrid", grid)
+    monkeypatch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+
+
+@pytest.fixture(scope="module")
+def small_contact_tables_in_module():
+    """The same for all tests of a module and the fixtures that they share."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+        yield
 
 
 # a first call may compile, and the machine may be busy: time is no property

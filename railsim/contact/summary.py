@@ -12,7 +12,7 @@ from railsim.contact.elastic import LoadedContact, loaded_contact
 from railsim.contact.exact_normal import ExactContact, exact_contact
 from railsim.contact.geometry import ContactGeometry, contact_geometry
 from railsim.contact.stored_table import cached_contact_table
-from railsim.contact.table import ContactTable, Normal, TableGrid
+from railsim.contact.table import ContactTable, Normal
 from railsim.errors import InputError, ModelError
 from railsim.profiles.profile import Profile
 
@@ -46,7 +46,7 @@ class Pair:
             inclination=self.inclination,
             back_to_back=self.back_to_back,
             centre_height=0.5 * (radii[0] + radii[1]),
-            grid=TableGrid(normal=normal),
+            normal=normal,
         )
 
 

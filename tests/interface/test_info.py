@@ -151,6 +151,7 @@ def test_static_loads_add_up_to_the_weight(capsys):
     )
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_every_load_case_has_its_own_tables(capsys):
     data = data_of(capsys, "metro_b_motor", "--static")
     assert list(data["load_cases"]) == ["design", "full"]
@@ -216,6 +217,7 @@ def test_result_shows_status_dimensions_and_units(capsys, tmp_path):
     assert "vehicle_toml" not in data["attributes"]
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_a_vehicle_of_another_gauge_stands_on_the_rails_of_a_track(tmp_path, capsys):
     metre = ["--set", "assemblies.bogie.assemblies.axle.wheelsets.wheelset.back_to_back=0.925"]
     track = tmp_path / "metre.toml"

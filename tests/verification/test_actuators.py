@@ -242,6 +242,7 @@ def example(tmp_path, monkeypatch):
     plt.close("all")
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_speed_over_a_gradient_and_after_a_profile(example):
     """The fall of speed by the closed response, within 2 %: motors and samples are 75 ms late.
 

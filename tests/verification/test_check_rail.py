@@ -139,6 +139,7 @@ def test_run_begins_on_the_check_rail(how):
     np.testing.assert_allclose(begun["check_rail_force"][-1, :, 1], force, atol=500.0)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_work_at_the_check_rail_is_part_of_the_frictional_power():
     """What a coasting coach loses in the curve, (m + sum(I/r0^2)) V V' = -P, within 1 %."""
     coach = load_vehicle("coach_manchester")

@@ -25,8 +25,8 @@ WHEEL, TRACK, PAD, PAD_DAMPING = 906.5, 245.0, 62e6, 55.4e3
 def crossing(**changes):
     """The transfer from wing to nose alone, whose tables take some seconds."""
     track = load_track("crossing_56e1_r245_1in9.25")
-    part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.9, "end": 50.5}
-    return track.replace(sections=[part], check_rail=[], **changes)
+    part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.45, "end": 50.5}
+    return track.replace(**{"sections": [part], "check_rail": [], **changes})
 
 
 def path_of_the_wheel():
@@ -165,21 +165,21 @@ def thrown(y, vy, track):
 
 def test_wheel_passes_the_nose_on_its_wrong_side():
     """Where the wing has gone aside nothing but the check rail keeps the flange from the nose."""
-    panel = load_track("crossing_56e1_r245_1in9.25")
-    lost = thrown(0.006, 2.5, panel.replace(check_rail=[]))
+    lost = thrown(0.006, 2.5, crossing())
     assert lost.status == "derailed"
     assert "front.outer.wheelset" in lost.attributes["status_reason"]
     assert "wrong side" in lost.attributes["status_reason"]
-    plain = thrown(0.006, 2.5, panel.replace(check_rail=[], sections=[]))
+    plain = thrown(0.006, 2.5, crossing(sections=[]))
     assert plain.status == "complete"  # the plain rail's face is there
-    held = thrown(0.006, 1.5, panel), thrown(0.006, 1.5, panel.replace(check_rail=[]))
+    check_rail = load_track("crossing_56e1_r245_1in9.25").check_rail
+    held = thrown(0.006, 1.5, crossing(check_rail=check_rail)), thrown(0.006, 1.5, crossing())
     aside = [np.abs(run["wheelset_lateral"][:, 0]).max() for run in held]
     assert aside[0] < 0.011 < 0.02 < aside[1]
 
 
 def test_flange_that_climbs_goes_on():
     """Beyond what the tables of the sections cover, 12 mm aside and 2.4 mrad of roll."""
-    run = thrown(0.006, 0.9, load_track("crossing_56e1_r245_1in9.25").replace(check_rail=[]))
+    run = thrown(0.006, 0.9, crossing())
     assert run.status == "complete"
     assert np.abs(run["wheelset_lateral"][:, 0]).max() > 0.0125
 

@@ -160,6 +160,7 @@ def test_what_cannot_be_fixed_is_told(vehicle, track, settings, sentence):
         )
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_a_body_that_cannot_stand_by_itself_is_held_in_its_nominal_position():
     """An anchor without springs; the run says so."""
     vehicle = rig("probe", spring=hanging([2e5, 3e5, 4e5]))

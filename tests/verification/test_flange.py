@@ -160,6 +160,7 @@ def growth_beyond_the_vehicle(model, at, step):
         ("power_car_china_star", 300.0, 22.8, 0.22, 8.0),
     ],
 )
+@pytest.mark.usefixtures("small_contact_tables")
 def test_runs_are_stable_where_one_end_of_their_class_does_not_tell(
     name, radius, speed, friction, growth, monkeypatch
 ):

@@ -205,6 +205,7 @@ def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
     ],
     always=(0, 3),
 )
+@pytest.mark.usefixtures("small_contact_tables")
 def test_vehicle_runs_its_track_at_the_permitted_speed(vehicle, track, until):
     spec = StudySpec(vehicles=vehicle, tracks=track, speeds="permitted", until=until)
     (case,) = Plan(spec).cases()

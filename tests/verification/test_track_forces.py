@@ -261,6 +261,7 @@ def test_wheels_follow_a_slow_vertical_wave(coach):
     assert np.max(np.abs(z - z[0] - wave)[inside]) < 5e-6
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_rates_of_irregularities_reach_the_contact():
     """A single wheelset is thrown up with the rail's vertical velocity: m z'' = Q - m g.
 
@@ -351,6 +352,7 @@ def test_irregular_rails_mirrored_give_the_mirrored_result(coach, support):
     assert np.ptp(here.Q) > 1.5e4  # it is no smooth run
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_slopes_that_have_learnt_wrongly_are_forgotten():
     """A leading wheel of the Co-Co locomotive in zone 3, 87.82 s after the start, whose lateral
     slope over the slip is at its bound: corrections had overshot fourfold, their relaxation was

@@ -20,6 +20,7 @@ from railsim.observation.pieces import on_grid
 from railsim.result.sensors import all_sensors
 from railsim.track.irregularity import displacement
 
+pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")
 COACH = "coach_25t"
 V, RATE, NOISE, BIAS = 50.0, 1000.0, 0.05, 0.02
 ERRI = {"type": "random", "spectrum": "erri_b176_low", "seed": 7}
@@ -137,7 +138,6 @@ def test_long_waves_move_everything_with_the_track(coach, linear):
     assert abs(H[response.outputs.index("Q.1.left"), 1]) < 1e3
 
 
-@pytest.mark.usefixtures("small_contact_tables")
 def test_mirror_image():
     """Level moves both sides alike and nothing across; cross level and alignment the opposite."""
     vehicle = railsim.load_vehicle("coach_zhai_high_speed")

@@ -78,6 +78,7 @@ def test_chosen_step_and_scheme_find_the_same_too(coach, write):
     assert max(differences(one, two).values()) < 0.02
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_gauge_widening_gives_little_lateral_force(coach):
     """10 mm over 5 m: the treads roll on other radii, 0.4 kN; a slope taken as slip gives 9 kN."""
     wider, _ = widening(0.010)
