@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli import common as cli
+from railsim.errors import listed
 from railsim.files.access import write_text
 
 if TYPE_CHECKING:
@@ -67,14 +68,13 @@ def write_report(
     with_files = [record for record in found.records if record["name"] in found.paths]
     results = found.results(worst_runs(with_files, curves))
     study = found.inputs.get("name")
-    stems = dict.fromkeys(folder_of(file).resolve().stem for file in files[:4])
-    names = str(study) if study else ", ".join(stems)
-    more = f" and {len(files) - 4} more" if len(files) > 4 else ""
+    stems = list(dict.fromkeys(folder_of(file).resolve().stem for file in files))
+    names = str(study) if study else listed(stems, 4)
     every = found.results([record["name"] for record in with_files])
     used = [] if results or not found.inputs else _used(folder_of(files[0]))
     measured = [as_section(part, number) for number, part in enumerate(parts, start=1)]
     runs = found.records, results, found.remarks, every, found.inputs, used
-    write_text(path, page(title or names + more, *runs, assessments, measured))
+    write_text(path, page(title or names, *runs, assessments, measured))
 
 
 def _used(folder: Path) -> "list[Used]":

@@ -236,13 +236,13 @@ def wheel_contact(system, work, w, side, state, n):
     if tw > 1.0:
         work.events[w, 4] += 1
     cell_weights(contact, ty, tr, above[9], work.weights)
-    coming = way_ahead(work, side, wheel)
+    closing = closing_distance(work, side, wheel)
     lift = 1.0
     for patch in range(N_PATCH):
         work.stiffness[patch] = 0.0
         work.stiffness[N_PATCH + patch] = 0.0
         approach[patch] = -1.0
-        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z + highest + coming):
+        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z + highest + closing):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
@@ -262,7 +262,7 @@ def wheel_contact(system, work, w, side, state, n):
     clear_wheel(work.wheel, w, side, lift)
     begin = n
     for patch in range(N_PATCH):
-        if approach[patch] > -NEAR - coming:
+        if approach[patch] > -NEAR - closing:
             n = patch_contact(system, work, w, side, patch, wheel, n)
     if elastic and n > begin + 1:
         couple_stiffness(work, contact.coupling, table, begin, n)
@@ -295,8 +295,8 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     rate = state[SPEED] + state[6 * system.bodies.kind.shape[0] + 6 * contact.body[w]]
     rate -= lever * above[7]
     # to see every zone that may touch, however steep
-    coming = way_ahead(work, side, wheel)
-    reach = wheel.z + highest + rails.lever[piece] * turned + STEEP * abs(aside) + coming
+    closing = closing_distance(work, side, wheel)
+    reach = wheel.z + highest + rails.lever[piece] * turned + STEEP * abs(aside) + closing
     lift, nearest = 1.0, -1.0
     for number in range(count):
         first = N_PATCH * number
@@ -326,7 +326,7 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
     begin = n
     for patch in range(N_PATCH * count):
         p = approach[patch]
-        if p > -NEAR - coming:
+        if p > -NEAR - closing:
             n = patch_contact(system, work, w, side, patch, wheel, n)
         if p > 0.0:
             along = 0.4 * p * p * sqrt(p) * bump[patch, B_K] + p * p * p / 3.0 * bump[patch, B_K2]
@@ -345,7 +345,7 @@ def raise_gap(look_up, first, bump, patch, shear):
 
 
 @compiled(inline=True)
-def way_ahead(work, side, wheel):
+def closing_distance(work, side, wheel):
     """How far a patch may come closer during the next step, a steep flange from the side [m]."""
     change = work.rate_change
     return work.watch[AHEAD] * (

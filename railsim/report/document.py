@@ -103,12 +103,6 @@ def in_words(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def listed(names: Sequence[str]) -> str:
-    """The first names of a list, and how many more there are."""
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more
-
-
 DPI = 130
 IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 

@@ -13,8 +13,8 @@ from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import InputError
-from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, listed
+from railsim.errors import InputError, listed
+from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table
 from railsim.report.inputs import differing
 from railsim.result import Result
 from railsim.result.sensors import sensors

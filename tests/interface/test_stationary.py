@@ -171,6 +171,7 @@ def test_support_is_that_at_the_beginning_of_the_track():
     assert any("support that varies" in one for one in found.remarks)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_twisted_rails_of_another_gauge():
     """The same difference of heights: angle and lever each as 1/2 b, the unloading as 1/(2 b)^2.
 

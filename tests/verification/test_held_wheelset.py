@@ -110,6 +110,7 @@ def test_flange_climbs_at_nadals_limit(friction, limit):
 
 
 @pytest.mark.parametrize(("lateral", "yaw"), [(2e5, 4e5), (5e6, 2e7), (5e6, 1e5), (1e5, 4e7)])
+@pytest.mark.usefixtures("small_contact_tables")
 def test_wheelset_on_springs_in_a_curve(lateral, yaw):
     """Restrained wheelset on cones, small creepages: closed form of its displacement and yaw.
 

@@ -108,6 +108,7 @@ def test_mass_is_the_sum_of_the_source(name):
 
 
 @points("name", [n for n in library_files("vehicle") if not n.startswith(FRICTION)], always=(4, 13))
+@pytest.mark.usefixtures("small_contact_tables")
 def test_stable_at_110_per_cent_of_the_admissible_speed(name):
     """S1002 on 60E1 1:40, friction 0.4, lateral amplitudes of 3 mm: every oscillation decays."""
     vehicle = load_vehicle(name)
