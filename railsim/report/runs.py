@@ -16,6 +16,7 @@ from markupsafe import Markup
 from railsim.assessment.assess import RUNNING
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.tables import tables
+from railsim.errors import listed
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
 from railsim.plot.assessment import assessment_figure
@@ -257,14 +258,14 @@ def _remarks(records: Sequence[Record], more: Sequence[str]) -> doc.Section:
             ended.setdefault((str(record["status"]), kind), []).append(record)
     rows: list[list[doc.Cell]] = []
     for (status, _), group in sorted(ended.items(), key=lambda item: -len(item[1])):
-        names = doc.listed([str(record["name"]) for record in group])
+        names = listed([str(record["name"]) for record in group])
         rows.append([f"{len(group)}", status, str(group[0].get("status_reason", "")), names])
     said: dict[str, list[str]] = {}
     for record in records:
         for remark in record.get("remarks", ()):
             said.setdefault(str(remark), []).append(str(record["name"]))
     short = sum(map(len, ended.values()))
-    remarks = [[remark, doc.listed(names)] for remark, names in said.items()]
+    remarks = [[remark, listed(names)] for remark, names in said.items()]
     caption = f"{short} of {len(records)} runs did not reach the requested end"
     for table, none in (
         (doc.Table(["runs", "status", "reason, of the first", "which"], rows, caption, range(1, 4)),
