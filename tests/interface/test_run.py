@@ -14,6 +14,7 @@ import pytest
 from started import started
 
 import railsim
+import railsim.files.access
 from railsim.cli import main
 from railsim.errors import ModelError
 from railsim.simulation.assumptions import assumptions
@@ -280,6 +281,18 @@ def test_interrupt_leaves_nothing(tmp_path, delay):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert errors.endswith("railsim: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_just_after_a_hidden_file_was_created_leaves_nothing(tmp_path, monkeypatch):
+    """Before any block of code takes care of the file."""
+
+    def interrupted(folder, *_):
+        assert len(list(folder.iterdir())) == 1
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(railsim.files.access, "sweep", interrupted)
+    assert main([*COACH, "--speed", "20", "--until", "5", "--out", str(tmp_path / "x.h5")]) == 130
     assert list(tmp_path.iterdir()) == []
 
 
