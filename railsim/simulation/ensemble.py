@@ -37,7 +37,6 @@ from railsim.kernels.status import (
     INWARD_RANGE,
     NOT_FINITE,
     ROLL_RANGE,
-    STRIKES,
     WHEEL_LIFT,
     WRONG_SIDE,
     YAW_RANGE,
@@ -53,7 +52,6 @@ Group = TypeVar("Group", bound=tuple[Any, ...])
 GRID = ("y0", "dy", "roll0", "droll")
 # statuses that concern a wheelset
 ENDS = (DERAILED, BESIDE_RAIL, WRONG_SIDE, FALLEN, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE)
-OF_WHEELSET = (*ENDS, STRIKES)
 
 
 def contact_grid(model: Model) -> tuple[float | int, ...]:
@@ -146,13 +144,13 @@ class Ensemble:
     def concerned(self, status: int, where: int) -> list[int]:
         """Number the vehicles by what a status of the time loop says of them.
 
-        1 for the one that it concerns and 0 for the others; where that is not known, each has a
-        number of its own.
+        1 for the one that it concerns and 0 for the others; each has a number of its own where that
+        is not known, or wheels strike: others will soon, and each time part of the way is repeated.
         """
         concerned = [False] * len(self.parts)
         if status == NOT_FINITE:
             concerned = [where in part.state for part in self.parts]
-        elif status in OF_WHEELSET:
+        elif status in ENDS:
             concerned = [part.wheelsets.start <= where < part.wheelsets.stop for part in self.parts]
         if sum(concerned) != 1:
             return list(range(len(self.parts)))
