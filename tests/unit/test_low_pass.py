@@ -10,6 +10,7 @@ from railsim.errors import InputError
 from railsim.notation import QUANTITIES
 from railsim.result import MemorySink
 from railsim.result.low_pass import LowPassSink
+from railsim.simulation.sampling import instants_for_each, sampled
 
 NAMES = ("time", "distance", "Q", "Y", "Y_over_Q")
 COORDINATES = {"wheelset": ("only",), "body": ()}
@@ -154,3 +155,15 @@ def test_unknown_quantity_is_refused_with_the_nearest_name():
             duration=0.1,
             settings=settings,
         )
+
+
+@pytest.mark.parametrize("rate", [1.0, 30.0, 100.0, 200.0, 333.0, 500.0, 700.0, 1000.0, 2000.0])
+def test_the_loop_puts_out_the_fewest_whole_parts_that_make_1000_a_second(rate):
+    """At least 1000 a second before the low pass, and at least two for each stored value."""
+    settings = Settings(output_rate=rate, outputs={"low_pass": {"frequency": 0.2 * rate}})
+    every = instants_for_each(settings)
+    assert every >= 2
+    assert every * rate >= 1000.0
+    assert (every - 1) * rate < 1000.0 or every == 2
+    assert sampled(settings).output_rate == every * rate
+    assert sampled(Settings(output_rate=rate)).output_rate == rate

@@ -11,7 +11,7 @@ from scipy.io import savemat
 
 import railsim
 from railsim.definitions.measurement import MeasurementFile
-from railsim.measurement.alignment import aligned
+from railsim.measurement.alignment import aligned, shift_of
 from railsim.measurement.clock import clock_of, delayed
 from railsim.measurement.likeness import suspicions
 from railsim.measurement.position import position
@@ -334,3 +334,14 @@ def test_the_place_is_found_by_curvature(tmp_path):
     run = railsim.load_measurement(tmp_path / "m.toml")
     moved = aligned(run, track)
     assert np.abs(moved.distance - s).max() < 2.0
+
+
+@pytest.mark.parametrize("offset", [0.0, 40.0])
+def test_place_and_correlation_do_not_depend_on_an_offset(offset):
+    """A signal 7 m late: found to a tenth of the grid, alike to the last digits."""
+    s = np.arange(0.0, 600.0, 0.1)
+    x = np.convolve(np.random.default_rng(4).standard_normal(len(s)), np.ones(50), mode="same")
+    found = shift_of(s + 7.0, x + offset, s, x)
+    assert found.shift == pytest.approx(-7.0, abs=0.01)
+    assert found.stretch == pytest.approx(0.0, abs=1e-6)
+    assert found.correlation == pytest.approx(1.0, abs=1e-6)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
 from railsim.identification.fit import _at_best_shares
-from railsim.identification.parameters import Model, Parameter, parsed, scaled
-from railsim.identification.residuals import whiteness
+from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
+from railsim.identification.residuals import Form, whiteness
+from railsim.profiles import load_profile
 
 SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
 PRIMARY, DAMPER = "primary.stiffness.z", "primary.damping.z"
@@ -444,3 +446,24 @@ def test_a_share_of_profiles_begins_in_the_deepest_of_several_valleys():
             return [np.array([(x[1] - 0.2) * (x[1] - 0.7), 0.1 * (x[1] - 0.7)]) for x in points]
 
     assert _at_best_shares(Valleys(), np.zeros(2)).tolist() == [0.0, 0.75]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_share_of_a_second_profile_has_that_share_of_its_heights(share):
+    """The hollow wheel lies 0.9 mm cos^2(pi y/70 mm) below S1002 within 35 mm."""
+    new, mixed = load_profile("S1002"), blended("S1002", "S1002_hollow", share)
+    depth = np.where(np.abs(new.y) < 35e-3, 0.9e-3 * np.cos(np.pi * new.y / 70e-3) ** 2, 0.0)
+    assert np.array_equal(mixed.y, new.y)
+    np.testing.assert_allclose(mixed.z, new.z - share * depth, rtol=0.0, atol=1e-9)
+
+
+def test_spectra_are_compared_in_third_octaves():
+    """From the lower end of the band on: 1, 1.26, 1.59, 2 Hz and so on, three to an octave."""
+    n, step = 20_000, 0.01
+    t = step * np.arange(n)
+    prepared = SimpleNamespace(measured=np.zeros((1, n)), step=step, noise=np.zeros(1))
+    form = Form("spectra", (1.0, 16.0))
+    for band, f in enumerate(2.0 ** ((np.arange(12) + 0.5) / 3.0)):
+        for aside in (2.0**-0.13, 2.0**0.13):
+            (rows,) = form.features(prepared, np.sin(2.0 * np.pi * f * aside * t)[None])
+            assert np.argmax(rows) == band

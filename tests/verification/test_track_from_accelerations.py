@@ -16,6 +16,7 @@ from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.observation import Assumed, irregularity
 from railsim.observation.estimate import BANDS, Estimate, joined
+from railsim.observation.estimate import rms as deviation
 from railsim.observation.pieces import on_grid
 from railsim.result.sensors import all_sensors
 from railsim.track.irregularity import displacement
@@ -419,3 +420,10 @@ def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_
     assert found.flanges == ((1, 40.0, 50.0),)
     expected = np.interp(found.s, [80.0, 100.0], [1.0, 3.0])
     np.testing.assert_allclose(found.values[0], expected, atol=1e-12)
+
+
+def test_deviations_are_the_root_of_the_mean_square_by_parseval():
+    """Powers |X|^2 / n of a series of n values, with a part at half the sampling rate."""
+    x = np.random.default_rng(3).standard_normal((2, 16)) + 2.0 * (-1.0) ** np.arange(16)
+    power = np.abs(np.fft.rfft(x, axis=1)) ** 2 / 16.0
+    np.testing.assert_allclose(deviation(power, 16), np.sqrt(np.mean(x**2, axis=1)), rtol=1e-12)
