@@ -6,6 +6,7 @@ from mechanism_closed_forms import LENGTHS, upper
 
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.values import ends, parameter_values
+from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.dynamics import driven_motion, free_motion
 from railsim.mechanisms.forces import (
@@ -305,3 +306,18 @@ def test_equilibrium_of_a_hanging_arm_is_stable_and_of_a_standing_one_not(tmp_pa
     rests = analyse(load_mechanism(path)).equilibria
     assert [stable for _, stable in rests] == [True, False]
     assert [s for s, _ in rests] == pytest.approx([-np.pi / 2, np.pi / 2], abs=1e-9)
+
+
+def test_a_cubic_through_the_four_rows_of_a_table_is_its_law():
+    """The spline through four rows is the one cubic through them; three are refused."""
+    pair, stroke = ("ground.P", "plate.C"), 0.4
+    rows = [[t, stroke * (3 * (t / 2.0) ** 2 - 2 * (t / 2.0) ** 3)] for t in (0.0, 0.5, 1.4, 2.0)]
+    assignments = ["motion.law=table", f"motion.table={rows}", "motion.points=21"]
+    model = build(load_mechanism("tilting_two_springs", assignments))
+    timed = driven_motion(solve(model, np.linspace(model.start, model.end, 101)))
+    length, rate, _ = timed.motion.length(pair)
+    u = timed.time / 2.0
+    assert length - length[0] == pytest.approx(stroke * (3 * u**2 - 2 * u**3), abs=1e-8)
+    assert rate * timed.speed == pytest.approx(stroke * 3 * (u - u**2), abs=1e-6)
+    with pytest.raises(InputError, match="four rows at least"):
+        load_mechanism("tilting_two_springs", ["motion.law=table", f"motion.table={rows[1:]}"])
