@@ -1,14 +1,19 @@
 """Non-linear critical speed: three methods on Cooperrider's bogie and on a coach."""
 
+from types import SimpleNamespace
+
 import cooperrider
 import numpy as np
 import pytest
 from dynamics import load_track, load_vehicle
 from selection import points
 
+import railsim
+from railsim.kernels.support import LEARNT
 from railsim.linear.eigenmodes import LossOfStability
 from railsim.linear.modes import modes
-from railsim.linear.vehicle import Contact
+from railsim.linear.vehicle import Contact, LinearVehicle
+from railsim.model.equilibrium import tracks_under
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import _by_ramp, critical_speed
@@ -16,6 +21,7 @@ from railsim.stability.diagram import diagram
 from railsim.stability.motion import Stretch
 from railsim.stability.ramp import ramp, sustained
 from railsim.stability.result import CriticalSpeed
+from railsim.stability.vehicle_flow import VehicleFlow
 
 RIGID = load_track("straight").replace(support={"preset": "rigid"})
 
@@ -344,3 +350,20 @@ def test_pieces_of_a_branch_end_at_its_jumps():
     assert not any(p.stable for p in settled_to(Branch("continuation", other), [slow, fast]).points)
     shot = Branch("continuation", [Point(75.0, 4e-3, 5.0, stable=False)])
     assert not settled_to(shot, [slow, fast]).points[0].stable
+
+
+def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest():
+    """The reference body but its place along the track; rails, not what slopes have learnt."""
+    of = LinearVehicle(load_vehicle("coach_manchester"), railsim.load_track("straight"))
+    motion = SimpleNamespace(prepared=of, model=of.model, system=of.system, step_at=lambda _: 1e-3)
+    flow = VehicleFlow(motion, 20.0)
+    rest = flow.full(flow.reduced(of.steady(20.0)), 20.0)
+    changed = rest + np.random.default_rng(1).standard_normal(rest.size)
+    after = flow.full(flow.reduced(changed), 20.0)
+    first = 6 * of.system.bodies.references[0]
+    assert after[first] == rest[first]
+    assert np.array_equal(after[first + 1 : first + 6], changed[first + 1 : first + 6])
+    before, found, known = (tracks_under(of.system, state) for state in (changed, after, rest))
+    assert len(found) == 4
+    assert np.array_equal(found[:, :LEARNT], before[:, :LEARNT])
+    assert np.array_equal(found[:, LEARNT:], known[:, LEARNT:])
