@@ -15,6 +15,7 @@ import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
 from railsim.animation.movie import _polygons
 from railsim.animation.page import scene_data
+from railsim.animation.scene import _drawn
 from railsim.cli import main
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.outlines import body_boxes
@@ -268,3 +269,16 @@ def test_wrong_calls_end_with_status_2(result, tmp_path, capsys):
 def test_numbers_are_rounded_to_what_a_screen_shows(result):
     data = scene_data(result_scene(result, frames=3))
     assert all(v == round(v, 5) for body in data["pose"][1] for v in body)
+
+
+def test_boxes_are_drawn_about_the_centres_of_gravity_where_their_bodies_are():
+    """Middle and half sizes, with the centre of gravity, give back the ends of each box."""
+    vehicle = flatten(railsim.load_vehicle("coach_manchester"))
+    boxes, reference = body_boxes(vehicle), vehicle.body(vehicle.reference)
+    drawn = {body.name: body for body in _drawn(vehicle)}
+    assert len(boxes) == 3
+    for name, (low, high) in boxes.items():
+        half, middle = np.reshape(drawn[name].box, (2, 3))
+        at = np.array([drawn[name].offset + reference.position[0], drawn[name].y, drawn[name].z])
+        np.testing.assert_allclose(at + middle - half, low, atol=1e-12)
+        np.testing.assert_allclose(at + middle + half, high, atol=1e-12)

@@ -13,6 +13,7 @@ from railsim.definitions.track.definition import Track
 from railsim.kernels.contact_columns import W_NORMAL
 from railsim.kernels.support import SETTLED
 from railsim.simulation import simulate
+from railsim.simulation.run_in import follow_rails
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -368,3 +369,23 @@ def test_slopes_that_have_learnt_wrongly_are_forgotten():
         assert not any("iterations" in remark for remark in run.attributes["remarks"])
     # the state still alternates from step to step by this much, before what was learnt is forgotten
     np.testing.assert_allclose(Y[0], Y[1], atol=0.3e3)
+
+
+def test_wheelsets_start_on_irregular_rails_at_the_rates_of_their_displacements(coach):
+    """At V the displacements of the start change at V d/ds, by differences over 2 mm."""
+    rough = {"type": "random", "spectrum": "erri_b176_high", "seed": 3, "fade": 0.0}
+    model = steady(coach, track(irregularities=[rough]), Settings(), 30.0).model
+    n, axles = model.index.n_bodies, model.system.contact.body
+
+    def started(s):
+        state = np.zeros(model.n_state)
+        state[-2:] = s, 30.0
+        follow_rails(model, state)
+        place, rate = state[: 12 * n].reshape(2, n, 6)[:, axles]
+        return place, rate
+
+    (before, _), (_, rate), (after, _) = (started(100.0 + ds) for ds in (-1e-3, 0.0, 1e-3))
+    lateral_vertical_roll = slice(1, 4)
+    change = 30.0 * (after - before)[:, lateral_vertical_roll] / 2e-3
+    assert np.all(np.abs(change) > 1e-4)
+    np.testing.assert_allclose(rate[:, lateral_vertical_roll], change, rtol=1e-2, atol=1e-5)
