@@ -7,6 +7,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from railsim.contact import contact_geometry
+from railsim.contact.curves import single_valued_part
 from railsim.errors import InputError
 from railsim.kernels.contact_geometry import rail_height
 from railsim.profiles import load_profile
@@ -158,3 +159,12 @@ def test_wider_gauge_moves_the_flange_contact_outwards():
 def test_gauge_that_does_not_fit_is_refused(gauge, words):
     with pytest.raises(InputError, match=words):
         contact_geometry(load_profile("S1002"), load_profile("60E1"), gauge=gauge)
+
+
+@pytest.mark.parametrize("start", [3, 4, 5, 6])
+def test_part_of_a_contour_around_a_point_ends_at_undercuts_and_steep_faces(start):
+    """Back by half a metre before the fourth point, a face of slope 5 behind the seventh one."""
+    y = np.array([0.0, 1.0, 2.0, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5])
+    z = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 5.0, 5.0])
+    assert single_valued_part(y, z, start, 1.5) == slice(3, 7)
+    assert single_valued_part(y, z, start, 6.0) == slice(3, 9)

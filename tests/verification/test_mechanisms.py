@@ -5,9 +5,11 @@ import pytest
 from mechanism_closed_forms import LENGTHS, upper
 
 from railsim.definitions.loading import load_mechanism
+from railsim.definitions.mechanism.parts import Slot
 from railsim.definitions.mechanism.values import ends, parameter_values
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.drawing import lines
 from railsim.mechanisms.dynamics import driven_motion, free_motion
 from railsim.mechanisms.forces import (
     Rates,
@@ -321,3 +323,20 @@ def test_a_cubic_through_the_four_rows_of_a_table_is_its_law():
     assert rate * timed.speed == pytest.approx(stroke * 3 * (u - u**2), abs=1e-6)
     with pytest.raises(InputError, match="four rows at least"):
         load_mechanism("tilting_two_springs", ["motion.law=table", f"motion.table={rows[1:]}"])
+
+
+@pytest.mark.parametrize("lift", [1, 2, 3])
+def test_the_line_of_a_slot_holds_its_pin_at_every_position(motions, lift):
+    """The pin lies on the line, which keeps its length and is as much too long at both ends."""
+    motion = motions[f"atr95_lift_{lift}"]
+    guides = [line for line in lines(motion) if line.kind == "guide"]
+    assert guides
+    for guide in guides:
+        first, last = np.moveaxis(guide.xy, 1, 0)
+        joint = motion.model.definition.joints[guide.name]
+        pin, _, _ = motion.point((joint.slot if isinstance(joint, Slot) else joint.prismatic)[0])
+        length = np.linalg.norm(last - first, axis=1)
+        parts = [np.linalg.norm(end - pin, axis=1) for end in (first, last)]
+        assert sum(parts) == pytest.approx(length, abs=1e-9)
+        assert np.ptp(length) < 1e-9
+        assert 0.0 < np.min(parts[0]) == pytest.approx(np.min(parts[1]), abs=1e-9)

@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
-from dynamics import Settings, load_track, load_vehicle, steady
+from dynamics import Settings, load_track, load_vehicle, rotation, steady
 from rig import test_vehicle
 
 from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.kernels.system import WHEELSET
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
+from railsim.kernels.track_frame import OMEGA
 from railsim.linear.circle import POSITION, circle, placed
 from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
-from railsim.linear.steady import NotConverged, led
+from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 from railsim.simulation.run_in import settled
@@ -242,3 +244,29 @@ def test_a_body_twist_moves_the_weight_above_rolling_wheelsets(rolling_on_twist)
     # not depend on the lateral stiffness of the secondary suspension (a hundredth of it: 10 %); on
     # that of the primary it does (0.0095 at 30 kN/m, 0.0091 at 1 MN/m).  Its cause is not known
     assert held.unloading - rolling.unloading == pytest.approx(2.0 * 0.46 * lean / 1.5, rel=0.12)
+
+
+def test_bodies_turn_with_their_track_frames():
+    """u = C^T w with C = C_z(yaw) C_x(roll) C_y(pitch); a wheelset's axes do not spin.
+
+    For any angles and any angular velocity of the frames; the spin u_2 of a wheelset stays.
+    """
+    coach, track = load_vehicle("coach_manchester"), load_track("curve_r250")
+    model = steady(coach, track, Settings(), 20.0).model
+    solver, rng = SteadyRolling(model, model.system), np.random.default_rng(7)
+    state = rng.uniform(-0.6, 0.6, model.n_state)
+    state[-1] = 20.0
+    w = solver.work.frames[:, OMEGA : OMEGA + 3]
+    w[:] = rng.uniform(-0.1, 0.1, w.shape)
+    found = state.copy()
+    solver._turn_with_frames(found[None])
+    n, kinds = model.index.n_bodies, model.system.bodies.kind
+    assert {WHEELSET} < set(kinds)
+    angles = state[: 6 * n].reshape(n, 6)[:, 3:]
+    before, after = (x[6 * n : 12 * n].reshape(n, 6)[:, 3:] for x in (state, found))
+    for b, (roll, pitch, yaw) in enumerate(angles):
+        spins = kinds[b] == WHEELSET
+        C = rotation(yaw, 2) @ rotation(roll, 0) @ rotation(0.0 if spins else pitch, 1)
+        u = 20.0 * C.T @ w[model.system.bodies.frame[b]]
+        u[1] = before[b, 1] if spins else u[1]
+        np.testing.assert_allclose(after[b], u, atol=1e-12)
