@@ -8,9 +8,13 @@ import railsim
 import railsim.studies.stationary
 from railsim.cli import main
 from railsim.definitions.loading import load_stationary_limits
+from railsim.linear.circle import circle
+from railsim.linear.stationary import WALKING_PACE
 from railsim.linear.steady import NotConverged
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
 from railsim.stability.curving import curving
-from railsim.studies.stationary import stationary
+from railsim.studies.stationary import _force, stationary
 
 COACH = ["stationary", "benchmark_vehicle1", "--cant", "0.1"]
 
@@ -188,3 +192,18 @@ def test_twisted_rails_of_another_gauge():
     ratio = [metre / normal for normal, metre in zip(*unloading, strict=True)]
     assert ratio == pytest.approx([(1.5 / 1.065) ** 2] * 2, rel=0.02)
     assert said == [False, True]
+
+
+def test_where_newton_fails_steady_curving_gives_the_same_guiding_force(monkeypatch):
+    """Of the leading outer wheel, outwards, in a curve to the left of 150 m."""
+
+    def never(*_, **__):
+        raise NotConverged("no steady state was found")
+
+    coach, track = railsim.load_vehicle("benchmark_vehicle1"), railsim.load_track("straight")
+    balance = equilibrium(assemble(coach, circle(track), railsim.Settings()), WALKING_PACE)
+    given = coach, balance, track, railsim.Settings(), -1.0 / 150.0
+    by_newton = _force(*given)
+    monkeypatch.setattr(railsim.studies.stationary, "on_twist", never)
+    assert _force(*given) == pytest.approx(by_newton, rel=2e-3)
+    assert by_newton > 10e3
