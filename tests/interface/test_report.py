@@ -10,6 +10,7 @@ from base64 import b64encode
 from hashlib import sha256
 from html import escape, unescape
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,9 +22,10 @@ from test_study import simulated as simulated
 
 import railsim
 from railsim.cli import main
+from railsim.definitions import Settings
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day, in_words
-from railsim.report.inputs import _flat
+from railsim.report.inputs import _flat, _settings
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
@@ -559,3 +561,19 @@ def test_vehicles_are_shown_at_rest_in_their_load_case(tmp_path):
     text = unescape((tmp_path / "r.html").read_text(encoding="utf-8"))
     for part in ("Static wheel loads", "Heights", "Springs", "Weights", "Natural frequencies"):
         assert f"{coach.name}, load 'laden' at rest: {part}" in text
+
+
+def test_settings_other_than_the_default_are_marked_and_the_usual_six_always_shown():
+    def run(**settings):
+        return SimpleNamespace(settings=lambda: Settings(**settings), attributes={"step": 1e-3})
+
+    shown = {"scheme", "step", "output_rate", "creep_law", "fastsim_grid", "normal_contact"}
+    rows = {key: (value, mark) for key, value, mark in _settings({"a": run()}).rows}
+    assert set(rows) == shown
+    assert {mark for _, mark in rows.values()} == {""}
+    both = {"a": run(), "b": run(creep_law="polach", contact_damping=0.0)}
+    rows = {key: (value, mark) for key, value, mark in _settings(both).rows}
+    assert set(rows) == shown | {"contact_damping"}
+    assert {key for key, (_, mark) in rows.items() if mark} == {"creep_law", "contact_damping"}
+    assert rows["creep_law"] == (f"{Settings().creep_law}, polach", "changed")
+    assert rows["step"] == ("1 ms", "")

@@ -1,12 +1,16 @@
 """Auxiliary runs of wear loop and recording car: on the track as it is where the vehicle is."""
 
+from importlib import import_module
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 import railsim
 from railsim.definitions import Settings
 from railsim.linear.track_response import track_response
 from railsim.linear.vehicle import LinearVehicle
-from railsim.observation import contact
+from railsim.observation import Assumed, contact
 from railsim.studies import wear_loop
 
 
@@ -91,3 +95,18 @@ def test_linear_vehicle_has_the_friction_and_support_of_its_place(coach, track):
     )
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert begin != pytest.approx(expected, rel=1e-3, abs=1e-12)
+
+
+def test_a_recording_car_is_linearised_in_the_middle_of_its_record(monkeypatch, coach, track):
+    places = []
+
+    def linear(vehicle, track, *, at):
+        places.append(at)
+        raise Seen
+
+    module = import_module("railsim.observation.irregularity")
+    monkeypatch.setattr(module, "LinearVehicle", linear)
+    record = SimpleNamespace(name="run", distance=np.array([400.0, 420.0, 900.0]))
+    with pytest.raises(Seen):
+        module._Smooth(coach, track, Assumed(), record, {}, 0)
+    assert places == [650.0]

@@ -18,6 +18,7 @@ from railsim.observation import Assumed, irregularity
 from railsim.observation.estimate import BANDS, Estimate, joined
 from railsim.observation.estimate import rms as deviation
 from railsim.observation.pieces import on_grid
+from railsim.plot.observation import irregularity_figure
 from railsim.result.sensors import all_sensors
 from railsim.track.irregularity import displacement
 
@@ -427,3 +428,23 @@ def test_deviations_are_the_root_of_the_mean_square_by_parseval():
     x = np.random.default_rng(3).standard_normal((2, 16)) + 2.0 * (-1.0) ** np.arange(16)
     power = np.abs(np.fft.rfft(x, axis=1)) ** 2 / 16.0
     np.testing.assert_allclose(deviation(power, 16), np.sqrt(np.mean(x**2, axis=1)), rtol=1e-12)
+
+
+def test_picture_shades_the_95_per_cent_interval_of_each_quantity():
+    """1.96 standard deviations above and below the estimate, in mm."""
+    s = np.arange(0.0, 100.5, 0.5)
+    rows = 1e-3 * np.sin(s / 10.0) * np.array([[1.0], [2.0], [3.0], [4.0]])
+    deviations = 1e-4 * np.arange(1.0, 5.0)
+    bands, none = dict.fromkeys(BANDS, rows), np.zeros((len(QUANTITIES), 1))
+    piece = Estimate(
+        s=s, speed=20.0, values=rows, deviations=deviations, bands=bands,
+        band_deviations=dict.fromkeys(BANDS, deviations), wave_numbers=none[0], seen=none,
+        power=none, outputs=("lateral.1",), forces=rows[:1], force_deviations=np.zeros(1),
+    )  # fmt: skip
+    figure = irregularity_figure(joined("run", "coach", [piece], np.array([0.1]), ()))
+    for q, axes in enumerate(figure.axes[:3]):
+        for shaded in axes.collections:
+            corners = shaded.get_paths()[0].vertices
+            for side, end in ((-1.0, np.min), (1.0, np.max)):
+                found = [end(corners[corners[:, 0] == at, 1]) for at in s]
+                assert found == pytest.approx(1e3 * (rows[q] + side * 1.96 * deviations[q]))
