@@ -129,8 +129,10 @@ class Plan:
         try:
             length = spec.until or load_track(spec.tracks[0]).length
         except InputError:
-            return 0.0
-        first = spec.speeds[0] if isinstance(spec.speeds[0], float) else 1.0
+            return ROUGH_DURATION
+        first = spec.speeds[0]
+        if not isinstance(first, float):  # that of the track, or linked
+            return ROUGH_DURATION
         return max(0.0, length - spec.start) / max(first, 0.5)
 
 

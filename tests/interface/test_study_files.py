@@ -16,7 +16,9 @@ from railsim.definitions.loading import load_study, load_track, load_vehicle
 from railsim.definitions.study.definition import Sample, Spread
 from railsim.errors import InputError
 from railsim.studies import user_function
+from railsim.studies.plan import Plan
 from railsim.studies.rows import made_rows, quantile, sampled
+from railsim.studies.spec import StudySpec
 
 COACH = "coach_manchester"
 HEAD = f'format = "railsim-study/1"\nname = "n"\nvehicles = ["{COACH}"]\ntracks = ["{CURVE}"]\n'
@@ -248,3 +250,26 @@ def test_permitted_speed_needs_both_speeds(tmp_path):
         combinations([COACH], [tmp_path / "line.toml"], ["permitted"])
     (fault,) = caught.value.faults
     assert (fault.key, fault.found) == ("speed", "missing")
+
+
+@pytest.mark.parametrize(
+    ("given", "workers", "words"),
+    [
+        ({"duration": 120.0}, 1, "some 7 days on 1 cores"),
+        ({"start": 100.0, "until": 1300.0}, 1, "some 4 days on 1 cores"),
+        ({"start": 100.0, "until": 1300.0}, 3, "some 35 hours on 3 cores"),
+        ({"start": 1300.0, "until": 1300.0}, 1, "some 35 hours on 1 cores"),
+        # not looked at, or at a speed that is not known yet: a minute
+        ({"tracks": ["nowhere"]}, 1, "some 4 days on 1 cores"),
+        ({"speeds": ["permitted"], "until": 1300.0}, 1, "some 4 days on 1 cores"),
+    ],
+)
+def test_too_many_runs_are_refused_with_the_time_that_they_would_take(given, workers, words):
+    """A second of a core for a minute at 20 m/s, and half a second besides: 250 000 times."""
+    values = tuple(f"{k / 1000}" for k in range(1, 501))
+    spec = StudySpec(
+        **{"vehicles": ["coach_manchester"], "tracks": ["straight"], "speeds": [20.0], **given},
+        grid={"track.friction": values, "track.gauge": values},
+    )
+    with pytest.raises(InputError, match=f"250,000 runs, {words}"):
+        Plan(spec, workers)
