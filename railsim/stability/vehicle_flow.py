@@ -8,10 +8,11 @@ rates are counted from steady rolling at the speed at hand.
 import numpy as np
 
 from railsim.arrays import Floats, Integers
-from railsim.kernels.state import N_SCALARS, SPEED, drive_begin, internal_begin, smoothed_begin
-from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
+from railsim.kernels.state import SPEED, drive_begin, internal_begin, smoothed_begin
+from railsim.kernels.support import DOF, LEARNT
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
+from railsim.model.equilibrium import tracks_under
 from railsim.model.work import CONSTANT_SPEED
 from railsim.stability.motion import LeftRange, VehicleMotion
 
@@ -51,12 +52,9 @@ class VehicleFlow:
         found += [(internal_begin(n) + i, FORCE) for i in range(m)]
         found += [(drive_begin(n, m) + i, DRIVE) for i in range(m)]
         if system.support.elastic:
-            end = model.n_state - N_SCALARS
-            first = end - SUPPORT_SIZE * len(system.contact.body)
-            for k in range(first, end):
-                entry = (k - first) % SUPPORT_SIZE
-                if entry < LEARNT:  # what slopes have learnt is no motion: a period begins without
-                    found.append((k, OF_TRACK[entry // DOF]))
+            # what slopes have learnt is no motion: a period begins without
+            tracks = tracks_under(system, np.arange(float(model.n_state)))[:, :LEARNT]
+            found += [(int(k), OF_TRACK[i // DOF]) for row in tracks for i, k in enumerate(row)]
         indices, floors = zip(*found, strict=True)
         return np.array(indices, dtype=np.int64), np.array(floors)
 
