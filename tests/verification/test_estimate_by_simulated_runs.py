@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import railsim
+from railsim.observation import simulated
 from railsim.observation.innovations import Powers, likely_sizes, spectra_of
 from railsim.observation.pieces import STEP, Piece
 from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, refined
@@ -130,3 +131,27 @@ def test_a_run_on_track_that_differs_from_place_to_place_begins_at_its_place(cha
     run = SimulatedRun(coach, track.replace(**changes), piece, [], [])
     assert not run.is_steady
     assert run._start == pytest.approx(400.0)
+
+
+@pytest.mark.parametrize(("widening", "begin"), [(None, 100.0), ([[0.0, 0.01]], 500.0)])
+def test_a_run_goes_from_100_m_ahead_of_its_piece_to_15_m_beyond(monkeypatch, widening, begin):
+    """On rails that are irregular as far as that; where all places are alike it begins at 0."""
+    seen = {}
+
+    def simulate(vehicle, track, **how):
+        seen.update(how, track=track)
+        raise LookupError
+
+    monkeypatch.setattr(simulated, "simulate", simulate)
+    track, grid = railsim.load_track("straight"), 500.0 + STEP * np.arange(N)
+    track = track.replace(gauge_widening=widening) if widening else track
+    piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 40.0), 500.0)
+    run = SimulatedRun(railsim.load_vehicle("coach_manchester"), track, piece, [], [])
+    with pytest.raises(LookupError):
+        run(np.zeros((4, N)))
+    end = begin + STEP * (N - 1)
+    assert (seen["start"], seen["until"]) == pytest.approx((begin - 100.0, end + 15.0))
+    rows = seen["track"].irregularities[0].rows
+    assert rows[0][0] <= begin - 100.0
+    assert rows[-1][0] > end + 15.0
+    assert seen["track"].length > end + 15.0
