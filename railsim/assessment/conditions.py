@@ -6,7 +6,7 @@ vehicle.
 A fault mode needs only one judged section, in any zone.
 """
 
-from collections import Counter
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +22,7 @@ from railsim.definitions.limits import (
     TrackTarget,
     Value,
     Zone,
+    up_to,
 )
 from railsim.definitions.vehicle.tables import Service
 from railsim.result import Result
@@ -120,12 +121,26 @@ def zone_conditions(
         words = f"{right} sections to the right, {n - right} to the left"
         state = _stated(0 < right < n)
         found.append(Condition("curves to both hands", place, state, words, "both", "ours"))
-    times = Counter((row.realisation, round(row.section.begin, 1)) for row in rows)
-    again = sum(times.values()) - len(times)
+    again = n - _independent(rows)
     words = f"{again} of {n} on irregularities that another section has as well"
     state = _stated(not again)
     found.append(Condition("independent sections", place, state, words, "none", "ours"))
     found.append(_quality(place, rows, limits.track_quality, service))
+    return found
+
+
+def _independent(rows: Sequence[SectionRow]) -> int:
+    """Largest number of sections of which no two share a part of the same irregularities.
+
+    Runs at different speeds begin to count at different places, so that their sections need not
+    coincide.  Taken in the order of their ends, each that overlaps none before it: the largest
+    number of intervals that are disjoint.
+    """
+    found, ends = 0, dict[str, float]()
+    for row in sorted(rows, key=lambda row: row.section.end):
+        if row.section.begin > ends.get(row.realisation, -math.inf) - 0.1:
+            ends[row.realisation] = row.section.end
+            found += 1
     return found
 
 
@@ -200,7 +215,7 @@ def _conicity(
         why = "no classes in the limits file" if classes is None else "a wheelset that fits"
         return [Condition(name, "", NOT_CHECKED, "not known", why) for name in names]
     speed = service.admissible_speed
-    high = next((least for v, least in classes.high if speed <= v), classes.high_above)
+    high = up_to(classes.high, speed, classes.high_above)
     found = f"{known.min():.2f} to {known.max():.2f}"
     required = (
         f"{classes.low:.2f} at most in some sections",

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from railsim.cant import cant_deficiency
-from railsim.definitions.limits import RunningLimits, Zone
+from railsim.definitions.limits import RunningLimits, Zone, up_to
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.section import Section
@@ -156,7 +156,7 @@ def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
 
 def section_length(zone: Zone, speed: float) -> float:
     """Length of a section at a speed [m]."""
-    return next((length for most, length in zone.section if speed <= most), zone.section_above)
+    return up_to(zone.section, speed, zone.section_above)
 
 
 def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service: Service) -> str:

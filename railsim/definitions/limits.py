@@ -7,7 +7,7 @@ A value is `checked` when somebody has compared it with the printed standard; un
 that uses it says so.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
@@ -33,6 +33,17 @@ from railsim.definitions.vehicle.tables import Service
 Rows = Annotated[tuple[tuple[Positive, Positive], ...], Field(min_length=1), rises("first column")]
 Probability = Annotated[float, Field(strict=True, ge=0.5, lt=1.0)]
 ZoneName = Annotated[str, Field(pattern="^[1-4]$")]
+
+
+def up_to(rows: Sequence[tuple[float, float]], speed: float, above: float) -> float:
+    """Value of the first row [speed up to m/s, value] that holds at a speed; `above` beyond.
+
+    Files round the speeds of standards: 220 km/h is 61.1111 m/s there, which is less.
+
+    >>> up_to([(61.1111, 250.0)], 220.0 / 3.6, 500.0), up_to([(61.1111, 250.0)], 61.2, 500.0)
+    (250.0, 500.0)
+    """
+    return next((value for most, value in rows if speed <= most * (1.0 + 1e-3)), above)
 
 
 class Sourced(Definition):
@@ -122,8 +133,7 @@ class ByWheelLoad(Sourced):
     def at(self, place: Situation) -> float:
         """Return the limit [N]."""
         speed = place.service.admissible_speed
-        most = next((m for v, m in self.by_speed if speed <= v * (1.0 + 1e-4)), self.above)
-        return min(self.constant + place.Q0, most)
+        return min(self.constant + place.Q0, up_to(self.by_speed, speed, self.above))
 
 
 class ByRadius(Sourced):

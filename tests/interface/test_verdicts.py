@@ -194,6 +194,17 @@ def test_the_same_irregularities_twice_are_not_independent():
     assert pair(3).found.startswith("6 of 12")
 
 
+def test_sections_that_overlap_on_the_same_irregularities_are_not_independent():
+    """A faster run begins to count further on: its sections lie beside those of the other."""
+    on = track(STRAIGHT, irregularities=[random(3)])
+    (found,) = assess({"a": made(on, FAST), "b": made(on, 1.01 * FAST)})
+    begins = {round(row.section.begin, 1) for row in found.sections}
+    assert len(begins) == len(found.sections) == 12
+    about = condition(found, "independent sections")
+    assert about.state == "not met"
+    assert about.found.startswith("6 of 12")
+
+
 def vehicle(**service):
     import railsim
 
