@@ -8,7 +8,8 @@ On a wheel, from its nominal rolling circle and flange back (EN 15313):
 
 Of a wheelset: distance of the flange backs ``AR``, of the active faces ``SR = AR + 2 Sd``, and the
 play in the gauge, ``gauge - SR``.  Limits are those of the TSI Rolling stock (EU 1302/2014, tables
-of 4.2.3.5.2) for 1435 mm, of ``qR`` that of EN 15313; quoted from memory.
+of 4.2.3.5.2), of ``qR`` that of EN 15313; quoted from memory.  ``AR`` and ``SR`` have limits on
+1435 mm only, widened or narrowed by 30 mm at most.
 """
 
 from math import inf, nan
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from railsim.constants import NORMAL_GAUGE, WIDENED
 from railsim.notation import SIDES
 from railsim.profiles.profile import FLANGE_BACK, Profile
 from railsim.table import Column, Table
@@ -23,12 +25,11 @@ from railsim.table import Column, Table
 FLANK, BELOW_TIP = 0.010, 0.002
 """Where the flank is measured: beyond the nominal rolling circle, below the flange tip [m]."""
 
-# diameters up to: least Sd, least Sh, least SR, least AR [m]
+# diameters up to: least Sd, least SR, least AR; least Sh [m]
 _LEAST = {
-    0.760: (0.0275, 0.0315, 1.415, 1.359),
-    0.840: (0.0250, 0.0295, 1.412, 1.358),
-    inf: (0.0220, 0.0275, 1.410, 1.357),
-}
+    0.760: (0.0275, 1.415, 1.359), 0.840: (0.0250, 1.412, 1.358), inf: (0.0220, 1.410, 1.357)
+}  # fmt: skip
+_LEAST_HEIGHT = {0.630: 0.0315, 0.760: 0.0295, inf: 0.0275}
 _MOST = (0.033, 0.036, 1.426, 1.363)
 LEAST_QR = 0.0065
 
@@ -75,8 +76,11 @@ def gauge_table(
     `gauge`: distance of the flange backs, track gauge [m].
     """
     heights, thicknesses, flanks = zip(*map(wheel_gauge, wheels), strict=True)
-    thickness, height, faces, backs = next(v for most, v in _LEAST.items() if diameter <= most)
-    most_thickness, most_height, most_faces, most_backs = _MOST
+    thickness, *least = next(v for most, v in _LEAST.items() if diameter <= most)
+    height = next(v for most, v in _LEAST_HEIGHT.items() if diameter <= most)
+    most_thickness, most_height, *most = _MOST
+    normal = abs(gauge - NORMAL_GAUGE) <= WIDENED
+    faces, backs = zip(least, most, strict=True) if normal else ((None, None), (None, None))
     active = back_to_back + thicknesses[0] + thicknesses[1]
     rows: list[list[Any]] = []
     for name, words, values, *limits in (
@@ -87,8 +91,8 @@ def gauge_table(
         for side, value in zip(SIDES, values, strict=True):
             rows.append([name, f"{words}, {side}", value, *limits])
     rows += [
-        ["AR", "flange backs", back_to_back, backs, most_backs],
-        ["SR", "active faces", active, faces, most_faces],
+        ["AR", "flange backs", back_to_back, *backs],
+        ["SR", "active faces", active, *faces],
         ["play", "gauge less active faces", gauge - active, None, None],
     ]
     lengths = [

@@ -99,6 +99,8 @@ class Stationary:
         def shown(quantity: str, value: float | None) -> object:
             if value is None or np.isnan(value):
                 return None
+            if np.isinf(value):
+                return "no load"
             if quantity.startswith("angle"):
                 return f"{angle.text(float(np.degrees(value)))} deg"
             return Amount(value, number)
@@ -192,9 +194,9 @@ def stationary(
             roll = partial(_quotient, balance, track, sign * heights, bend)
             combined = found(f"{case}, {name}", roll)
             quotients.append(np.nan if combined is None else combined)
-    level = float(np.max(forces) / load)
+    level = _over(float(np.fmax.reduce(forces)), load)
     values.append(_judged(f"{curve}, level", "guiding Y/Q", level, limits.guiding))
-    worst = float(np.max(quotients))
+    worst = float(np.fmax.reduce(quotients))
     values.append(_judged(f"{curve}, {name}", "guiding Y/Q, combined", worst, limits.guiding))
     name = f"cant {1e3 * cant:g} mm"
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
@@ -288,7 +290,12 @@ def _quotient(balance: Equilibrium, track: Track, heights: Floats, bend: float) 
     """Y/Q of the leading outer wheel in a twisted curve, outwards positive."""
     state, (outer, outwards) = on_twist(balance, track, heights, curvature=bend), _outer(bend)
     assert state.Y is not None  # its wheelsets roll
-    return outwards * float(state.Y[0, outer] / state.Q[0, outer])
+    return _over(outwards * float(state.Y[0, outer]), float(state.Q[0, outer]))
+
+
+def _over(Y: float, Q: float) -> float:
+    """Y/Q; infinite of a wheel without load, held ones being drawn by their rails: no pass."""
+    return np.inf if Q <= 0.0 else Y / Q
 
 
 def _outer(bend: float) -> tuple[int, float]:

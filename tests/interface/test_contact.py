@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from railsim import cli
+from railsim.contact.gauges import gauge_table
 from railsim.profiles import load_profile
 
 NAMES = (
@@ -95,6 +96,27 @@ def test_profiles_may_be_named_alone_and_have_gauge_values(capsys):
     at_3_mm = [row[5] for row in data["conicity_over_gauge"]]
     assert at_3_mm[0] > at_3_mm[1] > at_3_mm[2]  # more play, less conicity of this pair
     assert cli.main(["contact", "S1002", "60E1", "54E1"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("diameter", "least"), [(0.92, 27.5), (0.80, 27.5), (0.76, 29.5), (0.65, 29.5), (0.63, 31.5)]
+)
+def test_least_flange_height_of_small_wheels(diameter, least):
+    """EN 13715 makes flanges 28 mm high for wheels above 760 mm, 30 and 32 mm for smaller ones."""
+    wheel = load_profile("S1002")
+    first, *_ = gauge_table((wheel, wheel), diameter=diameter).records()
+    assert first["name"] == "Sh"
+    assert first["least"] == pytest.approx(1e-3 * least)
+    assert first["verdict"] == ("pass" if diameter > 0.76 else "fail")
+
+
+@pytest.mark.parametrize(("gauge", "verdict"), [(1.445, "fail"), (1.000, ""), (1.668, "")])
+def test_distances_across_the_wheelset_have_limits_on_their_gauge_only(gauge, verdict):
+    wheel = load_profile("S1002")
+    table = gauge_table((wheel, wheel), back_to_back=gauge - 0.07, gauge=gauge)
+    verdicts = {row["name"]: row["verdict"] for row in table.records()}
+    assert [verdicts["AR"], verdicts["SR"]] == [verdict, verdict]
+    assert verdicts["Sh"] == "pass"
 
 
 @pytest.mark.usefixtures("small_contact_tables")

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import railsim
@@ -123,6 +124,32 @@ def test_guiding_takes_the_worse_of_both_hands(vehicle, friction):
         right, left = -hands.Y[0, 0, 0, 0, 0], hands.Y[1, 0, 0, 0, 1]
         assert guiding[-1][0] == pytest.approx(max(right, left) / load, rel=2e-3)
     assert guiding[0] == pytest.approx(guiding[1], rel=1e-3)
+
+
+def test_guiding_with_a_wheel_that_twist_lifts_is_no_pass(monkeypatch):
+    """Held wheelsets are drawn down by their rails: Y over a load below zero is below any limit.
+
+    What no steady state is found for does not hide that another curve exceeds the limit.
+    """
+    stiff = ["assemblies.bogie.assemblies.axle.elements.primary.stiffness=[31e6, 1e6, 20e6]"]
+    coach = railsim.load_vehicle("coach_manchester", stiff)
+    track, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
+    low = limits.guiding.model_copy(update={"value": 0.7})
+    on_level = railsim.studies.stationary.on_twist
+
+    def only_level(*place, curvature):
+        if np.any(place[2]) and curvature < 0.0:
+            raise NotConverged("no steady state was found")
+        return on_level(*place, curvature=curvature)
+
+    monkeypatch.setattr(railsim.studies.stationary, "on_twist", only_level)
+    found = stationary(coach, track, limits.model_copy(update={"guiding": low}))
+    level, combined = (v for v in found.values if v.quantity.startswith("guiding"))
+    assert max(v.value for v in found.values if "permille" in v.case and v is not combined) > 1.0
+    assert level.value == np.inf
+    assert level.exceeded
+    assert combined.exceeded
+    assert "no load" in str(found.table())
 
 
 def test_case_without_steady_state_is_no_pass(monkeypatch):
