@@ -75,7 +75,7 @@ def assess(
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
-    groups = by_vehicle(results)
+    groups = by_vehicle(results, loads=standard in RUNNING)
     if standard in RUNNING:
         return [
             assess_running(

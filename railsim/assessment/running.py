@@ -29,6 +29,7 @@ from railsim.assessment.verdict import all_verdicts, overall
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.loading import load_running_limits
+from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.result import Result
@@ -45,16 +46,16 @@ class _Run:
     values: list[SectionValues] = field(default_factory=list)
 
 
-def by_vehicle(results: Mapping[str, Result]) -> list[dict[str, Result]]:
+def by_vehicle(results: Mapping[str, Result], *, loads: bool) -> list[dict[str, Result]]:
     """Return the runs that belong to one assessment together.
 
-    Those of the same vehicle; or of vehicles of the same name, each in a condition that its
-    service table states.
+    Those of the same vehicle, in all its `loads` or in one; or of vehicles of the same name, each
+    in a condition that its service table states.
     """
     groups: dict[str, dict[str, Result]] = {}
     for name, result in results.items():
         vehicle = result.vehicle()
-        key = f"file {result.attributes['vehicle_toml']}"
+        key = f"file {(vehicle.replace(load=None) if loads else vehicle).to_toml()}"
         if vehicle.service is not None and vehicle.service.condition is not None:
             key = f"name {vehicle.name}"
         groups.setdefault(key, {})[name] = result
@@ -64,12 +65,12 @@ def by_vehicle(results: Mapping[str, Result]) -> list[dict[str, Result]]:
 def _kind(result: Result) -> tuple[str, ...]:
     """What may not be pooled with others, in words."""
     vehicle, track = result.vehicle(), result.track()
-    service = vehicle.service
+    condition = (vehicle.service.condition if vehicle.service else None) or ""
     spectra = [str(getattr(part, "spectrum", part.type)) for part in track.irregularities]
     friction = " / ".join(f"{mu:g}" for mu in track.frictions)
     rails = " / ".join(dict.fromkeys(track.rail))
     return (
-        (service.condition if service else None) or "", vehicle.load or "",
+        condition, vehicle.load or ("" if condition else DESIGN),
         ", ".join(dict.fromkeys(spectra)) or "smooth", f"friction {friction}",
         f"{rails}, inclination {track.inclination:g}, gauge {track.gauge:g} m",
     )  # fmt: skip

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from railsim.assessment import Assessment, assess
+from railsim.assessment.assess import RUNNING
 from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.influences import RADIUS
 from railsim.assessment.running import by_vehicle
@@ -83,7 +84,7 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
     """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
     found: list[Assessment] = []
     remarks: list[str] = []
-    for group in by_vehicle(runs):
+    for group in by_vehicle(runs, loads=standard in RUNNING):
         try:
             found += assess(group, standard, coarse=True)
         except InputError as error:

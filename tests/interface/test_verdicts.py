@@ -233,6 +233,18 @@ def test_loads_in_one_condition_are_not_pooled():
     assert names == ["new", "worn", "worn, laden"]
 
 
+def test_loads_of_one_vehicle_are_assessed_together():
+    """Runs with `--load` of a vehicle without conditions are its two load states."""
+    coach = railsim.load_vehicle("coach_manchester")
+    texts = {load: coach.replace(load=load).to_toml() for load in ("design", "laden")}
+    runs = {load: made(ON_ZONE_4, 23.0, vehicle=text) for load, text in texts.items()}
+    (found,) = assess(runs)
+    assert condition(found, "load states").state == "met"
+    places = {c.place for c in found.conditions if c.name == "number of sections"}
+    assert {"zone 4, design", "zone 4, laden"} <= places
+    assert len(assess(runs, "wear")) == 2
+
+
 def test_fault_mode_is_assessed_for_running_safety_only():
     run = made(ON_ZONE_4, 23.0, vehicle=vehicle(condition="failed damper", fault=True))
     (found,) = assess(run)
