@@ -21,6 +21,7 @@ from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment
 
 FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
+WIDE_ENOUGH = 40.0  # Hz, low pass of a run: twice the highest corner of the standards' filters
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
 AMPLITUDE = 3e-3  # m, of the equivalent conicity
@@ -70,14 +71,23 @@ class Record:
         if float(np.max(np.abs(steps[:-1] - step))) > 1e-3 * step:
             allowed = "a run with settings.output_rate, not output_spacing"
             raise self.fault("time", "unequal time steps", allowed)
-        self.low_pass = result.settings().outputs.low_pass
-        self.coarse = self.low_pass is None and self.rate < FINE_ENOUGH * (1.0 - 1e-3)
+        low_pass, self.coarse, self._loss = result.settings().outputs.low_pass, "", ""
+        if low_pass is not None and low_pass.frequency < WIDE_ENOUGH:
+            self.coarse = f"low-pass filtered at {low_pass.frequency:g} Hz by the run"
+            self._loss = "what the filters of the standards pass above is missing"
+        elif low_pass is None and self.rate < FINE_ENOUGH * (1.0 - 1e-3):
+            self.coarse = f"{self.rate:.4g} samples per second"
+            self._loss = (
+                "too few for instantaneous values, components above half this rate may be aliased "
+                "into the result"
+            )
         if self.coarse and not coarse:
             allowed = (
-                f"at least {FINE_ENOUGH:g} (settings.output_rate=1000), or values low-pass "
-                "filtered by the run (settings.outputs.low_pass); `coarse` assesses it nevertheless"
+                f"at least {FINE_ENOUGH:g} samples per second (settings.output_rate=1000), or "
+                f"values low-pass filtered by the run at {WIDE_ENOUGH:g} Hz or more "
+                "(settings.outputs.low_pass); `coarse` assesses it nevertheless"
             )
-            raise self.fault("time", f"{self.rate:.4g} samples per second", allowed)
+            raise self.fault("time", self.coarse, allowed)
         self._last: _Readings | None = None
 
     def fault(self, key: str, found: str, allowed: str) -> InputError:
@@ -215,8 +225,5 @@ class Record:
         said = self.result.remarks
         found = [f"{self.name}: {one}" if one.startswith(HUNTS) else one for one in said]
         if self.coarse:
-            found.append(
-                f"{self.name}: {self.rate:.4g} samples per second are too few for instantaneous "
-                "values: components above half this rate may be aliased into the result"
-            )
+            found.append(f"{self.name}: {self.coarse}: {self._loss}")
         return found

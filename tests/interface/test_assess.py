@@ -191,6 +191,8 @@ def test_track_quality_stands_beside_the_sections():
     ({"without": ("Q",)}, r"Q: is not in the result; run it with settings.outputs.quantities"),
     ({"without": ("Y",)}, r"Y: is not in the result; run it with settings.outputs.quantities"),
     ({"rate": 200.0}, r"200 samples per second; at least 1000"),
+    ({"settings": '{"outputs": {"low_pass": {"frequency": 5.0}}, "output_rate": 1000.0}'},
+     r"low-pass filtered at 5 Hz by the run; at least 1000 .* at 40 Hz or more"),
     ({"until": 100.0}, r"too short for one section"),
 ])  # fmt: skip
 def test_what_cannot_be_assessed_is_refused(change, message):
@@ -207,6 +209,12 @@ def test_run_without_a_whole_section_says_how_long_one_is():
 def test_coarse_samples_are_taken_when_asked_and_told():
     (found,) = assess(made(track(STRAIGHT), FAST, rate=200.0), coarse=True)
     assert any("too few for instantaneous" in remark for remark in found.remarks)
+
+
+def test_run_without_what_the_filters_pass_is_taken_when_asked_and_told():
+    settings = '{"outputs": {"low_pass": {"frequency": 5.0}}, "output_rate": 1000.0}'
+    (found,) = assess(made(track(STRAIGHT), FAST, settings=settings), coarse=True)
+    assert any("filtered at 5 Hz by the run: what" in remark for remark in found.remarks)
 
 
 def test_low_passed_samples_are_fine():
