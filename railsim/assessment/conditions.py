@@ -107,8 +107,10 @@ def zone_conditions(
     """Conditions of a zone; `rows` are its sections that count."""
     wanted, place, n = limits.zones[report.zone], report.title, len(report.values)
     source, checked = wanted.source, wanted.checked
-    enough = n >= wanted.sections
-    words = str(n) if enough else "; ".join([str(n), *reasons(report.sections)])
+    outside = sum(bool(value.section.reason) for value in report.values)  # taken all the same
+    enough = n >= wanted.sections and not outside
+    words = f"{n}, {outside} of them outside the conditions of the zone" if outside else str(n)
+    words = words if enough else "; ".join([words, *reasons(report.sections)])
     found = [_number(place, words, wanted, met=enough)]
     if not n:
         return found

@@ -183,6 +183,17 @@ def test_results_on_low_and_high_irregularities_are_not_pooled():
     assert zones == [("erri_b176_low", 6), ("erri_b176_high", 6)]
 
 
+def test_sections_outside_the_conditions_are_no_pass_even_if_asked_for():
+    """30 sections of zone 1 at 20 m/s where 36.7 are required: enough only by number."""
+    on = track({"type": "STR", "length": 7700.0})
+    slow, right = (made(on, speed, rate=200.0) for speed in (20.0, FAST))
+    for run, state in ((slow, "not met"), (right, "met")):
+        (found,) = assess(run, coarse=True, all_sections=True)
+        about = condition(found, "number of sections", "zone 1")
+        assert about.state == state
+        assert about.found.startswith("30, 30 of them outside" if run is slow else "30")
+
+
 def test_the_same_irregularities_twice_are_not_independent():
     def pair(second):
         on = [track(STRAIGHT, irregularities=[random(seed)]) for seed in (3, second)]
