@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from railsim.assessment.conditions import MET, Condition
-from railsim.assessment.criteria import SAFETY, VERDICTS
+from railsim.assessment.criteria import SAFETY, VERDICTS, WORDS
 from railsim.assessment.zones import ZoneReport
 from railsim.result import Result
 
@@ -61,7 +61,11 @@ def all_verdicts(
         empty = [(title, row) for title, row in rows if math.isnan(row.share)]
         few = [f"{title}: {row.criterion.words}, {row.place}" for title, row in empty]
         unknown = [f"{where}: too few values for an estimate" for where in few]
-        incomplete = [*stopped, *unknown, *missing]
+        # such as ride without accelerations, track loading of the simplified method
+        nothing = (
+            [] if rows or not reports else [f"{WORDS[name]}: none of its quantities has values"]
+        )
+        incomplete = [*stopped, *unknown, *nothing, *missing]
         if derailed and name == SAFETY:
             value = DERAILED
         elif exceeded:

@@ -8,6 +8,7 @@ from made_record import Q0, curve, made, track
 
 import railsim
 from railsim.assessment import assess
+from railsim.assessment.verdict import all_verdicts
 from railsim.cli import main
 from railsim.errors import InputError
 from railsim.profiles import load_profile
@@ -112,6 +113,24 @@ def test_wheel_above_nadals_limit_before_it_lifts_is_said_to_exceed_it():
 
 
 # three verdicts -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("method", "without", "words"),
+    [
+        ("normal", ("body_acceleration",), "ride"),
+        ("simplified", ("body_acceleration",), "running safety"),
+        ("simplified", (), "track loading"),
+    ],
+)
+def test_what_was_not_measured_is_no_pass(method, without, words):
+    """Also where all conditions of the test are met, which are left out here."""
+    run = made(ON_ZONE_4, 23.0, without=without)
+    (found,) = assess(run, method=method)
+    verdicts = all_verdicts({"run": run}, found.zones, [])
+    names = {"ride": "ride", "running safety": "safety", "track loading": "loading"}
+    assert verdicts[names[words]].value == "incomplete"
+    assert verdicts[names[words]].reasons == (f"{words}: none of its quantities has values",)
 
 
 def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
