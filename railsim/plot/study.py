@@ -58,9 +58,7 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
     others = [None] * len(x.values) if family is None else family.values
     points = list(zip(x.values, others, strict=True))
     figure, cells = _panels(len(quantities))
-    if len(set(points)) < len(points):
-        words = "Medians of the runs at each point; bands from the smallest to the largest"
-        figure.suptitle(words, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
+    _name_medians(figure, points, "; bands from the smallest to the largest")
     for axes, quantity in zip(cells, quantities, strict=True):
         for member, colour in zip(members, colours, strict=True):
             own = None if family is None else [value == member for value in family.values]
@@ -72,6 +70,13 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
     if family is not None:
         _legend(figure, cells[0], family.words)
     return figure
+
+
+def _name_medians(figure: Figure, points: Sequence[Any], more: str = "") -> None:
+    """Say above a picture that it shows medians, where several runs share a point."""
+    if len(set(points)) < len(points):
+        words = f"Medians of the runs at each point{more}"
+        figure.suptitle(words, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
 
 
 def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, member: Any) -> None:
@@ -100,6 +105,7 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
 def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
     """Quantities over two parameters in colours; the median where several runs share a point."""
     figure, cells = _panels(len(quantities))
+    _name_medians(figure, list(zip(x.values, y.values, strict=True)))
     columns, rows = x.different, y.different
     for axes, quantity in zip(cells, quantities, strict=True):
         there: dict[tuple[int, int], list[float]] = {}

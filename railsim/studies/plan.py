@@ -216,7 +216,7 @@ def check_names(points: Sequence[Point]) -> None:
     """Refuse, by InputError, names of runs that are equal, or too long for a file."""
     counts = Counter(point.name for point in points)
     faults = Faults(
-        Fault("study", name, f"{count} runs of this name", "give files with different names")
+        Fault("study", name, f"{count} runs of this name", "each value once; other file names")
         for name, count in counts.items()
         if count > 1
     )

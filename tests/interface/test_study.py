@@ -230,7 +230,7 @@ def test_json_holds_every_record(tmp_path, simulated, capsys):
             "no file 'curve'",
         ),
         (["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "-5"], "-5 m/s"),
-        (["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "20"], "2 runs of this name"),
+        (["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "20"], "name; each value once"),
         (
             ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--grid", "friction=0.3"],
             "vehicle., track. or settings.",

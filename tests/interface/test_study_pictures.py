@@ -74,6 +74,15 @@ def test_map_and_ranking_hold_the_values():
     assert [t.get_text() for t in axes.get_yticklabels()] == ["s", "r", "q", "p"]
 
 
+def test_pictures_name_the_medians_of_runs_that_share_a_point():
+    once = Column("value", [1.0, 2.0, 3.0, 4.0])
+    speed, vehicle = Column("speed (m/s)", SPEED.values[:4]), Column("vehicle", VEHICLE.values[:4])
+    several = [curves_figure([VALUES], SPEED, None), map_figure([VALUES], SPEED, SPEED)]
+    assert all(f.get_suptitle().startswith("Medians of the runs") for f in several)
+    single = [curves_figure([once], speed, vehicle), map_figure([once], speed, vehicle)]
+    assert [f.get_suptitle() for f in single] == ["", ""]
+
+
 def test_runs_that_differ_in_the_vehicle_are_compared(folder, capsys):
     assert main(["compare", str(folder), "--json"]) == 0
     groups = json.loads(capsys.readouterr().out)["groups"]
