@@ -1,7 +1,7 @@
 """``railsim study``: every combination of vehicles, tracks and speeds."""
 
 from collections.abc import Callable, Sequence
-from contextlib import chdir
+from contextlib import chdir, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -131,6 +131,7 @@ def command(
     done = not output.overwrite and (folder / "study.json").exists()
     if not done and how["workers"] != 1 and how["scheduler"] is None:
         begin_server()  # which imports on another core while this process does
+    from railsim.studies.plan import faults_of_file
     from railsim.studies.spec import Execution
     from railsim.studies.study import run_study, stored_spec
     from railsim.studies.user_function import given_again
@@ -150,7 +151,8 @@ def command(
         spec = _spec(file, inputs, quantities, kept)
     lines = RunLines()
     # names of files in a study that goes on count from where it was started
-    with chdir(base), output.studying("study") as studying:
+    own = faults_of_file(file, assignments=not given.overrides) if file else nullcontext()
+    with chdir(base), own, output.studying("study") as studying:
         on_record = None if output.quiet or output.as_json else lines
         beside = ("report.html",) * report
         how |= {"resume": resume, "on_record": on_record, "beside": beside, **studying}

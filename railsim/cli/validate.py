@@ -1,7 +1,7 @@
 """``railsim validate``: check files and list every fault."""
 
 import os
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ import click
 
 from railsim.cli import common as cli
 from railsim.cli.terminal import echo, print_json
-from railsim.errors import InputError
 from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
@@ -109,15 +108,10 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
 def _check_runs(file: str) -> None:
     """Check vehicles, tracks and values of all runs of a study file, as the study does first."""
     from railsim.definitions.loading import load_study
-    from railsim.studies.plan import Plan
-    from railsim.studies.spec import StudySpec
+    from railsim.studies.plan import check_study, faults_of_file
 
-    try:
-        Plan(StudySpec.of_file(load_study(file))).cases()
-    except InputError as error:
-        # what an option would name is in the file
-        own = (replace(fault, file=file) if fault.option else fault for fault in error.faults)
-        raise InputError(own) from None
+    with faults_of_file(file):
+        check_study(load_study(file))
 
 
 def _is_profile(name: str) -> bool:

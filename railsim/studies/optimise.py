@@ -8,6 +8,7 @@ the journal.  Begin reading in `optimise`; `search.py` proposes designs.
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from railsim.studies.designs import (
     values_by_name,
     with_unit,
 )
-from railsim.studies.plan import ROUGH_DURATION, check_number
+from railsim.studies.plan import ROUGH_DURATION, check_number, check_study, faults_of_file
 from railsim.studies.records import finite
 from railsim.studies.search import Task, hypervolume, knee, non_dominated, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
@@ -170,6 +171,8 @@ def optimise(
     wanted = checked(Optimise, definition.optimise.model_dump() | replaced, "optimise")
     runs = wanted.evaluations * definition.runs
     check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
+    with nullcontext() if isinstance(file, Study) else faults_of_file(str(file)):
+        check_study(definition)
     folder = Path(out)
     check_folder(folder)
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)

@@ -14,6 +14,7 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -22,7 +23,7 @@ from typing import Any
 
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import needs_run
-from railsim.definitions.study.definition import value_texts
+from railsim.definitions.study.definition import Study, value_texts
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
 from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
@@ -38,6 +39,8 @@ MOST_RUNS = 200_000
 ROUGH_DURATION = 60.0  # s; simulated time of a run that has not been looked at
 # what a run takes at a rough guess: simulated seconds per second of one core, and seconds besides
 REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
+# options for what a study file may hold instead
+OF_FILE = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +199,39 @@ def _named_files(assignment: str) -> Iterator[str]:
     except (ValueError, RecursionError):
         value = written.strip()
     yield from _file_names(value, of_file=True)
+
+
+def check_study(study: Study) -> None:
+    """Check the runs of a study file, as the study does first.
+
+    Of an optimisation those of the designs at both bounds of all variables. Raises InputError:
+    everything that is wrong in any of them.
+    """
+    spec = StudySpec.of_file(study)
+    if study.optimise is not None:
+        bounds = {
+            key: [str(variable.low), str(variable.high)]
+            for path, variable in study.optimise.variables.items()
+            for key in (path, *variable.also)
+        }
+        spec = spec.changed(linked=[*spec.linked, bounds])
+    Plan(spec).cases()
+
+
+@contextmanager
+def faults_of_file(file: str, *, assignments: bool = True) -> Iterator[None]:
+    """Let faults of what an option would give name the study file that gives it.
+
+    `assignments`: all of them are the file's.
+    """
+    options = {f"--{name}" for name in OF_FILE} | ({"--set"} if assignments else set())
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            replace(fault, file=file, option="") if fault.option in options else fault
+            for fault in error.faults
+        ) from None
 
 
 def check_number(number: int, cores: int, seconds: Callable[[], float]) -> None:

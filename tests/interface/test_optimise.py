@@ -135,6 +135,12 @@ def test_another_file_is_refused(found, capsys):
         ('kind = "curving"', 'kind = "curve"', "analyses.curve"),
         ("speeds = [20.0]", "", "'speeds' is needed"),
         ("[optimise]", "[optimize]", "optimize"),
+        ("primary.stiffness.x", "primary.stiffness.q", "study.toml: vehicle.primary"),
+        (
+            'low = 5e6, high = 40e6, scale = "log"',
+            "low = -5e6, high = 1e6",
+            "0: -5000000.0; must be",
+        ),
     ],
 )
 def test_faults_of_the_file(tmp_path, capsys, old, new, words):

@@ -128,6 +128,8 @@ def test_grid_is_outermost_then_links_then_the_sample():
          "high = 1.0}\n", "power of two"),
         ("speeds = [10.0]\n[sample]\nnumber = 6\nparameters.a = {low = 1.0}\n", "is needed"),
         ("speeds = [10.0]\nspeed = [1.0]\n", "speed"),
+        ('speeds = [10.0]\n[grid]\n"track.frictoin" = [1]\n', "mine.toml: track.frictoin: unknown"),
+        ('speeds = [10.0]\nassignments = ["track.a=1"]\n', "mine.toml: track.a: unknown"),
     ],
 )  # fmt: skip
 def test_fault_of_a_study_file_is_told_by_validate_and_study(tmp_path, capsys, text, words):
