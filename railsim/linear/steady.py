@@ -149,7 +149,7 @@ class SteadyRolling:
         for factor in FACTORS:
             trial = state.copy()
             trial[self._unknowns] += factor * change
-            with suppress(NotConverged):
+            with suppress(NotConverged), np.errstate(over="ignore"):  # a trial may be far off
                 found = self._forces(trial)
                 if np.linalg.norm(found) < (1.0 - 0.1 * factor) * size:
                     return trial, found

@@ -1,10 +1,13 @@
 """Quasi-static curving and standing by Newton's method, against closed forms and the time loop."""
 
+import warnings
+
 import numpy as np
 import pytest
 from dynamics import Settings, load_track, load_vehicle, rotation, steady
 from rig import test_vehicle
 
+import railsim
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import WHEELSET
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
@@ -121,6 +124,16 @@ def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
     assert got[1] == pytest.approx(need[1], rel=1e-3)
     assert -got[0] == pytest.approx(need[0], abs=1e-3 * max(abs(need[0]), 0.1 * weight))
     assert balance.Q0.sum() == pytest.approx(weight, rel=1e-9)
+
+
+def test_a_trial_far_from_the_steady_state_is_no_warning():
+    # the forces of one of its trials overflow
+    soft = railsim.load_vehicle("coach_manchester", ["primary.stiffness.x=5376310"])
+    deficiency = 1.5 * 20.0**2 / (250.0 * GRAVITY) - 0.15
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        track = railsim.load_track("curve_r250")
+        railsim.curving(soft, track, radius=250.0, cant_deficiency=deficiency)
 
 
 def test_no_steady_state_is_said_with_what_is_unbalanced():
