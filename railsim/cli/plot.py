@@ -79,10 +79,9 @@ def command(
         raise input_error(wrong[0], found, "a folder of results")
     elif Path(file).suffix.lower() in RESULTS:
         from railsim.plot.histories import histories
-        from railsim.plot.selection import STUDY
         from railsim.result import open_run
 
-        figure = histories(open_run(file), selections or STUDY, **how)
+        figure = histories(open_run(file), selections, **how)
     else:
         figure = _track_figure(file, selections)
     output.wrote(save(figure, path, overwrite=output.overwrite))

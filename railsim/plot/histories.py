@@ -24,7 +24,7 @@ from railsim.text import unformatted
 @style.styled()
 def histories(
     result: Result,
-    selections: Sequence[str] = STUDY,
+    selections: Sequence[str] = (),
     *,
     over: str = "distance",
     by: str = "wheel",
@@ -32,7 +32,8 @@ def histories(
 ) -> Figure:
     """Draw quantities of a result: a pair of axes for each, or for each and each wheelset.
 
-    `selections`: Quantities and labels, see `railsim.plot.selection`. `over` ({"distance",
+    `selections`: Quantities and labels, see `railsim.plot.selection`; by default those of the
+    curving study, of a result without them all that it holds. `over` ({"distance",
     "time"}): Horizontal axis; the distance is that of the reference body. `by` ({"wheel",
     "wheelset"}): One pair of axes for all wheels, or one for each wheelset. `between`: Part of the
     horizontal axis to show, in its unit. Raises InputError: a quantity or label that the result
@@ -40,7 +41,7 @@ def histories(
     """
     check_not_empty(result)
     window = slice(None) if between is None else _window(result[over], between)
-    rows = panels(result, tuple(selections))
+    rows = panels(result, tuple(selections or _default(result)))
     if by == "wheelset":
         cells = [_by_wheelset(result, panel) for panel in rows]
         columns = max(len(row) for row in cells)
@@ -50,6 +51,12 @@ def histories(
         grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
         grid[-1] += [None] * (columns - len(grid[-1]))
     return _figure(result, grid, over, by, window)
+
+
+def _default(result: Result) -> Sequence[str]:
+    held = [name for name in result if result.quantities[name].dims[0] == "time" != name]
+    study = [name for name in STUDY if name in held]
+    return study or [name for name in held if name != "distance"] or held
 
 
 def check_not_empty(result: Result, name: str = "") -> None:
@@ -129,7 +136,8 @@ def _draw(
         values, above = line.values[window] * quantity.scale, 3.0 - 0.01 * index
         # the leading wheelset stays visible
         axes.plot(horizontal, values, color=colour, ls=style.SIDE_LINES[side], zorder=above)
-    axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+    if quantity.name != "mileage":  # whose zero is far away
+        axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = capitalised(quantity)
     drawn = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
     if by == "wheelset" and len(drawn) == 1:

@@ -378,10 +378,10 @@ class Result:
             Xarray is not installed.
         """
         package = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
-        variables = {
-            name: (q.dims, self[name], {"units": q.unit, "long_name": q.long_name})
-            for name, q in self._quantities.items()
-        }
+        variables = {}
+        for name, q in self._quantities.items():
+            facts = {"units": q.unit, "long_name": q.long_name, "comment": q.sign}
+            variables[name] = q.dims, self[name], {k: text for k, text in facts.items() if text}
         coords: dict[str, Any] = {name: list(names) for name, names in self._coordinates.items()}
         for name in ("time", "distance"):
             if name in variables:

@@ -20,6 +20,7 @@ from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
 from railsim.plot.style import HUES, SHADES, wheelset_colours
 from railsim.plot.track import track_figure
+from railsim.result.export import selected
 from railsim.track.irregularity import displacement
 
 
@@ -51,6 +52,11 @@ def test_figures_of_the_study_are_the_default(result):
     labels = [each.get_ylabel() for each in axes]
     units = ["(%)", "(kN)", "Y/Q", "(mrad)", "(mm)", "(mrad)"]
     assert all(unit in label for unit, label in zip(units, labels, strict=True))
+
+
+def test_of_a_result_without_the_figures_of_the_study_everything_is_drawn(result):
+    axes = histories(selected(result, ["Q"])).axes
+    assert [ax.get_title(loc="left") or ax.get_title() for ax in axes] == ["Vertical wheel force"]
 
 
 def test_lines_are_the_arrays_in_shown_units(result):

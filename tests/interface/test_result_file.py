@@ -71,6 +71,7 @@ def test_dataset_in_memory_equals_the_one_from_the_file(written):
         xarray.testing.assert_equal(
             open_result(written).to_xarray().reset_coords("distance"), data.load()
         )
+        assert open_result(written).to_xarray().Y.attrs["comment"] == data.Y.comment
 
 
 def test_chunks_make_no_difference(tmp_path):
