@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -16,7 +17,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, Va
 from railsim.definitions.base import Name
 from railsim.definitions.study.analyses import Analysis
 from railsim.definitions.study.definition import Sample, Study, value_texts
-from railsim.errors import Fault, InputError, argument_fault, input_error, nearest
+from railsim.errors import Fault, InputError, argument_error, argument_fault, input_error, nearest
 from railsim.notation import QUANTITIES, REQUESTED
 from railsim.studies.rows import PERMITTED, speed_of
 from railsim.units import ALLOWED
@@ -150,6 +151,13 @@ class Execution:
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None
+
+    def __post_init__(self) -> None:
+        """Raise InputError: `workers` is no number of processes."""
+        if self.workers is not None and not (
+            isinstance(self.workers, Integral) and self.workers > 0
+        ):
+            raise argument_error("workers", f"found {self.workers!r}", "a whole number above 0")
 
 
 def kept_quantities(keep: str) -> tuple[str, ...]:

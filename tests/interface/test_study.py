@@ -715,3 +715,10 @@ def deadly_work(index, batch):
         execute._shared[1][index] = os.getpid()
         os.kill(os.getpid(), signal.SIGKILL)
     return execute._work(index, batch)
+
+
+@pytest.mark.parametrize("workers", [0, -1, 2.5, "2"])
+def test_workers_that_are_no_number_of_processes_are_refused(tmp_path, workers):
+    with pytest.raises(InputError, match=r"workers: found .*; a whole number above 0"):
+        railsim.study(COACH, CURVE, 20.0, out=tmp_path / "s", workers=workers)
+    assert not (tmp_path / "s").exists()
