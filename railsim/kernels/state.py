@@ -6,8 +6,8 @@
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
-    then 42w      of each wheelset whose creep forces follow the creepages: see `transient`
-    then 54w      of each wheelset on elastic rails: track under it, see `support`
+    then 84w      of each wheelset whose creep forces follow the creepages: see `transient`
+    then 48w      of each wheelset on elastic rails: track under it, see `support`
     LAST_STEP     memory of the fast scheme: length of the last step (s), 0 where there was none
     TIME, ARC_LENGTH, SPEED   t (s), s of the reference body's frame (m), V = s' (m/s)
 
