@@ -24,8 +24,8 @@ def patch(ratio):
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_force_never_exceeds_friction(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)
-    # midpoint sums of the elliptic bound over 10 x 10 cells exceed mu N by 1.48 %; the table between
-    # its nodes by 1.83 %, the largest that a search finds: a/b = 14.7, xi_y = 0.0292, phi = -1.54
+    # midpoint sums of the elliptic bound over 10 x 10 cells exceed mu N by 1.48 %; the table
+    # between its nodes by 1.83 % at most: a search ends at a/b = 14.7, xi_y = 0.0292, phi = -1.54
     beyond = 1.0184 if law == "table" else 1.0148
     assert np.hypot(force.T_x, force.T_y) <= 0.4 * 60e3 * beyond
 
