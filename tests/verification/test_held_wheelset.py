@@ -24,6 +24,7 @@ def contact_a22():
             yield {key: float(row[key]) for key in row if key != "side"}
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_creep_forces_of_contacts_wheelset_a22():
     """Manchester contact benchmark A2.2, solved by the full theory: 10 kN, 2 m/s, friction 0.3.
 

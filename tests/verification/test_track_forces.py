@@ -191,6 +191,7 @@ def test_wider_gauge_lets_the_guiding_wheel_run_further_out(coach):
     assert moved == pytest.approx(-widening, abs=0.1e-3)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_widening_of_one_rail_moves_the_middle(coach):
     """On the straight the coach settles in the middle of its rails: half of the widening aside."""
     rows = ((0.0, 0.0, 0.004), (1000.0, 0.0, 0.004))
@@ -325,6 +326,7 @@ def test_slow_run_over_a_twist_gives_the_static_change_of_load():
 
 
 @pytest.mark.parametrize("support", ["rigid", "ballasted"])
+@pytest.mark.usefixtures("small_contact_tables")
 def test_irregular_rails_mirrored_give_the_mirrored_result(coach, support):
     """Left and right of everything exchanged, through dips, kinks, twists and random rails.
 

@@ -67,6 +67,7 @@ def test_cross_level_is_a_wave_of_the_cant(coach, length, height, curvature, can
     assert_same(coach, cross_level(Wave(length, height), curvature, cant), length)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_widening_of_one_rail_is_a_wider_track_beside_its_position(coach):
     assert_same(coach, widening(0.005), 5.0)
 
