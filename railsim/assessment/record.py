@@ -21,7 +21,7 @@ from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment
 
 FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
-WIDE_ENOUGH = 40.0  # Hz, low pass of a run: twice the highest corner of the standards' filters
+WIDE_ENOUGH = 40.0  # Hz, low pass of a run: twice the corner of the filters of EN 14363 and UIC 518
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
 AMPLITUDE = 3e-3  # m, of the equivalent conicity

@@ -109,7 +109,7 @@ HOLLOW_DEPTH, HOLLOW_HALF = 0.9, 35.0
 def s1002_hollow() -> Profile:
     """S1002 with a hollow tread: a construction that stands for a worn wheel, not a measurement.
 
-    The tread is lower by 0.9 mm cos^2(pi y/140 mm) within 35 mm of the nominal rolling circle, so
+    The tread is lower by 0.9 mm cos^2(pi y/70 mm) within 35 mm of the nominal rolling circle, so
     that its slope outside it remains continuous.  On 60E1 rails inclined by 1:40 the equivalent
     conicity for 3 mm grows from 0.18 to 0.46.
     """
