@@ -87,7 +87,8 @@ def kalker_lookup(n, patches, table):
         total = a[i] + b[i]
         u = (a[i] - b[i]) / total if total > 0.0 else 0.0
         outside[i] = 1.0 if abs(u) > KALKER_U_MAX else 0.0
-        position = min(max((u + KALKER_U_MAX) * scale, 0.0), float(last))
+        # 0 first: the larger of it and NaN is 0, and NaN does not become an index
+        position = min(max(0.0, (u + KALKER_U_MAX) * scale), float(last))
         node = min(int(position), last - 1)
         w = position - node
         c11[i] = table[node, 0] + w * (table[node + 1, 0] - table[node, 0])

@@ -31,9 +31,14 @@ RESULTS = (6, 7, 8, 10, 0)
 
 
 def available() -> bool:
-    """Say whether this processor has AVX-512 and numba compiles."""
+    """Say whether numba compiles, and for a processor that has AVX-512.
+
+    That is this one, unless `NUMBA_CPU_NAME` or `NUMBA_CPU_FEATURES` names another.
+    """
     if numba.config.DISABLE_JIT:
         return False
+    if numba.config.CPU_FEATURES is not None:
+        return "+avx512f" in numba.config.CPU_FEATURES.split(",")
     return bool(llvm.get_host_cpu_features().get("avx512f", False))
 
 

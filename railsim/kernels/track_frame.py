@@ -72,9 +72,9 @@ def frame_columns(frames, offsets):
 def cell_of(track, s):
     """Cell index of arc length `s`, -1 outside the table, and the distance into the cell [m]."""
     position = (s - track.s_start) / track.ds
-    i = int(np.floor(position))
-    if not (position >= 0.0 and i < track.coefficients.shape[0]):
+    if not (position >= 0.0 and position < track.coefficients.shape[0]):  # NaN, inf: no index
         return -1, 0.0
+    i = int(position)
     return i, s - track.s_start - i * track.ds
 
 

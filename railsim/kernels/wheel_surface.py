@@ -14,7 +14,9 @@ Tables hold e, e_phi, e_y and e_phi_y at the nodes of an even grid, periodic in 
 them (Hermite), constant beyond the ends in y.
 """
 
-from math import floor, pi
+from math import pi
+
+import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
@@ -53,6 +55,18 @@ def wheel_angle(system, state, w):
     return s / radius - state[6 * b + 4], state[SPEED] / radius
 
 
+@compiled(inline=True)
+def cell_around(phi, n_phi):
+    """Number of the cell at an angle, of `n_phi` around the wheel, and the part of it passed.
+
+    Neither NaN nor an angle beyond all integers becomes an index.
+    """
+    x = phi * n_phi / (2.0 * pi)
+    x -= n_phi * np.floor(x / n_phi)
+    i = int(min(x, n_phi - 1.0)) if x > 0.0 else 0
+    return i, x - i
+
+
 @compiled(python=False)
 def surface_at(contact, table, phi, y):
     """Height e [m] of a wheel at an angle and a lateral position, with e_phi [m] and e_y [1]."""
@@ -60,14 +74,11 @@ def surface_at(contact, table, phi, y):
     values = contact.surface
     n_phi, n_y = int(row[table, N_PHI]), int(row[table, N_Y])
     step = 2.0 * pi / n_phi
-    x = phi / step
-    i = floor(x)
-    x -= i
-    i -= n_phi * floor(i / n_phi)
+    i, x = cell_around(phi, n_phi)
     after = i + 1 if i + 1 < n_phi else 0
     dy = row[table, DY]
     u = min(max((y - row[table, Y0]) / dy, 0.0), n_y - 1.0)
-    j = min(int(u), n_y - 2)
+    j = min(int(u), n_y - 2) if u > 0.0 else 0  # also for NaN, which must not become an index
     u -= j
     inside = 1.0 if y > row[table, Y0] and y < row[table, Y0] + dy * (n_y - 1.0) else 0.0
     first = int(row[table, FIRST])
@@ -102,8 +113,7 @@ def surface_at(contact, table, phi, y):
 def angle_to_flat(contact, table, phi):
     """Angle that the wheel has still to roll until it is at a flat, 0 on one [rad]."""
     n_phi = int(contact.surface_row[table, N_PHI])
-    i = floor(phi * n_phi / (2.0 * pi))
-    i -= n_phi * floor(i / n_phi)
+    i, _ = cell_around(phi, n_phi)
     return contact.flat_ahead[int(contact.surface_row[table, FIRST_AHEAD]) + i]
 
 
