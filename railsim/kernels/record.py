@@ -134,10 +134,17 @@ def _type_of(value, context):
 
 @unbox(RecordType)
 def _unbox(kind, instance, c):
+    """Read the address, in whose making a signal may be heard: then there is none.
+
+    Python reads no number where there is no object, it ends the process.
+    """
     number = c.pyapi.object_getattr_string(instance, "address")
-    address = c.pyapi.long_as_voidptr(number)
-    c.pyapi.decref(number)
-    return NativeValue(address, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+    address = cgutils.alloca_once_value(c.builder, cgutils.get_null_value(c.pyapi.voidptr))
+    with c.builder.if_then(cgutils.is_not_null(c.builder, number), likely=True):
+        c.builder.store(c.pyapi.long_as_voidptr(number), address)
+        c.pyapi.decref(number)
+    failed = cgutils.is_not_null(c.builder, c.pyapi.err_occurred())
+    return NativeValue(c.builder.load(address), is_error=failed)
 
 
 @infer_getattr

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from railsim.kernels import compiled
-from railsim.kernels.record import record
+from railsim.kernels.record import Record, record
 
 
 @record
@@ -67,3 +67,17 @@ def test_addresses_do_not_travel_to_another_process():
 def test_array_of_another_order_is_refused():
     with pytest.raises(TypeError, match=r"Inner\.table: an array in C order"):
         fill(Outer(1, Inner(np.zeros((3, 2)).T, 1.0), np.zeros(3)))
+
+
+def test_signal_heard_while_an_address_is_made_is_raised_and_ends_nothing_else(monkeypatch):
+    """Ctrl-C is raised between any two instructions of Python, also in those that make it."""
+
+    def interrupted(record):
+        raise KeyboardInterrupt
+
+    fill(made())
+    with monkeypatch.context() as patch:
+        patch.setattr(Record, "address", property(interrupted))
+        with pytest.raises(KeyboardInterrupt):
+            fill(made())
+    assert fill(made()) == (3, 6.0)
