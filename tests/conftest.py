@@ -2,6 +2,7 @@
 
 import functools
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -27,10 +28,28 @@ def reference_dir():
     return folder
 
 
+@pytest.fixture(scope="session")
+def solutions_of_session(tmp_path_factory):
+    """Empty folder for equilibria and steps that all processes of this session share."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "solutions"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(autouse=True)
-def no_stored_solutions(monkeypatch):
-    """Equilibria and steps are found anew: a test may replace what finds them."""
-    monkeypatch.setattr(railsim.model.solutions, "solutions_folder", lambda _: None)
+def stored_solutions(request, solutions_of_session):
+    """Equilibria and steps are found once a session: this saves a fifth of its time.
+
+    They are found anew in a test that replaces something: it may be what finds them.
+    """
+    replaces = {"monkeypatch", "small_contact_tables_in_module"} & set(request.fixturenames)
+    folder = None if replaces else solutions_of_session
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(railsim.model.solutions, "solutions_folder", lambda _: folder)
+        patch.setattr(railsim.model.solutions, "MOST_NEW", sys.maxsize)
+        patch.setattr(railsim.model.solutions, "MOST_STORED", sys.maxsize)
+        yield
 
 
 @pytest.fixture
