@@ -31,7 +31,7 @@ TREAD, ROOT = 0, 1
 
 
 def crossing(**changes):
-    """The transfer from wing to nose alone, the same as in `test_crossing_runs`: tables are shared."""
+    """The transfer from wing to nose, the same as in `test_crossing_runs`: tables are shared."""
     track = load_track("crossing_56e1_r245_1in9.25")
     part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.45, "end": 50.5}
     return track.replace(sections=[part], check_rail=[], **changes)
