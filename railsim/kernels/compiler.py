@@ -208,8 +208,8 @@ if PRIVATE:
 class KernelCache:
     """Compiled code of one function on disk, as numba's dispatcher wants it.
 
-    One file for every signature and kind of processor; which sources they belong to is said by the
-    name of the folder.
+    One file for every signature, kind of processor and way of compiling that a user asks numba for;
+    which sources they belong to is said by the name of the folder.
     """
 
     def __init__(self, function: Callable[..., object], folder: Path) -> None:
@@ -226,7 +226,8 @@ class KernelCache:
         return str(self._folder)
 
     def _path(self, signature: object, codegen) -> Path:
-        key = repr((str(signature), codegen.magic_tuple(), self._code))
+        how = str(_config.OPT), _config.BOUNDSCHECK
+        key = repr((str(signature), codegen.magic_tuple(), self._code, how))
         digest = hashlib.sha256(key.encode()).hexdigest()[:24]
         return self._folder / f"{self._name}-{digest}.nbc"
 

@@ -7,11 +7,14 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
+import numba
 import pytest
 
 import railsim.kernels
 from railsim.kernels import lock
+from railsim.kernels.compiler import KernelCache
 
 # `locate_frames` lives in another file than `track_frames`, which it calls; prints the rate of turn
 # about x on straight track, and how often numba had to compile
@@ -96,6 +99,16 @@ def test_processes_that_begin_at_once_compile_once(copied_kernels):
     with ThreadPoolExecutor(3) as threads:
         found = list(threads.map(run, [folder] * 3))
     assert sorted(found) == [(0.0, 0), (0.0, 0), (0.0, 1)]
+
+
+@pytest.mark.parametrize(("name", "value"), [("OPT", 0), ("BOUNDSCHECK", 1)])
+def test_code_compiled_in_another_way_is_other_code(monkeypatch, tmp_path, name, value):
+    """What a debugging run stores is not what later runs load."""
+    codegen = SimpleNamespace(magic_tuple=lambda: ("processor", "features"))
+    kept = KernelCache(output, tmp_path)
+    usual = kept._path("f(x)", codegen)
+    monkeypatch.setattr(numba.config, name, value)
+    assert kept._path("f(x)", codegen) != usual
 
 
 def test_lock_whose_file_was_removed_is_no_lock(tmp_path):
