@@ -64,7 +64,7 @@ def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Pane
 
 
 def _panels(result: Result, selection: str) -> list[Panel]:
-    name, *labels = selection.split(":")
+    name, *labels = str(selection).split(":")
     drawable = [key for key, q in result.quantities.items() if q.dims[0] == "time" != key]
     if name not in drawable:
         raise _fault(selection, f"no quantity '{name}'", nearest(name, drawable))

@@ -176,6 +176,11 @@ def test_what_a_result_does_not_have_is_refused(file, tmp_path, selection, words
     assert not out.exists()
 
 
+def test_a_list_in_place_of_names_is_refused(result):
+    with pytest.raises(InputError, match="no quantity '\\['Q'\\]'"):
+        result.plot(["Q"])
+
+
 @pytest.mark.parametrize("name", [".", "..", "/", ""])
 def test_folder_is_not_drawn(name, capsys, tmp_path, monkeypatch):
     (tmp_path / "empty").mkdir()
