@@ -119,7 +119,8 @@ class _Symmetric:
     def take(self, chunk: dict[str, Floats]) -> dict[str, Floats]:
         """Filtered instants that are known with a further chunk."""
         self._window = {
-            name: np.concatenate([self._window[name], array]) if self._window else array
+            # copied: the loop writes its next instants into the same memory
+            name: np.concatenate([self._window[name], array] if self._window else [array])
             for name, array in chunk.items()
         }
         if not self._started:

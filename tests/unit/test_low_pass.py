@@ -59,6 +59,24 @@ def test_chunks_do_not_matter_and_times_are_equal_steps(causal):
     np.testing.assert_allclose(many.distance, 20.0 * many.time, atol=1e-9)
 
 
+def test_a_loop_that_writes_into_the_same_memory_spoils_no_instants():
+    """The filter's half length, 1255 instants, is longer than the loop's first 800."""
+    t = np.arange(8001) / 1000.0
+    sink = LowPassSink(MemorySink(), 100, 10.0, 4.0, causal=False)
+    sink.begin(COORDINATES, [QUANTITIES[name] for name in NAMES])
+    memory = {name: np.zeros(800) for name in ("time", "distance")}
+    memory |= {name: np.full((800, 1, 2), 50e3) for name in ("Q", "Y", "Y_over_Q")}
+    for start in range(0, len(t), 800):
+        rows = t[start : start + 800]
+        memory["time"][: len(rows)] = rows
+        memory["distance"][: len(rows)] = 20.0 * rows
+        memory["Y"][: len(rows)] = (1e3 * np.sin(2.0 * np.pi * rows))[:, None, None]
+        sink.append({name: array[: len(rows)] for name, array in memory.items()})
+    found = sink.close({"status": "complete"})
+    np.testing.assert_allclose(found.time, np.arange(81) / 10.0, atol=1e-12)
+    np.testing.assert_allclose(found.Y[:, 0, 0], 1e3 * np.sin(2.0 * np.pi * found.time), atol=3.0)
+
+
 def test_causal_filter_is_scipys_butterworth_of_order_4():
     def noise(t):
         return np.random.default_rng(2).normal(size=len(t)).cumsum()
