@@ -20,8 +20,8 @@ from railsim.files.access import make_folder
 from railsim.identification.identified import Channel, Identified, Place
 from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem
-from railsim.identification.residuals import FORMS, Form, whiteness
-from railsim.identification.runs import model_of, prepared, track_of
+from railsim.identification.residuals import FORMS, Form, banded, whiteness
+from railsim.identification.runs import FEWEST, model_of, prepared, track_of
 from railsim.identification.variants import Workers
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import Shift, shift_of
@@ -35,6 +35,7 @@ SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
 CLOSE, MOST_TIMES = 0.1, 4  # standard deviations; times that derivatives are taken at the solution
 SAME = 3e-3  # change of a coordinate up to which derivatives are the same
+NARROW = 0.01  # of the distance between its bounds, within which a parameter lies at one
 PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
 SHARES = 5  # of profiles that are tried before the search
@@ -104,6 +105,11 @@ def identify(
     model = model_of(vehicle, runs, track)
     wanted = parsed(parameters, model.vehicle, model.track)
     ready = [prepared(run, model, band, track or track_of(run)) for run in runs]
+    if form == "spectra" and any(
+        not row.size for one in ready for row in Form(form, band).features(one, one.measured)
+    ):
+        found, allowed = f"{band[0]:g} to {band[1]:g} Hz", "frequencies in a third-octave band at "
+        raise argument_error("band", found, f"{FEWEST} {allowed}least: a wider band, a longer run")
     ready = [replace(one, run=one.run.with_step_of(model)) for one in ready]
     place = place and form == "history"
     kept = None if folder is None else Path(folder)
@@ -260,23 +266,16 @@ def _places(problem: Problem, x: Floats) -> Floats:
 def _suspicions(problem: Problem, x: Floats, series: list[Floats], *, clocks: bool) -> list[str]:
     remarks: list[str] = []
     for one, values in zip(problem.placed(x), series, strict=True):
-        low, high = problem.form.band
         measured, simulated = (
-            {n: _banded(x, one.step, low, high) for n, x in zip(one.names, rows, strict=True)}
+            {
+                n: banded(x, one.step, problem.form.band)
+                for n, x in zip(one.names, rows, strict=True)
+            }
             for rows in (one.measured, values)
         )
         found = suspicions(measured, simulated, one.step, clocks=clocks)
         remarks += [f"{one.run.name}: {words}" for words in found]
     return remarks
-
-
-def _banded(x: Floats, step: float, low: float, high: float) -> Floats:
-    known = np.isfinite(x)
-    clean = np.where(known, x, 0.0)
-    spectrum = np.fft.rfft(clean)
-    f = np.fft.rfftfreq(len(x), step)
-    spectrum[(f < low) | (f > high)] = 0.0
-    return np.where(known, np.fft.irfft(spectrum, len(x)), np.nan)
 
 
 def _weigh(problem: Problem, x: Floats, *, stated: bool) -> bool:
@@ -333,11 +332,26 @@ def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> 
         for place in places
         if abs(place.stretch) > STRETCHED
     ]
+    remarks += _at_bounds(problem.parameters, x)
     return Identified(
         problem.model.vehicle, tuple(problem.parameters), x[:count], covariance[:count, :count],
         values, vectors, tuple(channels), tuple(places), problem.form.kind, problem.form.band,
         inflation, problem.simulations, tuple(remarks),
     )  # fmt: skip
+
+
+def _at_bounds(parameters: Sequence[Parameter], x: Floats) -> list[str]:
+    """Say which parameters end at a bound; a share of 0 or 1 is one of the profiles itself."""
+    remarks = []
+    for one, coordinate in zip(parameters, x, strict=False):
+        reach = min(SAME, NARROW * (one.bounds[1] - one.bounds[0]))
+        for bound, end in zip(one.bounds, (one.low, one.high), strict=True):
+            if abs(coordinate - bound) < reach and not (one.is_share and end in (0.0, 1.0)):
+                remarks.append(
+                    f"{one.name} ends at its bound of {end:g}: the best value may lie beyond it, "
+                    "and the intervals do not hold."
+                )
+    return remarks
 
 
 def _without_places(jacobian: Floats, count: int) -> Floats:

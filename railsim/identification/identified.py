@@ -16,12 +16,14 @@ from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.files.access import check_file, whole_file
 from railsim.identification.parameters import TRACK, Parameter, blended, present, scaled
+from railsim.identification.residuals import banded
 from railsim.profiles import save_profile
 from railsim.profiles.used import used_profiles
 from railsim.table import Column, Table
 
 NORMAL = 1.959964  # of a normal distribution: 95 % within
 UNKNOWN = 0.5  # standard deviation of a combination (as a share) from which the data do not tell it
+INFINITE = 1e3  # standard deviation from which nothing is known
 PART = 0.25  # share of the largest part of a combination that is named
 NOT_WHITE = 0.01  # probability
 
@@ -158,7 +160,7 @@ class Identified:
                 continue
             row = row * np.sign(row[np.argmax(np.abs(row))])
             parts = [k for k in np.argsort(-np.abs(row)) if abs(row[k]) > PART * abs(row).max()]
-            known = "infinite" if spread > 1e3 else f"{100 * spread:.0f} %"
+            known = "infinite" if spread > INFINITE else f"{100 * spread:.0f} %"
             names = [self.parameters[k].name for k in parts]
             if len(parts) == 1:
                 said.append(f"The data say nothing about {names[0]} (standard deviation {known}).")
@@ -192,6 +194,14 @@ class Identified:
         value = self._values[".".join(present(self.vehicle, parameter.keys[0])[0])]
         return None if isinstance(value, list) else float(value)
 
+    def _misfit(self, one: Channel, simulated: Floats) -> float:
+        """Return the rms of measured less simulated in the band, in % of the measured rms."""
+        known = np.isfinite(one.measured) & np.isfinite(simulated)
+        measured, simulated = (np.where(known, x, np.nan) for x in (one.measured, simulated))
+        rows = (banded(x, one.step, self.band) for x in (measured - simulated, measured))
+        difference, scale = (float(np.sqrt(np.sum(row[known] ** 2))) for row in rows)
+        return 100.0 * difference / scale if scale else np.nan
+
     def record(self) -> dict[str, Any]:
         """Return everything but the series as plain values."""
         arrays = ("covariance", "correlation", "singular_values", "combinations")
@@ -217,8 +227,8 @@ class Identified:
                 {
                     "run": one.run,
                     "channel": one.name,
-                    "before": _share(one.measured, one.before),
-                    "after": _share(one.measured, one.after),
+                    "before": self._misfit(one, one.before),
+                    "after": self._misfit(one, one.after),
                     "level": one.level,
                     "probability": one.probability,
                     "white": one.is_white if np.isfinite(one.probability) else None,
@@ -320,8 +330,10 @@ def parameter_table(record: Mapping[str, Any]) -> Table:
     """Return values, standard deviations and intervals of the record of an identification."""
     rows = []
     for one in record["parameters"]:
-        ends = [x if x is not None and np.isfinite(x) else None for x in one["interval"]]
-        share = 100.0 * one["standard_deviation"]
+        spread, ends = one["standard_deviation"], one["interval"]
+        if not spread < INFINITE:
+            spread, ends = None, [None, None]
+        share = None if spread is None else 100.0 * spread
         rows.append([one["name"], one["value"], one["factor"], share, *ends])
     return Table(
         [
@@ -351,8 +363,8 @@ def residual_table(record: Mapping[str, Any]) -> Table:
         [
             Column("run"),
             Column("channel"),
-            Column("before", "before (% of rms)", format=".1f"),
-            Column("after", "after (% of rms)", format=".1f"),
+            Column("before", "before (% of rms in the band)", format=".1f"),
+            Column("after", "after (% of rms in the band)", format=".1f"),
             Column("level", "residual over noise", format=".2f"),
             Column("probability", "p-value, white", format=".2g"),
             Column("white"),
@@ -368,10 +380,3 @@ def _merged(entries: list[str]) -> list[str]:
         value, _, mark = entry.partition("# ")
         found.setdefault(value.strip(), []).append(mark)
     return [f"{value}  # {'; '.join(marks)}" for value, marks in found.items()]
-
-
-def _share(measured: Floats, simulated: Floats) -> float:
-    known = np.isfinite(measured) & np.isfinite(simulated)
-    scale = float(np.sqrt(np.mean(measured[known] ** 2))) if known.any() else 0.0
-    difference = float(np.sqrt(np.mean((measured - simulated)[known] ** 2))) if known.any() else 0.0
-    return 100.0 * difference / scale if scale else np.nan

@@ -141,6 +141,7 @@ class Problem:
         for k, parameter in enumerate(self.parameters):
             low, high = parameter.bounds
             inside = [step for step in (STEP, -STEP) if low <= x[k] + step <= high]
+            inside = inside or [max(high - x[k], low - x[k], key=abs)]
             for step in inside if central else inside[:1]:
                 moved = x.copy()
                 moved[k] += step

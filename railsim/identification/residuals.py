@@ -16,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Flags, Floats
-from railsim.identification.runs import Prepared
+from railsim.identification.runs import FEWEST, Prepared
 
 FORMS = ("history", "spectra", "sections")
 FADE = 1.0  # s
 SECTION = 50.0  # m
 THIRD = 2.0 ** (1.0 / 3.0)
-FEWEST = 6  # coefficients of a third-octave band
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +93,16 @@ def _fade(n: int, step: float) -> Floats:
     window[:edge], window[-edge:] = ramp, ramp[::-1]
     window /= np.sqrt(np.mean(window**2))
     return window
+
+
+def banded(x: Floats, step: float, band: tuple[float, float]) -> Floats:
+    """Return a series in a band of frequencies [Hz], both ends faded; NaN where it has no value."""
+    known = np.isfinite(x)
+    n = len(x)
+    spectrum = np.fft.rfft(np.where(known, x, 0.0) * _fade(n, step))
+    f = np.fft.rfftfreq(n, step)
+    spectrum[(f < band[0]) | (f > band[1])] = 0.0
+    return np.where(known, np.fft.irfft(spectrum, n), np.nan)
 
 
 def whiteness(residual: Floats) -> tuple[float, float]:

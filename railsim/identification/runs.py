@@ -33,8 +33,8 @@ STEADY = 0.01  # change of the speed over its mean up to which it is constant
 FORGET = 2.0  # s, after which the start of a run is forgotten
 LEAD = 100.0  # m, that a run begins ahead, as far as the track is there
 SHORTEST = 4.0  # s
+FEWEST = 6  # frequencies in the band, or in a third-octave band that is compared
 DEGREE = 5  # of the spline
-MARGIN = 0.85  # of the step of the model, for variants that are stiffer
 ALIKE = 20.0  # Hz, up to which runs are simulated for comparison
 # where the speed varies nothing is low-passed: what is folded into the band lies far above it
 VARYING_RATE, FAR_ABOVE = 400.0, 10.0  # 1/s at least; times the end of the band
@@ -119,15 +119,13 @@ class Run:
         )
 
     def with_step_of(self, model: Model) -> "Run":
-        """Return the run with a fixed step for all variants: that of the model, and a margin."""
+        """Return the run with a fixed step for all variants: that of the model."""
         if self.settings.drive.mode != "constant":
             return self
-        interval = 1.0 / self.settings.output_rate
         probe = replace(self, until=self.start + max(1.0, self.speed * 0.1))
         with silent():
             result = probe.result(replace(model, track=self.track))
-        count = int(np.ceil(interval / (MARGIN * float(result.attributes["step"])) - 1e-9))
-        return replace(self, settings=self.settings.replace(step=interval / count))
+        return replace(self, settings=self.settings.replace(step=float(result.attributes["step"])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +199,11 @@ def prepared(
         found = f"{max(0.0, end - begin):.0f} m on the track of {track.length:.0f} m"
         allowed = f"{SHORTEST * mean:.0f} m at least, {FORGET:g} s after the start of the run"
         raise input_error(measurement.name, found, allowed, key="distance")
+    f = np.fft.rfftfreq(len(thinner.time), 1.0 / thinner.rate)
+    if (number := int(np.sum((f >= band[0]) & (f <= high)))) < FEWEST:
+        found = f"{band[0]:g} to {high:g} Hz: {number} frequencies, {f[1]:.3g} Hz apart"
+        allowed = f"{FEWEST} at least: a wider band or a longer run"
+        raise input_error(measurement.name, found, allowed, key="band")
     names = tuple(compared(measurement))
     channels = tuple(measurement.definition.channels[name] for name in names)
     outputs = outputs_for([channel.quantity for channel in channels])

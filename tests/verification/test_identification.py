@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +17,7 @@ from railsim.identification import Identified
 from railsim.identification.fit import _at_best_shares
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
 from railsim.identification.residuals import Form, whiteness
+from railsim.identification.runs import model_of, prepared
 from railsim.profiles import load_profile
 
 SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
@@ -264,6 +266,9 @@ def test_tables_scale_their_forces_only():
         (["primary.stifness.z"], {}, "primary.stifness.z"),
         ([PRIMARY], {"band": (30.0, 5.0)}, "two frequencies above 0 that rise"),
         ([PRIMARY], {"band": (0.5, 90.0)}, "225 at least for a band up to 90 Hz"),
+        # 6.5 s of the run are compared: frequencies are 0.154 Hz apart
+        ([PRIMARY], {"band": (0.5, 1.0)}, "band: 0.5 to 1 Hz: 3 frequencies, 0.154 Hz apart"),
+        ([PRIMARY], {"band": (0.5, 2.0), "form": "spectra"}, "in a third-octave band at least"),
         ([PRIMARY], {"form": "shapes"}, "history, spectra, sections"),
         ([PRIMARY + ":2:3"], {}, "factors below and above 1"),
         (["bodies.body.mas"], {}, "no value 'mas'; did you mean 'mass'?"),
@@ -274,6 +279,41 @@ def test_bad_input_is_one_line(found, keys, how, words):
         railsim.identify(quarter(), found[1], keys, workers=1, **how)
     assert len(caught.value.faults) == 1
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("low", [0.99, 0.9])
+def test_a_bound_that_keeps_the_value_out_is_said(found, low):
+    """The primary spring has 0.8 of its stiffness; 0.99 is nearer to 1 than a difference's step."""
+    one = railsim.identify(quarter(), found[1], [f"{PRIMARY}:{low}:1.01"], band=(0.5, 14.0),
+                           workers=1)  # fmt: skip
+    assert one.factors[0] == pytest.approx(low, rel=1e-3)
+    assert one.remarks[0].startswith(f"{PRIMARY} ends at its bound of {low}")
+    assert not one.unidentified
+
+
+def test_what_nothing_shows_has_no_deviation_and_no_interval_in_the_table(found):
+    one = found[0]
+    covariance = one.covariance.copy()
+    covariance[1, 1] = 1e12
+    table = str(replace(one, covariance=covariance).table()).splitlines()
+    (line,) = (line for line in table if DAMPER in line)
+    assert line.split() == [DAMPER, f"{one.factors[1] * 2e4:.5g}", f"{one.factors[1]:.4f}"]
+
+
+def test_misfit_is_that_in_the_band(found):
+    """Most of the acceleration of the axlebox lies above 3 Hz, where nothing is compared."""
+    one = railsim.identify(quarter(), found[1], list(FACTORS), band=(0.5, 3.0), workers=1)
+    for channel in one.record()["channels"]:
+        assert channel["after"] < 4.0
+    assert one.remarks == ()
+
+
+def test_all_variants_have_the_step_of_the_model(found):
+    measurement = railsim.load_measurement(found[1])
+    model = model_of(quarter(), [measurement], TRACK)
+    run = prepared(measurement, model, (0.5, 14.0), TRACK).run.with_step_of(model)
+    softer = run.model(model, parsed([PRIMARY], quarter(), TRACK), [-0.5])
+    assert run.result(softer).attributes["step"] == run.settings.step
 
 
 def test_a_file_in_place_of_the_folder_is_said(found, tmp_path):
