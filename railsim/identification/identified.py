@@ -23,7 +23,7 @@ from railsim.table import Column, Table
 
 NORMAL = 1.959964  # of a normal distribution: 95 % within
 UNKNOWN = 0.5  # standard deviation of a combination (as a share) from which the data do not tell it
-INFINITE = 1e3  # standard deviation from which nothing is known
+INFINITE = 1e3  # standard deviation, end of an interval from which nothing is known
 PART = 0.25  # share of the largest part of a combination that is named
 NOT_WHITE = 0.01  # probability
 
@@ -330,10 +330,9 @@ def parameter_table(record: Mapping[str, Any]) -> Table:
     """Return values, standard deviations and intervals of the record of an identification."""
     rows = []
     for one in record["parameters"]:
-        spread, ends = one["standard_deviation"], one["interval"]
-        if not spread < INFINITE:
-            spread, ends = None, [None, None]
-        share = None if spread is None else 100.0 * spread
+        ends = [x if x is not None and abs(x) < INFINITE else None for x in one["interval"]]
+        spread = one["standard_deviation"]
+        share = 100.0 * spread if spread < INFINITE else None
         rows.append([one["name"], one["value"], one["factor"], share, *ends])
     return Table(
         [

@@ -112,6 +112,7 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
     """
     found: list[Parameter] = []
     faults = Faults()
+    taken: list[tuple[str, ...]] = []
     for text in texts:
         try:
             one = _parsed(text) if isinstance(text, str) else text
@@ -119,6 +120,7 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
             if one.is_share and one.profiles[0] not in used:
                 words = f"{vehicle.name} has no wheels with '{one.profiles[0]}'"
                 raise ValueError(words, nearest(one.profiles[0], used))
+            places: list[tuple[str, ...]] = [(WHEEL, one.profiles[0])] if one.is_share else []
             for key in one.keys:
                 kind, own = _side(key)
                 path, value = present({"vehicle": vehicle, "track": track}[kind], own)
@@ -128,6 +130,11 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
                 if not _scalable(value):
                     words = f"{'.'.join(path)} is {value!r}"[:100]
                     raise ValueError(words, "a number that is not 0")
+                places.append((kind, *path))
+            for place in places:
+                if any(place[: len(other)] == other[: len(place)] for other in taken):
+                    raise ValueError(f"{place[-1]} is given twice", "each value once")
+                taken.append(place)
             found.append(one)
         except (KeyError, ValueError) as error:
             shown = text if isinstance(text, str) else text.name
@@ -135,9 +142,6 @@ def parsed(texts: Iterable[str | Parameter], vehicle: Vehicle, track: Track) -> 
             faults.append(argument_fault("parameters", shown, *told))
         except InputError as error:
             faults += error.faults
-    names = [one.name for one in found]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        faults.append(argument_fault("parameters", name, "given twice", "each parameter once"))
     if not faults and not found:
         faults.append(argument_fault("parameters", "", "none", "one key at least"))
     faults.check()

@@ -3,7 +3,8 @@
 ``history``
     The difference over time, as its Fourier coefficients in the band: for white noise they are
     independent, so that no filter colours the residuals and their number is that of the
-    independent values.  Gaps count as no difference; both ends fade by half a cosine.
+    independent values.  Means do not count, gaps are no difference; both ends fade by half a
+    cosine.
 ``spectra``
     Logarithms of the rms values in third-octave bands, simulated ones with the noise that is stated
     of a channel: where the place on the track, or the track itself, is known by its spectrum only.
@@ -43,6 +44,9 @@ class Form:
         if self.kind == "sections":
             return self._sections(prepared, clean, known)
         n = values.shape[1]
+        # without the mean, an offset of a sensor: faded and with gaps it would reach into the band
+        count = np.maximum(known.sum(axis=1, keepdims=True), 1)
+        clean = np.where(known, clean - clean.sum(axis=1, keepdims=True) / count, 0.0)
         coefficients = np.fft.rfft(clean * _fade(n, prepared.step), axis=1)
         f = np.fft.rfftfreq(n, prepared.step)
         # of white noise of standard deviation 1 in the band each part has the variance 1
@@ -99,7 +103,8 @@ def banded(x: Floats, step: float, band: tuple[float, float]) -> Floats:
     """Return a series in a band of frequencies [Hz], both ends faded; NaN where it has no value."""
     known = np.isfinite(x)
     n = len(x)
-    spectrum = np.fft.rfft(np.where(known, x, 0.0) * _fade(n, step))
+    mean = np.mean(x[known]) if known.any() else 0.0
+    spectrum = np.fft.rfft(np.where(known, x - mean, 0.0) * _fade(n, step))
     f = np.fft.rfftfreq(n, step)
     spectrum[(f < band[0]) | (f > band[1])] = 0.0
     return np.where(known, np.fft.irfft(spectrum, n), np.nan)

@@ -152,6 +152,9 @@ def _channel(
             x[outside] = np.nan
     elif clipped := _clipped(x):
         remarks.append(f"{name} {clipped}: give its range to leave these values out.")
+    known = x[np.isfinite(x)]
+    if channel.quantity not in AXES and len(known) and known.min() == known.max():
+        remarks.append(f"{name} is {known[0]:g} from its first value to its last: a dead sensor?")
     x = clock.on_grid(channel.factor * (x - channel.offset))
     if channel.delay:
         x = delayed(x, channel.delay * clock.rate)

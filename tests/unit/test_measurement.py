@@ -191,6 +191,12 @@ def test_mounting_takes_gravity_back(tmp_path):
     assert run["z"] == pytest.approx(z, abs=1.5 * p**2 * 15.0)
 
 
+def test_a_dead_sensor_is_said(tmp_path):
+    path = written(tmp_path, cell=lambda row, name, text: "0.25" if name == "box" else text)
+    (words,) = railsim.load_measurement(path).remarks
+    assert words == "box is 0.25 from its first value to its last: a dead sensor?"
+
+
 def test_clipped_signals_are_said_and_left_out(tmp_path):
     def cell(row, name, text):
         return f"{np.clip(float(text), -0.4, 0.4):.9f}" if name == "box" else text

@@ -271,6 +271,10 @@ def test_tables_scale_their_forces_only():
         ([PRIMARY], {"band": (0.5, 2.0), "form": "spectra"}, "in a third-octave band at least"),
         ([PRIMARY], {"form": "shapes"}, "history, spectra, sections"),
         ([PRIMARY + ":2:3"], {}, "factors below and above 1"),
+        ([PRIMARY, f"elements.{PRIMARY}"], {}, "z is given twice; each value once"),
+        (["primary.stiffness", PRIMARY], {}, "z is given twice"),
+        ([f"{PRIMARY}+{PRIMARY}"], {}, "z is given twice"),
+        (["wheel:S1002:S1002", "wheel:S1002:S1002:0:0.5"], {}, "S1002 is given twice"),
         (["bodies.body.mas"], {}, "no value 'mas'; did you mean 'mass'?"),
     ],
 )
@@ -291,13 +295,14 @@ def test_a_bound_that_keeps_the_value_out_is_said(found, low):
     assert not one.unidentified
 
 
-def test_what_nothing_shows_has_no_deviation_and_no_interval_in_the_table(found):
+def test_what_nothing_shows_has_no_deviation_and_no_end_in_the_table(found):
     one = found[0]
     covariance = one.covariance.copy()
     covariance[1, 1] = 1e12
     table = str(replace(one, covariance=covariance).table()).splitlines()
     (line,) = (line for line in table if DAMPER in line)
-    assert line.split() == [DAMPER, f"{one.factors[1] * 2e4:.5g}", f"{one.factors[1]:.4f}"]
+    value = f"{one.factors[1] * 2e4:.5g}"
+    assert line.split() == [DAMPER, value, f"{one.factors[1]:.4f}", "0.0000"]
 
 
 def test_misfit_is_that_in_the_band(found):
@@ -306,6 +311,19 @@ def test_misfit_is_that_in_the_band(found):
     for channel in one.record()["channels"]:
         assert channel["after"] < 4.0
     assert one.remarks == ()
+
+
+def test_an_offset_of_a_sensor_is_outside_the_band(found):
+    """Twenty times the rms of the channel: 0 Hz is not compared."""
+    one, path, _ = found
+    rows = [line.split(",") for line in (path.parent / "run.csv").read_text().splitlines()]
+    for row in rows[1:]:
+        row[-2] = str(float(row[-2]) + 5.0)  # of the body [m/s2]
+    (path.parent / "offset.csv").write_text("\n".join(map(",".join, rows)))
+    shifted = path.with_name("offset.toml")
+    shifted.write_text(path.read_text().replace("run.csv", "offset.csv"))
+    other = railsim.identify(quarter(), shifted, list(FACTORS), band=(0.5, 14.0), workers=1)
+    assert other.factors == pytest.approx(one.factors, rel=1e-6)
 
 
 def test_all_variants_have_the_step_of_the_model(found):
