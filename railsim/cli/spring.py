@@ -131,7 +131,10 @@ def verify(suspension: "TrailingArmSuspension") -> Answer:
     heights = ride_heights(suspension) if suspension.tolerances is not None else ()
     data, sheets = verification_data(suspension, result), data_sheets(suspension, result)
     parts: list[Any] = [tables.load_table(suspension), ""] if suspension.load_notes else []
-    parts += [tables.case_table(result), "", tables.loaded_table(sheets), ""]
+    deflections = f"{1e3 * data['mounting_deflection']:.2f} mm under the mounting load"
+    wanted = f"mounting.deflection is {1e3 * suspension.mounting.deflection:.2f} mm"
+    parts += [tables.case_table(result), f"{deflections}; {wanted}", ""]
+    parts += [tables.loaded_table(sheets), ""]
     parts += [tables.sheet_table(sheets), "", check_table(result.checks)]
     if heights:
         data["ride_height"] = ride_height_data(heights)
@@ -193,12 +196,12 @@ def vehicle(
             valid = nearest(load, suspension.loads)
             raise input_error("--load", f"no load '{load}' in [loads]", valid)
         part = vehicle_part(suspension, load)
-        base, removed = _base(suspension, extends, out)
+        base, removed, beside = _base(suspension, extends, out)
         text = vehicle_text(suspension, part, base, removed)
         if out:
             write_text(out, text)
             output.written.append(out)
-    for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
+    for remark in (*part.remarks, *beside, *_load_remarks(suspension, part.case, extends)):
         if not output.quiet:
             echo(remark, err=True)
     record = {"file": output.out, "assembly": part.assembly, "axleboxes": part.axleboxes}
@@ -233,19 +236,27 @@ def _load_remarks(
 
 def _base(
     suspension: "TrailingArmSuspension", extends: str | None, out: Path | None
-) -> tuple[str | None, list[str] | None]:
-    """The vehicle to extend as the written file must name it, and what to remove there."""
-    if extends is None or suspension.vehicle is None:
-        return None, None
+) -> tuple[str | None, list[str] | None, list[str]]:
+    """The vehicle to extend as the written file must name it, what to remove there, remarks."""
+    table = suspension.vehicle
+    if extends is None or table is None:
+        return None, None, []
     from railsim.files.key_paths import key_path
     from railsim.files.sources import find_file, read_source
 
     base = find_file(extends, "vehicle")
     data = read_source(base, "vehicle").data
-    removed = [key for key in suspension.vehicle.remove if _holds(data, key_path(key))]
+    removed = [key for key in table.remove if _holds(data, key_path(key))]
+    beside = []
+    if not removed and not _holds(data, key_path(f"{table.assembly}.elements.coil_nest")):
+        keys = ", ".join(table.remove) or "nothing to remove"
+        beside.append(
+            f"'{extends}' has nothing of vehicle.remove ({keys}): its own primary suspension stays "
+            "beside this one unless vehicle.remove names its parts."
+        )
     if is_file(extends):
         extends = Path(os.path.relpath(base, out.parent if out else "")).as_posix()
-    return extends, removed
+    return extends, removed, beside
 
 
 def _holds(data: Any, path: Sequence[str]) -> bool:

@@ -313,7 +313,7 @@ class TrailingArmSuspension(FileDefinition):
 
     def contradictions(self) -> list[Fault]:
         """Return what is wrong between the parts."""
-        return [*_load_faults(self), *_inner_faults(self)]
+        return [*_load_faults(self), *_inner_faults(self), *_tolerance_faults(self)]
 
     def unusual(self) -> list[Remark]:
         """Return what is allowed but unusual."""
@@ -377,6 +377,18 @@ def _inner_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
             f"{clearance * 1e3:.1f} mm",
             "reduce inner.mean_diameter or a wire diameter, or raise outer.mean_diameter",
         )
+
+
+def _tolerance_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
+    """Tolerances that leave nothing of what deviates."""
+    if suspension.tolerances is None:
+        return
+    for name, spring in suspension.springs.items():
+        for key in ("wire_diameter", "mean_diameter", "active_coils", "free_height"):
+            value, deviation = getattr(spring, key), getattr(suspension.tolerances, key)
+            if value is not None and deviation >= value:
+                found = f"{deviation:g}, but {name}.{key} is {value:g}"
+                yield Fault("", f"tolerances.{key}", found, "less than what deviates")
 
 
 def spring_remarks(suspension: TrailingArmSuspension) -> list[Remark]:

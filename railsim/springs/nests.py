@@ -37,7 +37,7 @@ class Task:
     wanted: Wanted  # loads and deflections to be met
     wires: Floats  # wire diameters to choose from [m]
     height_difference: float  # free height of the outer spring less that of the inner one [m]
-    loads: Floats  # for the solid height, highest and lowest dynamic load [N]
+    loads: Floats  # largest, for the solid height, highest and lowest dynamic load [N]
 
 
 @dataclass(frozen=True)
@@ -75,18 +75,23 @@ def task_of(suspension: TrailingArmSuspension) -> Task:
     if limits is None or target is None or inner is None or missing:
         words = "missing", "the search needs it"
         raise InputError(Fault(suspension.name, name, *words) for name in missing)
-    solid_load = max(suspension.loads.values())
-    if suspension.checks.solid_load is not None:
-        solid_load = suspension.loads[suspension.checks.solid_load]
+    checked, largest = suspension.checks, max(suspension.loads.values())
+    solid_load = suspension.loads[checked.solid_load] if checked.solid_load else largest
     dynamic = dynamic_loads(suspension).values() if suspension.fatigue else (solid_load, solid_load)
     mounting = suspension.mounting
     return Task(
         suspension=suspension,
-        limits=limits,
+        # what the verification asks for is not offered with less
+        limits=limits.model_copy(
+            update={
+                "clearance_min": max(limits.clearance_min, checked.radial_clearance),
+                "fatigue_margin_min": max(limits.fatigue_margin_min, checked.fatigue_margin),
+            }
+        ),
         wanted=Wanted(mounting.load, mounting.deflection, target.load, target.deflection),
         wires=np.array(limits.wire_diameters or EN_10060),
         height_difference=suspension.outer.free_height - inner.free_height,
-        loads=np.array([solid_load, *dynamic]),
+        loads=np.array([largest, solid_load, *dynamic]),
     )
 
 
@@ -172,7 +177,8 @@ def _strength_slack(
     nu = trailing_arm.poisson_ratio(task.suspension)
     buckling = helical.buckling_deflection(H0, D, nu, limits.seating)
     highest = np.max(state.deflection, axis=-1)
-    slack = {"height": state.height[..., 0] / smallest - 1.0}
+    least = np.minimum(state.height[..., 0] / solid, state.height[..., 1] / smallest)
+    slack = {"height": least - 1.0}
     slack["buckling"] = 1.0 - highest / (search.buckling_ratio_max * buckling)
     if material.tau_allowable is not None:
         K_V = helical.vertical_stiffness(material.G, d, D, n)
@@ -183,13 +189,13 @@ def _strength_slack(
 
 
 def _margin(task: Task, d: Floats, D: Floats, state: CoilState) -> Floats:
-    """Goodman-Smith margins, (spring, nest); the loads are (solid, highest, lowest)."""
+    """Goodman-Smith margins, (spring, nest); the last loads are the highest and the lowest."""
     table = task.suspension.fatigue
     if table is None:
         return np.full(d.shape, np.inf)
     shear, under = state.K_L * state.lateral, (state.height, state.lateral)
     stress = checks.corrected_stress(d[..., None], D[..., None], state.force, shear, *under)
-    tau_min, tau_max = np.min(stress[..., 1:], axis=-1), np.max(stress[..., 1:], axis=-1)
+    tau_min, tau_max = np.min(stress[..., 2:], axis=-1), np.max(stress[..., 2:], axis=-1)
     with np.errstate(divide="ignore"):  # no equilibrium: no stress, and a slack that says so
         margin: Floats = checks.goodman_limit(table.goodman, tau_min) / tau_max
     return margin

@@ -30,7 +30,7 @@ from railsim.springs.nests import Dimensions, Evaluation, Task, evaluate
 LIMITS = {
     "outer_diameter": ("search.outer_diameter_max", "raise it"),
     "inner_diameter": ("search.inner_diameter_min", "reduce it"),
-    "radial_clearance": ("search.clearance_min", "reduce it"),
+    "radial_clearance": ("search.clearance_min", "reduce it and checks.radial_clearance"),
     "free_height_min": ("search.free_height", "reduce the smallest free height"),
     "free_height_max": ("search.free_height", "raise the largest free height"),
     "stiffness": ("target", "bring load and deflection to what two springs can do; see design"),
@@ -41,7 +41,7 @@ OF_EACH = {
     "coils": ("search.active_coils_min", "reduce it, or allow thicker wire"),
     "height": ("search.free_height", "raise it, or allow thinner wire"),
     "yield": ("search.stress_ratio_max", "raise it or material.tau_allowable"),
-    "fatigue": ("search.fatigue_margin_min", "reduce it, or allow more space"),
+    "fatigue": ("search.fatigue_margin_min", "reduce it and checks.fatigue_margin"),
     "buckling": ("search.buckling_ratio_max", "raise it, or reduce search.free_height"),
 }
 LIMITS |= {f"{limit}_{s}": how for limit, how in OF_EACH.items() for s in ("outer", "inner")}

@@ -116,7 +116,14 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
     K_V = [stiffness for stiffness, _, _ in springs]
     load = suspension.mounting.load
     start = float(trailing_arm.mounting_deflection(load, K_V, suspension.engagement))
-    return trailing_arm.nest(suspension, springs, start)
+    frame = trailing_arm.nest(suspension, springs, start)
+    for (name, solid), coil in zip(solid_heights(suspension).items(), frame.coils, strict=True):
+        if coil.start >= coil.H0 - solid:
+            found = f"{load * 1e-3:.3f} kN is beyond the solid height of the {name} spring"
+            remedy = f"reduce it, or raise {name}.wire_diameter, {name}.free_height or material.G"
+            faults.append(Fault(suspension.name, "mounting.load", found, remedy))
+    faults.check()
+    return frame
 
 
 def load_cases(

@@ -159,6 +159,10 @@ def test_tables_for_people(capsys):
         ("fatigue", ["fatigue.max_load=30e3"], "fatigue.max_load", "highest"),
         ("fatigue", ["fatigue.max_load=200e3"], "fatigue.max_load", "solid height"),
         ("fatigue", ["fatigue.goodman=[[0.0, 4e8]]"], "fatigue.goodman", ""),
+        # kg/mm2 in place of Pa
+        ("verify", ["material.G=8000", "material.E=21000"], "mounting.load", "solid height"),
+        ("verify", ["tolerances.wire_diameter=0.03"], "tolerances.wire_diameter", "0.027; less"),
+        ("verify", ["tolerances.active_coils=4"], "tolerances.active_coils", "is 3.6; less"),
     ],
 )
 def test_bad_input_names_the_key_and_what_to_change(capsys, command, changes, key, advice):
@@ -309,6 +313,26 @@ def test_vehicle_warns_of_springs_for_another_load(capsys):
     assert "puts 97.2 kN on an axlebox at rest, the springs are taken at 59.9 kN" in (
         capsys.readouterr().err
     )
+
+
+def test_vehicle_says_that_the_other_primary_suspension_stays(capsys):
+    """The springs of wagon_y25 have other names than those of the coach."""
+    said = "'wagon_y25' has nothing of vehicle.remove"
+    assert cli.main(["spring", "vehicle", "turasas_axlebox", "--extends", "wagon_y25"]) == 0
+    assert said in capsys.readouterr().err
+    for coach in ("coach_flexicoil", "coach_manchester"):
+        assert cli.main(["spring", "vehicle", "turasas_axlebox", "--extends", coach]) == 0
+        assert "vehicle.remove" not in capsys.readouterr().err
+
+
+def test_verify_says_how_far_the_springs_are_from_the_wanted_deflection(capsys):
+    """K_V = G d^4 / (8 n D^3) of both springs, loads in kg in place of N."""
+    stiffness = 78.48e9 * (0.041**4 / (8 * 3.6 * 0.230**3) + 0.027**4 / (8 * 6.0 * 0.142**3))
+    assert cli.main(["spring", "verify", "turasas_axlebox", "--set", "mounting.load=7012.5"]) == 0
+    said = (
+        f"{7012.5 / stiffness * 1e3:.2f} mm under the mounting load; mounting.deflection is 73.47"
+    )
+    assert said in capsys.readouterr().out
 
 
 def test_vehicle_json_gives_the_tables(capsys):

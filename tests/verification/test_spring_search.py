@@ -39,6 +39,17 @@ def test_every_nest_meets_all_checks_of_the_verification(found):
         assert all(check.ok for check in verification.checks)
 
 
+def test_nests_meet_stricter_checks_and_the_largest_load_of_the_file():
+    """T.I. is above the load for the solid height, and must not press a spring solid."""
+    changes = ["checks.radial_clearance=0.009", "checks.fatigue_margin=1.2"]
+    changes += ["checks.solid_load=A.S.", "checks.standard_clearance_factor=0.0"]
+    suspension = load_spring("turasas_axlebox", [*QUICK, *changes, 'loads."T.I."=100e3'])
+    result = search(suspension)
+    assert result.nests
+    for nest in result.nests:
+        assert all(check.ok for check in verify(built(suspension, nest)).checks)
+
+
 def test_nests_have_the_stated_margins_and_deflections(found):
     suspension, result = found
     for nest in result.nests:
