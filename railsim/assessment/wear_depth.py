@@ -230,7 +230,7 @@ def wheel_dimensions(profile: Profile) -> WheelDimensions:
     """
     y, z = np.asarray(profile.y), np.asarray(profile.z) - np.interp(0.0, profile.y, profile.z)
     tip = int(np.argmax(z))
-    tread, field = y >= y[tip], y > 0.0
+    tread = y >= y[tip]
 
     def face(depth: float) -> float:
         """Innermost place of the flange's face at a depth."""
@@ -238,6 +238,6 @@ def wheel_dimensions(profile: Profile) -> WheelDimensions:
         pair = slice(below - 1, below + 1)
         return float(np.interp(-depth, -z[tread][pair], y[tread][pair]))
 
-    thick, outer = face(0.010), np.maximum.accumulate(z[field][::-1])[::-1]
-    slope, hollow = thick - face(z[tip] - 0.002), float(np.max(outer - z[field]))
+    thick, outer = face(0.010), np.maximum.accumulate(z[tread][::-1])[::-1]
+    slope, hollow = thick - face(z[tip] - 0.002), float(np.max(outer - z[tread]))
     return WheelDimensions(float(z[tip]), thick - FLANGE_BACK, slope, hollow)

@@ -70,12 +70,19 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
           --distance 6000 --step 1000 --out worn
     """
     from railsim.definitions.loading import load_wheel_limits
+    from railsim.definitions.track.layout import curvature_sections
     from railsim.studies.wear_loop import Route, wear_loop, wear_rows
 
     inputs = [replace(given, track=track).inputs() for track, _, _ in routes]
     ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
     (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
     named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
+    for track in {way.track.name: way.track for way in ways}.values():
+        parts = curvature_sections(track)
+        curved = sum(part.end - part.begin for part in parts if part.type != "STR")
+        if 0.0 < curved < (whole := parts[-1].end - parts[0].begin):
+            words = f"{curved:.0f} of its {whole:.0f} m are curved; its mean wear is that over all"
+            how["output"].remark(f"{track.name}: {words}.")
     _carry_out(
         WHEELS,
         {"vehicle": coach.name, "routes": named},

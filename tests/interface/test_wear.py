@@ -115,6 +115,16 @@ def test_loop_that_is_refused_keeps_what_was_done(command, tmp_path, capsys, mon
     assert files == {"wear.json", "wear.png", "steps", "wheel_100_km.csv", "wheel_150_km.csv"}
 
 
+def test_straights_of_a_curve_are_said(capsys):
+    """60 m of R 500 m and two transitions of 60 m between straights of 300 and 500 m."""
+    route = ["--route", "curve_r500", "20", "1", "--route", "straight", "20", "1"]
+    more = ["--distance", "1", "--step", "1", "--law", "none"]
+    assert main(["wear", "coach_manchester", *route, *more]) == 2
+    said = capsys.readouterr().err
+    assert said.count("are curved") == 1
+    assert "180 of its 980 m are curved; its mean wear is that over all." in said
+
+
 @pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize(("speed", "hunts"), [(30.0, False), (60.0, True)])
 def test_straight_above_the_critical_speed_is_a_remark(speed, hunts, tmp_path):

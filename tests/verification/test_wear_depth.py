@@ -17,13 +17,14 @@ from railsim.assessment.wear_depth import (
     grid,
     parts_of_step,
     spread,
+    wheel_dimensions,
     worn_depth,
     worn_profile,
 )
 from railsim.contact.curves import tape_circle_position, wheel_curve
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
-from railsim.profiles import load_profile
+from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.studies.wear_loop import wear_loop
 
@@ -63,6 +64,18 @@ def test_contact_in_one_place_wears_no_groove_sharper_than_a_gauge_corner(place)
 
     # where the new wheel is as hollow as the corner, R 13 mm, the groove adds to it
     assert concave(worn) - concave(new) < 0.5 / 13e-3
+
+
+@pytest.mark.parametrize("place", [-0.015, 0.015])
+def test_hollow_counts_on_both_sides_of_the_nominal_rolling_circle(place):
+    """A parabola of 2 mm over 30 mm in a tread of 1:40."""
+    y = np.linspace(-0.055, 0.055, 11_001)
+    flange = 0.028 * np.clip((-0.032 - y) / 0.02, 0.0, 1.0)
+    tread = -y / 40.0 - 2e-3 * np.maximum(0.0, 1.0 - ((y - place) / 0.015) ** 2)
+    found = wheel_dimensions(Profile("parabola", "wheel", y, tread + flange)).hollow
+    # above the outer edge, -15/40 mm: 2 (1 - u^2) - 15 (1 - u)/40 mm at its largest over u
+    u = np.linspace(-1.0, 1.0, 20_001)
+    assert found == pytest.approx(1e-3 * np.max(2.0 * (1.0 - u**2) - 0.375 * (1.0 - u)), rel=1e-4)
 
 
 def test_step_is_divided_where_the_profile_would_wear_by_more_than_a_tenth_of_a_millimetre():
