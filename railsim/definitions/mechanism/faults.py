@@ -228,6 +228,15 @@ def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
         low, work, high = (number(getattr(zone, k), values) for k in ("low", "work", "high"))
         if not low <= work <= high or low == high:
             yield _fault("zone", f"{low:g}, {work:g}, {high:g}", "low <= work <= high")
+    wanted = mechanism.optimise
+    if wanted is not None and wanted.min_transmission_angle is not None:
+        angle = number(wanted.min_transmission_angle, values)
+        if not 0.0 < angle < 0.5 * np.pi:
+            allowed = "above 0 and below pi/2 rad: angles are folded to it"
+            yield _fault("optimise.min_transmission_angle", f"{angle:g}", allowed)
+    for name, tolerance in mechanism.tolerances.items():
+        if not (value := number(tolerance, values)) >= 0.0:
+            yield _fault(f"tolerances.{name}", f"{value:g}", "0 or greater: it is plus and minus")
     for name, bounds in _bounds(mechanism):
         low, high = (number(q, values) for q in bounds)
         if not low < high:
