@@ -9,7 +9,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.mechanism import definition as written
 from railsim.definitions.mechanism.values import points_of
-from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia
+from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia, rubs
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.links import Course
@@ -19,6 +19,7 @@ Law = Callable[[Floats], tuple[Floats, Floats, Floats]]
 """Travel, speed and acceleration at given times."""
 
 ACCURACY = 1e-11  # relative error of a step of the free motion
+NEAR = 1e-9  # of the end of a free motion: it is reached [rad or m]
 
 
 def polynomial_345(duration: float, stroke: float) -> tuple[float, float, float]:
@@ -173,31 +174,54 @@ def free_motion(
     Notes
     -----
     Dormand and Prince's method of order 8 with a relative error of `ACCURACY` a step.  Friction
-    acts against the motion.
+    acts against the motion; where it turns, it may hold the mechanism, and the motion ends.
     """
     from scipy.integrate import solve_ivp  # imported where it is needed: it takes a while
 
     last = [solve(model, [start])]
 
-    def rate(t: float, state: Floats) -> list[float]:
+    def pull(t: float, state: Floats, sense: int) -> tuple[float, float]:
+        """Generalised force with friction against a sense of motion, and generalised mass."""
         motion = solve(model, [state[0]], last[0])
         last[0] = motion
-        sense = int(np.sign(state[1])) if state[1] != 0.0 else int(np.sign(until - start))
         mass, slope = inertia(motion)
         if not mass[0] > 0.0:
             raise model.refusal("release", "no mass moves", "masses of bodies")
-        pull = generalised_force(motion, Rates(np.array([state[1]]), 0.0, sense, trial=True))
+        found = generalised_force(motion, Rates(np.array([state[1]]), 0.0, sense, trial=True))
         if force is not None:
-            pull = pull + force(t, motion)
-        return [state[1], float((pull[0] - 0.5 * slope[0] * state[1] ** 2) / mass[0])]
+            found = found + force(t, motion)
+        return float(found[0] - 0.5 * slope[0] * state[1] ** 2), float(mass[0])
 
     def there(_: float, state: Floats) -> float:
         return float(state[0] - until)
 
+    def turns(_: float, state: Floats) -> float:
+        return float(state[1])
+
     there.terminal = True  # type: ignore[attr-defined]
+    turns.terminal = True  # type: ignore[attr-defined]
+    events = [there, turns] if rubs(model) else [there]
     accuracy: Any = {"rtol": ACCURACY, "atol": 1e-13}
-    found = solve_ivp(rate, (0.0, duration), [start, speed], "DOP853", events=[there], **accuracy)
-    if not found.success:
-        raise model.refusal("release", "the motion has no solution", found.message)
-    generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is reported here
-    return FreeMotion(found.t, found.y[0], found.y[1], found.status == 1)
+    t, state, legs, reached = 0.0, np.array([start, speed]), [], False
+    while t < duration and not reached:
+        sense = int(np.sign(state[1]))
+        if not sense:
+            sense = next((way for way in (1, -1) if way * pull(t, state, way)[0] > 0.0), 0)
+        if not sense and len(events) > 1:
+            legs.append((np.array([t, duration]), np.stack([state, state], axis=1)))
+            break
+
+        def rate(t: float, state: Floats, sense: int = sense) -> list[float]:
+            found, mass = pull(t, state, sense)
+            return [state[1], found / mass]
+
+        turns.direction = -sense  # type: ignore[attr-defined]
+        found = solve_ivp(rate, (t, duration), state, "DOP853", events=events, **accuracy)
+        if not found.success:
+            raise model.refusal("release", "the motion has no solution", found.message)
+        legs.append((found.t, found.y))
+        reached = found.status == 1 and abs(found.y[0, -1] - until) < NEAR
+        t, state = float(found.t[-1]), np.array([found.y[0, -1], 0.0])
+    time, (s, rates) = (np.concatenate(parts, axis=-1) for parts in zip(*legs, strict=True))
+    generalised_force(solve(model, s))  # a gas spring beyond its stroke is reported here
+    return FreeMotion(time, s, rates, reached)

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
+from railsim.mechanisms.dynamics import free_motion
+from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import sentences
@@ -145,6 +148,27 @@ def test_with_friction_an_arm_rests_in_a_range_of_angles(arm):
     assert (hanging.stable, standing.stable) == (True, False)
     assert (hanging.low, hanging.high) == pytest.approx((-np.pi / 2 - half, -np.pi / 2 + half))
     assert (standing.low, standing.high) == pytest.approx((np.pi / 2 - half, np.pi / 2 + half))
+
+
+def test_a_pendulum_with_dry_friction_turns_where_its_energy_says_and_rests(arm):
+    """From a to b, m g l (cos b - cos a) = T (a + b); it rests where m g l |sin b| < T."""
+    moment, down = 300.0, -0.5 * np.pi
+    text = arm(TORQUE, begin=-2.9, end=-0.1, friction=moment)
+    found = free_motion(build(text), down + 1.2, -2.9, 30.0)
+    weight, swing, expected = 100.0 * G, 1.2, []
+    while weight * np.sin(swing) > moment:
+        swing = brentq(
+            lambda b, a=swing: weight * (np.cos(b) - np.cos(a)) - moment * (a + b),
+            -0.999 * swing,
+            swing,
+        )
+        expected.append(swing)
+    sides = down + np.array(expected) * (-1.0) ** np.arange(1, len(expected) + 1)
+    assert len(expected) == 2
+    assert np.min(found.s) == pytest.approx(sides[0], abs=1e-6)
+    assert found.s[-1] == pytest.approx(sides[-1], abs=1e-6)
+    assert found.time[-1] == 30.0
+    assert not found.reached
 
 
 def test_no_position_of_rest_is_said(arm):
