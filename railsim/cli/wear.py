@@ -1,6 +1,6 @@
 """``railsim wear``, ``railsim rail-wear``: profiles over distance or tonnage as they wear."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,6 +10,7 @@ import click
 from railsim.cli import common as cli
 
 if TYPE_CHECKING:
+    from railsim.definitions import Track
     from railsim.studies.wear_loop import WearStep
     from railsim.table import Table
 
@@ -70,19 +71,13 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
           --distance 6000 --step 1000 --out worn
     """
     from railsim.definitions.loading import load_wheel_limits
-    from railsim.definitions.track.layout import curvature_sections
     from railsim.studies.wear_loop import Route, wear_loop, wear_rows
 
     inputs = [replace(given, track=track).inputs() for track, _, _ in routes]
     ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
     (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
     named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
-    for track in {way.track.name: way.track for way in ways}.values():
-        parts = curvature_sections(track)
-        curved = sum(part.end - part.begin for part in parts if part.type != "STR")
-        if 0.0 < curved < (whole := parts[-1].end - parts[0].begin):
-            words = f"{curved:.0f} of its {whole:.0f} m are curved; its mean wear is that over all"
-            how["output"].remark(f"{track.name}: {words}.")
+    _say_straights([way.track for way in ways], how["output"])
     _carry_out(
         WHEELS,
         {"vehicle": coach.name, "routes": named},
@@ -119,7 +114,20 @@ def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
     _, worn, settings = inputs[0]
     named = [{"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix]
     record = {"track": worn.name, "traffic": named}
+    _say_straights([worn], how["output"])
     _carry_out(RAILS, record, partial(rail_wear, worn, mix, settings=settings), rail_rows, **how)
+
+
+def _say_straights(tracks: "Sequence[Track]", output: cli.Output) -> None:
+    """Remark on tracks of which a part only is curved: the mean wear is that over all."""
+    from railsim.definitions.track.layout import curvature_sections
+
+    for track in {track.name: track for track in tracks}.values():
+        parts = curvature_sections(track)
+        curved = sum(part.end - part.begin for part in parts if part.type != "STR")
+        if 0.0 < curved < (whole := parts[-1].end - parts[0].begin):
+            words = f"{curved:.0f} of its {whole:.0f} m are curved; its mean wear is that over all"
+            output.remark(f"{track.name}: {words}.")
 
 
 class Worn(NamedTuple):

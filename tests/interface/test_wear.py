@@ -122,7 +122,11 @@ def test_straights_of_a_curve_are_said(capsys):
     assert main(["wear", "coach_manchester", *route, *more]) == 2
     said = capsys.readouterr().err
     assert said.count("are curved") == 1
-    assert "180 of its 980 m are curved; its mean wear is that over all." in said
+    words = "180 of its 980 m are curved; its mean wear is that over all."
+    assert words in said
+    traffic = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "1", "--step", "1"]
+    assert main(["rail-wear", "curve_r500", *traffic, "--law", "none"]) == 2
+    assert words in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("small_contact_tables")
