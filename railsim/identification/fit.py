@@ -161,7 +161,7 @@ def _solved(problem: Problem, loss: str) -> Identified:
     remarks += _suspicions(problem, x, problem.series(x), clocks=True)
     remarks += [f"{one.run.name}: {words}" for one in problem.runs
                 for words in one.measurement.remarks]  # fmt: skip
-    return _outcome(problem, start, x, list(dict.fromkeys(remarks)))
+    return _outcome(problem, start, x, loss, list(dict.fromkeys(remarks)))
 
 
 def _least(
@@ -204,7 +204,7 @@ def _with_own_derivatives(
     for _ in range(MOST_TIMES):
         jacobian = problem.derivatives_at(x)
         before, (x, _) = x, _least(problem, x, bounds, loss, FINE)
-        deviations = np.sqrt(np.diag(_covariance(problem, x, jacobian)[0]))
+        deviations = np.sqrt(np.diag(_covariance(problem, x, jacobian, loss)[0]))
         change = float(np.max(np.abs(x - before) / deviations))
         if np.max(np.abs(x - before)[: problem.count]) < SAME:
             change = 0.0
@@ -213,11 +213,24 @@ def _with_own_derivatives(
     return x, change
 
 
-def _covariance(problem: Problem, x: Floats, jacobian: Floats) -> tuple[Floats, float]:
+def _counting(vector: Floats, loss: str) -> Floats:
+    """Return by how much residuals count with a loss, 1 where it does not yield."""
+    square = (vector / SCALE) ** 2
+    weights = {
+        "linear": np.ones(len(vector)), "soft_l1": 1.0 / np.sqrt(1.0 + square),
+        "huber": 1.0 / np.sqrt(np.maximum(square, 1.0)), "cauchy": 1.0 / (1.0 + square),
+    }  # fmt: skip
+    return weights[loss]
+
+
+def _covariance(problem: Problem, x: Floats, jacobian: Floats, loss: str) -> tuple[Floats, float]:
     """Return the covariance of the coordinates, and by how much residuals above noise raise it."""
     vector = problem.vector(x)
     data = len(vector) - len(problem.before(x))
-    square = float(np.sum(vector[:data] ** 2)) / max(1, data - problem.size)
+    counting = _counting(vector, loss)
+    jacobian = np.sqrt(counting)[:, None] * jacobian
+    square = float(counting[:data] @ vector[:data] ** 2)
+    square /= max(1.0, float(np.sum(counting[:data])) - problem.size)
     # what the noise that is stated does not explain is taken as noise too
     inflation = max(1.0, square)
     _, singular, right = np.linalg.svd(jacobian, full_matrices=False)
@@ -300,10 +313,13 @@ def _rms(x: Floats) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
-def _outcome(problem: Problem, start: Floats, x: Floats, remarks: list[str]) -> Identified:
+def _outcome(
+    problem: Problem, start: Floats, x: Floats, loss: str, remarks: list[str]
+) -> Identified:
     count = problem.count
     jacobian = problem.derivatives_near(x)
-    covariance, inflation = _covariance(problem, x, jacobian)
+    covariance, inflation = _covariance(problem, x, jacobian, loss)
+    jacobian = np.sqrt(_counting(problem.vector(x), loss))[:, None] * jacobian
     data = len(jacobian) - len(problem.before(x))
     channels = []
     series = zip(
