@@ -99,6 +99,9 @@ def identify(
     """
     _checked(band, form, loss)
     files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
+    places = [Path(one).resolve() for one in files if not isinstance(one, Measurement)]
+    for twice in {one.name for one in places if places.count(one) > 1}:
+        raise argument_error("measured", f"{twice} is given twice", "each run once")
     runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
     if not runs:
         raise argument_error("measured", "none", "one measured run at least")

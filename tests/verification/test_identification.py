@@ -351,6 +351,12 @@ def test_all_variants_have_the_step_of_the_model(found):
     assert run.result(softer).attributes["step"] == run.settings.step
 
 
+def test_a_run_counts_once(found):
+    """Twice the same values would narrow the intervals by the root of two."""
+    with pytest.raises(railsim.InputError, match="run.toml is given twice; each run once"):
+        railsim.identify(quarter(), [found[1], str(found[1])], [PRIMARY], workers=1)
+
+
 def test_a_file_in_place_of_the_folder_is_said(found, tmp_path):
     (tmp_path / "kept").write_text("a file", encoding="utf-8")
     with pytest.raises(railsim.InputError, match="folder: cannot make"):
