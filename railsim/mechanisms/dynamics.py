@@ -220,7 +220,7 @@ def free_motion(
         if not found.success:
             raise model.refusal("release", "the motion has no solution", found.message)
         legs.append((found.t, found.y))
-        reached = found.status == 1 and abs(found.y[0, -1] - until) < NEAR
+        reached = found.status == 1 and bool(abs(found.y[0, -1] - until) < NEAR)
         t, state = float(found.t[-1]), np.array([found.y[0, -1], 0.0])
     time, (s, rates) = (np.concatenate(parts, axis=-1) for parts in zip(*legs, strict=True))
     generalised_force(solve(model, s))  # a gas spring beyond its stroke is reported here

@@ -248,6 +248,7 @@ def test_search_without_a_solution_gives_the_least_broken_compromise(capsys):
          "optimise.min_transmission_angle", "below pi/2 rad"),
         ("atr95_lift_2", ["optimise.min_transmission_angle=0"],
          "optimise.min_transmission_angle", "above 0"),
+        ("atr95_lift_2", ["actuators.lift.rod=0.2"], "actuators.lift.rod", "the bore, 0.16"),
         ("tilting_two_springs", ["tolerances.front_F1=-20"], "tolerances.front_F1", "or greater"),
         ("atr95", ["actuators.lift.heights=[0.1,0.2]"], "actuators.lift", "rows of 'forces'"),
         ("atr95_lift_5", ["optimise.objective=constant"], "optimise.target", "needs one"),

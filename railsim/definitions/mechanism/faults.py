@@ -219,6 +219,10 @@ def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
                 if not np.all(np.diff(first) > 0.0):
                     found, allowed = "first column not rising", "rising from row to row"
                     yield _fault(f"{key}.table", found, allowed)
+            if isinstance(part, Cylinder):
+                rod, bore = number(part.rod, values), number(part.bore, values)
+                if not rod < bore:
+                    yield _fault(f"{key}.rod", f"{rod:g}", f"less than the bore, {bore:g}")
             if isinstance(part, AirSpring):
                 yield from _air_spring_faults(key, part, values)
     begin, end = (number(q, values) for q in (mechanism.driver.start, mechanism.driver.end))
