@@ -115,7 +115,7 @@ def critical_speed(
     found = CriticalSpeed(contact, vehicle.name, conditions(track, settings), low, high)
     found.remarks += smooth.remarks
     found.conicity_over_amplitude = _conicity(smooth)
-    found.linear = _linear(found, smooth)
+    found.linear, stuck = _linear(found, smooth)
     if over_amplitude:
         found.linear_over_amplitude = _over_amplitude(smooth, low, high)
         if found.linear is not None and smooth.system.support.elastic:
@@ -140,7 +140,7 @@ def critical_speed(
 
         try:
             if method == "ramp":
-                _by_ramp(found, motion, begins, excitations, share)
+                _by_ramp(found, motion, begins, stuck, excitations, share)
             elif method == "bifurcation":
                 _by_diagram(found, motion, begins.parameter, points, excitations, share)
             else:
@@ -202,8 +202,13 @@ def _loss_of_hunting(
     return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
 
 
-def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
-    """The linear critical speed; a remark where there is none, or where friction sticks."""
+def _linear(
+    found: CriticalSpeed, prepared: LinearVehicle
+) -> tuple[LinearLoss | None, float | None]:
+    """The linear critical speed; a remark where there is none, or where friction sticks.
+
+    Besides: from which speed another mode is undamped as long as friction sticks [m/s].
+    """
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
     def words(mode: Eigenmodes) -> str:
@@ -212,19 +217,21 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
             f"{100.0 * mode.damping_ratios[0]:.3g} % at {mode.linearisation.parameter:g} m/s"
         )
 
-    lost = _loss_of_hunting(prepared, low, high)
+    lost, stuck = _loss_of_hunting(prepared, low, high), None
     if prepared.sticking:
         other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
         if (other.parameter is not None and other.parameter != lost.parameter) or other.already:
             mode = other.modes[0]
+            stuck = float(mode.linearisation.parameter)
             found.remarks.append(
                 f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
                 f"{mode.linearisation.parameter:.4g} m/s or less as long as all friction elements "
-                "stick; sliding damps it, so that it is not counted"
+                "stick; sliding limits it, so that it does not count as loss of stability"
             )
     if lost.parameter is not None:
         mode = lost.modes[0]
-        return LinearLoss(lost.parameter, float(mode.frequencies[0]), mode_name(parts, mode))
+        name = mode_name(parts, mode)
+        return LinearLoss(lost.parameter, float(mode.frequencies[0]), name), stuck
     found.unstable_at_low = lost.already
     if lost.already:
         found.remarks.append(f"unstable at the lower end of the range: {words(lost.modes[0])}")
@@ -233,7 +240,7 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
             f"no linear critical speed from {low:g} to {high:g} m/s; least damped: "
             f"{'; '.join(map(words, lost.modes))}"
         )
-    return None
+    return None, stuck
 
 
 def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmplitude:
@@ -296,6 +303,7 @@ def _by_ramp(
     found: CriticalSpeed,
     motion: VehicleMotion,
     begins: LossOfStability,
+    stuck: float | None,
     excitations: Sequence[float],
     progress: Progress,
 ) -> None:
@@ -304,29 +312,37 @@ def _by_ramp(
     found.nonlinear["ramp"] = lowest  # kept if a further one leaves the rails
     unstable = found.low if begins.already else begins.parameter
     end = found.high if lowest is None else lowest.speed
-    if unstable is not None and end > _far_above(unstable):
+    for at in sorted(v for v in (stuck, unstable) if v is not None and end > _far_above(v)):
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
-        reach = min(ABOVE * unstable, end - unstable)
-        tops = [unstable + share * reach for share in ONWARDS]
+        reach = min(ABOVE * at, end - at)
+        tops = [at + share * reach for share in ONWARDS]
         for top in tops:
             below, further = ramp(motion, found.low, top, excitations=excitations)
             found.branches.append(further)
             if below is not None:
                 found.nonlinear["ramp"] = lowest = below
                 break
-        else:
+        if lowest is not None and lowest.speed < end:
+            break
+        if at == unstable:
             words = " and ".join(f"{top:.4g}" for top in tops)
             found.remarks.append(
-                f"ramp: rest is unstable at {unstable:.4g} m/s, but nothing lasts that is excited "
+                f"ramp: rest is unstable at {at:.4g} m/s, but nothing lasts that is excited "
                 f"at {words} m/s (bifurcation)"
             )
     if lowest is None:
-        found.remarks.append(f"ramp: nothing hunts from {found.low:g} to {found.high:g} m/s")
+        found.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {found.high:g} m/s")
     elif lowest.speed <= found.low:
         found.remarks.append(f"ramp: hunts still at the lower end, {found.low:g} m/s")
     if branch.points[0].speed < found.high:
         top = branch.points[0].speed
         found.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
+
+
+def _after(excitations: Sequence[float]) -> str:
+    """Say what was tried: another disturbance may end in hunting."""
+    size = 1e3 * max(excitations)
+    return f"after disturbances of up to {size:g} mm in the shape of the hunting mode"
 
 
 def _far_above(speed: float) -> float:
@@ -360,12 +376,14 @@ def _by_diagram(
     found.nonlinear["bifurcation"] = lowest = lowest_of(branches)
     found.branches += branches
     found.jumps = jumps(branches)
-    reached = max((point.speed for point in branches[0].points), default=None)
+    reached, tried = max((p.speed for p in branches[0].points), default=None), _after(excitations)
     if reached is None:
         found.remarks.append("bifurcation: the vehicle derails at the lower end")
     elif reached < speeds[-1]:
         found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
-    if lowest is not None and lowest.speed <= found.low:
+    if lowest is None and reached is not None:
+        found.remarks.append(f"bifurcation: nothing hunts {tried} at any of the {points} speeds")
+    elif lowest is not None and lowest.speed <= found.low:
         found.remarks.append(f"bifurcation: hunts still at the lower end, {found.low:g} m/s")
 
 

@@ -7,7 +7,7 @@ begins near the unstable motion between them.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 
@@ -36,7 +36,8 @@ from railsim.stability.ramp import (
 ALIKE = 0.1  # relative difference of two amplitudes at a speed that count as one motion
 NEAR = 0.03  # relative difference of amplitudes that need not settle further
 SETTLING = 2.0  # s between looks at a step of a diagram
-MOST_SETTLING = 60  # looks; 1 m/s above a critical speed a coach's hunting grows by 0.1/s
+MOST_SETTLING = 60  # looks; 1 m/s above a critical speed a coach's hunting grows by 0.1/s ...
+ONE_WAY = 30  # ... and closer to it more slowly: they count from the last of so many to one side
 THRESHOLDS = 4  # speeds between the ends of two branches at which the unstable motion is sought
 HALVINGS = 6  # of the disturbance there
 MOST_LINGERING = 20  # s of a run that decides for one of two motions
@@ -91,8 +92,8 @@ def diagram(
     for number, speed in enumerate(reached):
         branches += _further(motion, branches, speed, excitations, lower)
         tell(0.5 + 0.25 * number / len(reached))
-    branches = [_refined(motion, branch) for branch in branches]
-    up, down = branches[:2]
+    up, down = (_refined(motion, branch) for branch in branches[:2])
+    branches[:2] = up, down
     between = _threshold(motion, up, down, lambda share: tell(0.75 + 0.25 * share))
     return [*branches, *([between] if between.points else [])]
 
@@ -114,13 +115,20 @@ def settled(
     """
     state, before = moved(motion, state, begin, speed), np.inf
     dead = THRESHOLD if 0.0 in known else 0.02 * THRESHOLD
-    for _ in range(MOST_SETTLING):
+    lasting, turned, grew = 0, 0, False
+    for look in count(1):
         seen = looked_at(motion, state, speed, SETTLING)
         change = abs(seen.amplitude - before) / max(seen.amplitude, 1e-12)
         near = any(abs(a - seen.amplitude) < NEAR * a for a in known)
         if change < 0.1 * CHANGE or (near and change < 0.5 * CHANGE):
             break
         if seen.amplitude < dead and seen.amplitude < before:
+            break
+        if (seen.amplitude > before) != grew:
+            turned, grew = look, not grew
+        if look - turned >= ONE_WAY:
+            lasting = look
+        if look - lasting >= MOST_SETTLING:
             break
         state, before = seen.state, seen.amplitude
     return seen
@@ -163,14 +171,14 @@ def _further(
             continue
         if not _is_known(here, [*branches, *found]):
             down, up = (_followed(motion, branches, here, side) for side in (below, above))
-            found.append(Branch("further", [*down[::-1], here, *up]))
+            found.append(Branch("further", [*down[:0:-1], *up]))
     return found
 
 
 def _followed(
     motion: Motion, branches: Sequence[Branch], start: Point, speeds: Sequence[float]
 ) -> list[Point]:
-    """Motions from one on over several speeds, to the first that is known or dead."""
+    """A motion followed over several speeds, to the first that is known or dead."""
     points = [start]
     for speed in speeds:
         try:
@@ -180,7 +188,7 @@ def _followed(
         points.append(seen_at(speed, seen))
         if _is_known(points[-1], branches):
             break
-    return points[1:]
+    return _refined(motion, Branch("further", points)).points
 
 
 def _refined(motion: Motion, branch: Branch) -> Branch:
@@ -190,25 +198,21 @@ def _refined(motion: Motion, branch: Branch) -> Branch:
     """
     points = branch.points[:1]
     for before, after in pairwise(branch.points):
-        points += [*_between(motion, branch.direction, before, after), after]
+        points += [*_between(motion, before, after), after]
     return Branch(branch.direction, points)
 
 
-def _between(motion: Motion, direction: str, before: Point, after: Point) -> list[Point]:
-    """Points between two neighbours, so many that no jump is wider than `RESOLUTION`."""
-    source = before
-    if direction == "further" and after.amplitude > before.amplitude:
-        source = after
+def _between(motion: Motion, before: Point, after: Point) -> list[Point]:
+    """Points between two found in this order, so many that no jump is wider than `RESOLUTION`."""
     near = abs(after.speed - before.speed) <= RESOLUTION
-    if near or source.amplitude < THRESHOLD or not far_apart(before.amplitude, after.amplitude):
+    if near or before.amplitude < THRESHOLD or not far_apart(before.amplitude, after.amplitude):
         return []
     middle = 0.5 * (before.speed + after.speed)
     try:
-        here = seen_at(middle, settled(motion, source.state, source.speed, middle))
+        here = seen_at(middle, settled(motion, before.state, before.speed, middle))
     except LeftRange:
         return []
-    lower = _between(motion, direction, before, here)
-    return [*lower, here, *_between(motion, direction, here, after)]
+    return [*_between(motion, before, here), here, *_between(motion, here, after)]
 
 
 def _threshold(motion: Motion, up: Branch, down: Branch, tell: Progress) -> Branch:

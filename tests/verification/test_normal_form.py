@@ -100,6 +100,50 @@ def test_a_motion_that_grows_is_followed_to_its_end():
     )
 
 
+@pytest.mark.parametrize("above", [0.1, 0.2])
+def test_slow_growth_just_above_the_loss_of_stability_is_followed_to_its_end(above):
+    """Within two minutes 10 um become 0.1 mm and 1.2 mm, which are no motions of their own."""
+    start = NormalForm().rest(LOST + above, 1e-5)
+    seen = settled(NormalForm(), start, LOST + above, LOST + above)
+    assert seen.amplitude == pytest.approx(hunting(LOST + above)[0], rel=0.01)
+
+
+class Between(NormalForm):
+    """Two stable motions from 46.2 to 49.7 m/s, 4 mm and 1 mm, others 4 mm alone.
+
+    a' = 2 a (a1 - a)(a - a2)(a - a3)/a1^3 with a3 = 1 mm; a2 = 2 mm where both are there.
+    """
+
+    def stretch(self, state, begin, end, duration):
+        n = round(duration / STEP)
+        a, phase = state
+        time, lateral = STEP * np.arange(1, n + 1), np.empty((n, 1))
+        for k in range(n):
+            speed = begin + (end - begin) * (k + 0.5) / n
+            upper, middle, lower = (x * 1e-3 for x in ((4.0, 2.0, 1.0)))
+            if 46.2 <= speed <= 49.7:
+                rate = (upper - a) * (a - middle) * (a - lower) / lower**3
+            else:
+                rate = (upper - a) / lower
+            a *= math.exp(STEP * rate)
+            phase += OMEGA * STEP
+            lateral[k, 0] = a * math.cos(phase)
+        return Stretch(np.array([a, phase]), time, lateral, 1e6 * lateral)
+
+
+def test_a_motion_found_at_one_speed_is_followed_to_both_its_ends():
+    """Where it jumps to a larger one it is the smaller one that is followed between the speeds."""
+    (found,) = [
+        branch
+        for branch in diagram(Between(), [44.0, 48.0, 52.0], excitations=[1e-3, 4e-3])
+        if branch.direction == "further"
+    ]
+    small = [point.speed for point in found.points if point.amplitude < 1.5e-3]
+    assert min(small) == pytest.approx(46.2, abs=0.1)
+    assert max(small) == pytest.approx(49.7, abs=0.1)
+    assert np.all(np.diff(found.column("speed")) > 0.0)
+
+
 class Derails(NormalForm):
     """What derails while it brakes from above 52 m/s."""
 
