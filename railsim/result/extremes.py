@@ -157,8 +157,8 @@ class MidCurve:
     `medians`, `scatter`: Median over the full curve, and half the distance between the percentiles
     15.87 and 84.13, which is one standard deviation of a normal distribution [SI]. `full_curve`:
     Where the reference body is while all wheelsets are in the full curve, without the first third
-    of it [m]; where it is shorter than that, its middle. `settling`: Whether the scatter is mostly
-    that of values on their way to a steady state, on smooth rails.
+    of it [m]; where the curve is shorter than the vehicle, its middle. `settling`: Whether the
+    scatter is mostly that of values on their way to a steady state, on smooth rails.
     """
 
     radius: float  # signed, positive to the right [m]
@@ -215,14 +215,14 @@ def _wanted(result: Result, names: Iterable[str] | None) -> list[str]:
 
 def _full_curve(result: Result, section: Section) -> tuple[float, float]:
     """Part of the way over which the whole vehicle is in the full curve, less its first third."""
-    middle = 0.5 * (section.begin + section.end)
     ahead = behind = 0.0
     if "wheelset_distance" in result:
         offset = result["wheelset_distance"][0] - result["distance"][0]
         ahead, behind = float(np.max(offset)), float(np.min(offset))
     begin, end = section.begin - behind, section.end - ahead
     begin += SETTLING * (end - begin)
-    return (begin, end) if begin < middle < end else (middle, middle)
+    middle = 0.5 * (section.begin + section.end)
+    return (begin, end) if begin < end else (middle, middle)
 
 
 def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bool) -> MidCurve:

@@ -42,7 +42,10 @@ def full_curve_table(result: Result, curve: MidCurve) -> Table:
             rows.append([name, quantity.words, side, *cells])
     begin, end = curve.full_curve
     around_words = "median, ± still settling" if curve.settling else "median and scatter"
-    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: {around_words}"
+    where = f"s = {begin:.1f} to {end:.1f} m: {around_words}"
+    if begin == end:
+        where = f"shorter than the vehicle, at its middle, s = {begin:.1f} m: values there"
+    title = f"Full curve R {curve.radius:.6g} m, {where}"
     numbers = [Column(str(index + 1), format=">") for index in range(len(result.wheelsets))]
     columns = [Column("quantity", " "), Column("words", "wheelset"), Column("side")]
     return Table([*columns, *numbers], rows, title)

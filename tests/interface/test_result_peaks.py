@@ -7,6 +7,7 @@ from example_result import arrays, attributes, example_result
 from railsim import load_track
 from railsim.notation import QUANTITIES
 from railsim.result import Result, mid_curves, peak, peaks
+from railsim.result.tables import full_curve_table
 
 
 def small(values, distance=(0.0, 10.0, 20.0), **facts):
@@ -87,6 +88,34 @@ def test_full_curve_values_are_medians_with_their_scatter():
     low, high = np.percentile(flat["Q"][rows], [15.87, 84.13], axis=0)
     np.testing.assert_allclose(curve.scatter["Q"], 0.5 * (high - low))
     assert curve.record()["medians"]["Q"] == curve.medians["Q"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("offsets", "full", "words"),
+    [
+        (
+            (7.2, -23.2),
+            (383.2 + 29.6 / 3.0, 412.8),
+            "s = 393.1 to 412.8 m",
+        ),  # two cars, first leads
+        ((40.0, -40.0), (390.0, 390.0), "shorter than the vehicle"),
+    ],
+)
+def test_a_vehicle_is_in_the_full_curve_wherever_its_reference_body_stands(offsets, full, words):
+    """From 360 to 420 m, the last wheelset behind its begin, the first before its end."""
+    waved = waves(1000.0)
+    arrays = {name: waved[name] for name in waved.quantities}
+    arrays["wheelset_distance"] = waved["distance"][:, None] + np.array([offsets])
+    arrays = {
+        name: np.repeat(values, 2, axis=1) if name in ("Q", "Y", "Y_over_Q") else values
+        for name, values in arrays.items()
+    }
+    quantities = {name: QUANTITIES[name] for name in arrays}
+    names = {"wheelset": ["lead", "trail"], "side": ["left", "right"]}
+    result = Result(arrays, quantities, names, attributes())
+    (curve,) = mid_curves(result)
+    assert curve.full_curve == pytest.approx(full)
+    assert words in str(full_curve_table(result, curve))
 
 
 def in_the_curve(course, **track):
