@@ -40,6 +40,7 @@ from railsim.studies.geometry_limits import CELL, SECTION, RecordedGeometry
 from railsim.studies.outcome import Outcome
 from railsim.studies.spec import StudySpec
 from railsim.table import Amount, Column, Table
+from railsim.track.irregularity import measured_remarks
 
 PIECE, RUN_IN, BEYOND = 2000.0, 200.0, 60.0  # m
 APART = 25.0  # m
@@ -205,7 +206,8 @@ def assess_track(
         f"{record['name']}: {record['status']}, {record['status_reason']}"
         for record in outcome.records
         if record["status"] != "complete"
-    ] + _hunting(outcome.records)
+    ]
+    remarks += _hunting(outcome.records) + measured_remarks(track)
     return _judged(track, runs, share, outcome, remarks)
 
 

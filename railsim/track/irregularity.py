@@ -13,6 +13,7 @@ from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import Measured, largest_between_rows
+from railsim.definitions.track.layout import cant_sections
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 from railsim.errors import input_error, nearest
@@ -21,6 +22,9 @@ from railsim.laws.permission import permitted_part
 
 # Largest displacement between the rows over that at the rows, from which on it is remarked on.
 BEYOND_ROWS = 1.05
+# Least cant and length at which a cross level is held against it, and share of it that is doubtful.
+CANTED, LONG, TWICE = 0.02, 30.0, 0.5  # m, m, 1
+MISSING, RECORDED = 5.0, 100  # median steps between two rows of a record; rows that make it one
 LARGEST = 0.5  # m; of a law of one's own
 
 
@@ -77,7 +81,10 @@ def shortest_length(track: Track) -> float:
 
 
 def measured_remarks(track: Track) -> list[str]:
-    """Remark on records between whose rows the rails go further than the rows by 5 % or more."""
+    """Remark on records between whose rows the rails go further than at them, on gaps and cant.
+
+    Further by 5 % or more; gaps of five steps or more.
+    """
     remarks = []
     for index, part in enumerate(track.irregularities):
         if not isinstance(part, Measured):
@@ -89,7 +96,42 @@ def measured_remarks(track: Track) -> list[str]:
                 f"{found.column} reaches {1e3 * found.between:.3g} mm at s = {found.s:.1f} m, "
                 f"the largest row is {1e3 * found.at_rows:.3g} mm."
             )
+        remarks += _gap_remarks(part, index) + _cant_remarks(part, index, track)
     return remarks
+
+
+def _gap_remarks(part: Measured, index: int) -> list[str]:
+    """Remark on rows that are missing: a smooth curve bridges them, and no defect is seen there."""
+    s = np.array([row[0] + part.shift for row in part.rows or ()])
+    steps = np.diff(s)
+    if len(s) < RECORDED or not len(gaps := np.flatnonzero(steps > MISSING * np.median(steps))):
+        return []
+    k = int(gaps[np.argmax(steps[gaps])])
+    more = f"the longest of {len(gaps)} such gaps, " if len(gaps) > 1 else ""
+    return [
+        f"irregularities.{index} has no rows from s = {s[k]:.1f} to {s[k + 1]:.1f} m, {more}"
+        f"elsewhere one every {np.median(steps):.3g} m: a smooth curve bridges them."
+    ]
+
+
+def _cant_remarks(part: Measured, index: int, track: Track) -> list[str]:
+    """Remark on a cross level that holds the cant, which the track has already."""
+    rows = np.array(part.rows or ())
+    for section in cant_sections(track):
+        cant, middle = section.start_value, 0.5 * (section.begin + section.end)
+        inside = (rows[:, 0] + part.shift >= section.begin) & (
+            rows[:, 0] + part.shift < section.end
+        )
+        if cant != section.end_value or abs(cant) < CANTED or not inside.any():
+            continue
+        s, level = rows[inside, 0], part.scale * (rows[inside, 4] - rows[inside, 2])
+        if np.ptp(s) >= LONG and abs(mean := float(level.mean())) > TWICE * abs(cant):
+            return [
+                f"The cross level of irregularities.{index} is {1e3 * mean:.0f} mm in the mean "
+                f"about s = {middle:.0f} m, where the track has {1e3 * cant:.0f} mm of cant: they "
+                "add up. Where it is the same cant, band takes it out."
+            ]
+    return []
 
 
 def _widening(track: Track) -> Displacement:

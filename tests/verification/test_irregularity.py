@@ -570,6 +570,62 @@ def test_equal_faults_of_a_recording_are_one_line_with_their_number(tmp_path):
     ]
 
 
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        (
+            "s,y_left,y_right,gauge",
+            "gauge and y_left and y_right; y_left and y_right, or gauge and y",
+        ),
+        ("s,z_left,cross_level,y", "cross_level and z_left; z_left and z_right, or cross_level"),
+    ],
+)
+def test_rails_and_what_is_worked_out_from_them_are_not_added_up(header, words, tmp_path):
+    """A gauge 2 mm wider in all three columns would be 4 mm."""
+    rows = "".join(f"{s},0.001,0.001,0.002\n" for s in range(5))
+    with pytest.raises(InputError, match=words):
+        recorded(tmp_path, f"{header}\n{rows}")
+    kept = {"columns": '{ s = "s", gauge = "gauge" }', "units": '{ s = "m", gauge = "m" }'}
+    if "gauge" in header:
+        (row, *_) = recorded(tmp_path, f"{header}\n{rows}", **kept).irregularities[0].rows
+        assert row[3] - row[1] == pytest.approx(0.002)
+
+
+def test_missing_rows_are_remarked_on(tmp_path):
+    s = np.arange(0.0, 90.0, 0.25)
+    z = 1e-3 * np.sin(2.0 * np.pi * s / 12.0)
+    assert measured_remarks(recorded(tmp_path, written(s, z))) == []
+    kept = ((s <= 20.0) | (s >= 32.0)) & ((s <= 50.0) | (s >= 52.0))
+    (remark,) = measured_remarks(recorded(tmp_path, written(s[kept], z[kept]), shift=5.0))
+    assert "no rows from s = 25.0 to 37.0 m, the longest of 2 such gaps" in remark
+    few = kept & (s < 36.0) & (s > 15.0)  # a defect drawn by hand
+    assert measured_remarks(recorded(tmp_path, written(s[few], z[few]))) == []
+
+
+@pytest.mark.parametrize(("level", "remarked"), [(80.0, True), (-80.0, True), (8.0, False)])
+def test_a_cross_level_that_holds_the_cant_is_remarked_on(level, remarked):
+    """A recording car measures the cant too: added to that of the plan it would be 160 mm."""
+    s = np.arange(0.0, 500.0, 0.5)
+    share = np.interp(s, [0.0, 300.0, 360.0, 420.0, 480.0], [0.0, 0.0, 1.0, 1.0, 0.0])
+    half = 0.5e-3 * (level * share + np.sin(s))
+    rows = [(a, 0.0, -b, 0.0, b) for a, b in zip(s.tolist(), half.tolist(), strict=True)]
+    part = {"type": "measured", "rows": rows}
+    curve = load_track("curve_r500").replace(
+        cant=[
+            {"type": "CST", "length": 300.0, "cant": 0.0},
+            {"type": "LIR", "length": 60.0},
+            {"type": "CST", "length": 60.0, "cant": 0.08},
+            {"type": "LIR", "length": 60.0},
+            {"type": "CST", "length": 300.0, "cant": 0.0},
+        ],
+        irregularities=[part],
+    )
+    found = measured_remarks(curve)
+    assert bool(found) == remarked
+    if remarked:
+        assert f"is {level:.0f} mm in the mean about s = 390 m" in found[0]
+
+
 def test_largest_value_between_the_rows_is_reported(tmp_path):
     """Eight rows a wave: with one on the crest, and with the crest between two."""
     s = np.arange(0.0, 60.0, 1.0)

@@ -31,6 +31,8 @@ SHARES = {
     "cross_level": (0.0, 0.0, -0.5, 0.0, 0.5),
     "gauge": (0.0, -0.5, 0.0, 0.5, 0.0),
 }
+# columns of single rails and of the track, of which a file has the ones or the others: they add up
+EITHER = ({"y_left", "y_right"}, {"y", "gauge"}), ({"z_left", "z_right"}, {"z", "cross_level"})
 LARGEST = 0.5  # m
 # Change of a displacement over distance between two rows beyond which no wheel could follow: a step
 # in the record, or a wrong unit.
@@ -121,6 +123,8 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
     head = [cell.strip() for cell in next(csv.reader([numbered[0][1]], delimiter=delimiter))]
     columns = _mapped(path, head, how.columns) if how.columns else _header(path, head)
     columns = [column and _as_told(column, how) for column in columns]
+    named = [column for column in columns if column]
+    _check_once(path, {column.name for column in named})
     faults: list[tuple[int, str, str]] = []  # number of the line, found, allowed
     numbers, table = [], []
     for number, line in numbered[1:]:
@@ -132,7 +136,6 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
             numbers.append(number)
         except ValueError as problem:
             faults.append((number, *problem.args))
-    named = [column for column in columns if column]
     values = np.array(table).reshape(len(table), len(named))
     rows = _rows(named, values, how)
     found = _row_faults(rows, named, values)
@@ -142,6 +145,21 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
     if len(rows) < 4:
         raise input_error(str(path), f"{len(rows)} rows", "four rows at least")
     return _filtered(path, rows, how)
+
+
+def _check_once(path: Path, names: set[str]) -> None:
+    """Raise InputError where a file gives single rails and what is worked out from them."""
+    faults = Faults()
+    for rails, track in EITHER:
+        if names & rails and names & track:
+            found = " and ".join(sorted(names & (rails | track)))
+            allowed = (
+                f"{' and '.join(sorted(rails))}, or {' and '.join(sorted(track))}: they add up"
+            )
+            faults.append(
+                Fault(str(path), "header", found, f"{allowed}; name the ones in 'columns'")
+            )
+    faults.check()
 
 
 def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[float]:
