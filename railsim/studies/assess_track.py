@@ -34,6 +34,7 @@ from railsim.notation import SIDES
 from railsim.result import Result, open_result
 from railsim.result.hunting import HUNTS
 from railsim.result.sensors import sensors
+from railsim.simulation.conditions import check_range
 from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, RecordedGeometry
@@ -171,10 +172,16 @@ def assess_track(
     check_folder(folder)
     track = recorded(recording)
     tested = {short_name(name): load_vehicle(name) for name in vehicles}
+    for speed in speeds:
+        check_range(track, speed, 0.0, None, None)
     missing = [n for n, v in tested.items() if v.service is None]
     if missing:
         allowed = "add [service] with admissible_speed and cant_deficiency"
         raise InputError([Fault(name, "service", "missing", allowed) for name in missing])
+    bare = [n for n, v in tested.items() if POINTS[0] not in sensors(v)]
+    if bare:
+        found, allowed = "a vehicle of wheelsets alone", "one with a body, whose floor is judged"
+        raise InputError([Fault(name, "bodies", found, allowed) for name in bare])
     begin, end = _extent(track)
     count = max(1, round((end - begin) / PIECE))
     edges = np.linspace(begin, end, count + 1)

@@ -140,6 +140,20 @@ def test_wrong_input(recording, tmp_path, capsys):
     assert "share" in capsys.readouterr().err
     assert main(["assess-track", "straight", *start[2:], "40", *end]) == 2
     assert "no recording" in capsys.readouterr().err
+    for speed in ("0", "-3", "1000"):
+        assert main([*start, speed, *end]) == 2
+        assert "0.5 to 150 m/s" in capsys.readouterr().err
+    lone = tmp_path / "lone.toml"
+    lone.write_text(
+        'format = "railsim-vehicle/1"\nname = "one wheelset"\n'
+        "[service]\nadmissible_speed = 20.0\ncant_deficiency = 0.1\n"
+        "[wheelsets.axle]\nmass = 4000.0\ninertia = [800.0, 90.0, 800.0]\n"
+        'position = [0.0, 0.0, -0.46]\nradius = 0.46\nprofile = "S1002"\n'
+    )
+    assert (
+        main(["assess-track", str(recording), "--vehicles", str(lone), "--speeds", "9", *end]) == 2
+    )
+    assert "wheelsets alone" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
     assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
 
