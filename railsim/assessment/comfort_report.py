@@ -11,6 +11,7 @@ from railsim.assessment.sperling import Direction, index_of_rms, sperling_weight
 from railsim.assessment.weighting import WK
 from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import input_error
 from railsim.result.filters import band_passed
 
@@ -66,6 +67,10 @@ def comfort_report(record: Record) -> list[PointComfort]:
     """
     names = [name for name in record.sensors if not name.startswith("frame_")]
     if not names:
+        flat = flatten(record.result.vehicle())
+        if flat.body(flat.reference).kind == "wheelset":
+            found, allowed = "a vehicle of wheelsets alone", "one with a body that has a floor"
+            raise input_error(record.name, found, allowed, "vehicle.bodies")
         allowed = "run it with settings.outputs.sensors=true"
         raise input_error(record.name, "is not in the result", allowed, "sensor_acceleration")
     columns = [list(record.sensors).index(name) for name in names]

@@ -31,7 +31,7 @@ def describe_statics(
         data[found.load] = {**found.record(), "frequencies": frequencies.records()}
         parts += ["", f"At rest, load '{found.load}'", *(f"  {words}" for words in found.displaced)]
         for table in (*found.tables, frequencies):
-            parts += ["", table]
+            parts += ["", table] if table.rows else []
     return Description(data, parts)
 
 

@@ -62,7 +62,10 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
         Column("number", format="<d"),
         *map(Column, ("between", "values")),
     ]
-    parts += ["", _body_table(bodies), "", Table(columns, lines), *_preload_note(vehicle)]
+    parts += ["", _body_table(bodies)]
+    if lines:
+        parts += ["", Table(columns, lines)]
+    parts += _preload_note(vehicle)
     return Description(data, parts)
 
 

@@ -230,3 +230,23 @@ def test_a_vehicle_of_another_gauge_stands_on_the_rails_of_a_track(tmp_path, cap
     assert "check gauge" in capsys.readouterr().err
     assert cli.main([*asked, "--track", str(track)]) == 0
     assert "At rest, load 'design'" in capsys.readouterr().out
+
+
+def test_one_wheelset_has_no_empty_tables_and_no_floor_to_assess(tmp_path, capsys):
+    (tmp_path / "lone.toml").write_text(
+        'format = "railsim-vehicle/1"\nname = "one wheelset"\n'
+        "[wheelsets.axle]\nmass = 4000.0\ninertia = [800.0, 90.0, 800.0]\n"
+        'position = [0.0, 0.0, -0.46]\nradius = 0.46\nprofile = "S1002"\n'
+    )
+    path = str(tmp_path / "lone.toml")
+    assert cli.main(["info", path, "--static"]) == 0
+    shown = capsys.readouterr().out
+    assert "Static wheel loads" in shown
+    assert "between" not in shown
+    assert "Natural frequencies" not in shown
+    run, sensors = str(tmp_path / "run.h5"), "settings.outputs.sensors=true"
+    rate = "settings.output_rate=1000"
+    more = ["--speed", "5", "--duration", "1", "--set", sensors, "--set", rate, "--out", run]
+    assert cli.main(["run", path, "straight", *more]) == 0
+    assert cli.main(["assess", run, "--standard", "comfort"]) == 2
+    assert "wheelsets alone" in capsys.readouterr().err
