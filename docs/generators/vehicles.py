@@ -37,7 +37,7 @@ AMPLITUDE = 3e-3  # m
 FASTEST = 20.0  # Hz, of the modes that are listed
 WIDTH = 900  # pixels
 GRAVITY = 9.81
-MARKS = re.compile(r"\[[DRCMA](?: \w+)?\]")
+MARKS = re.compile(r"\[[DRCIMA](?: \w+)?\]")
 INFINITE = 1e9  # m
 
 
