@@ -47,6 +47,7 @@ SHARE = 0.75  # ... this share of them
 # Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
 # what is left to the end of hunting; the range may be narrow.
 ONWARDS, ABOVE = (0.5, 0.1), 0.1
+AGAIN = 1.25  # ratio of speeds at which is looked whether rest is stable again
 AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
 OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
@@ -231,6 +232,7 @@ def _linear(
     if lost.parameter is not None:
         mode = lost.modes[0]
         name = mode_name(parts, mode)
+        found.remarks += _stable_again(prepared, lost.parameter, high)
         return LinearLoss(lost.parameter, float(mode.frequencies[0]), name), stuck
     found.unstable_at_low = lost.already
     if lost.already:
@@ -241,6 +243,20 @@ def _linear(
             f"{'; '.join(map(words, lost.modes))}"
         )
     return None, stuck
+
+
+def _stable_again(prepared: LinearVehicle, lost: float, high: float) -> list[str]:
+    """Remark where rest is stable above the speed at which it is not: the sway of a body hunts."""
+    speed = lost
+    while (speed := AGAIN * speed) < high:
+        above = _loss_of_hunting(prepared, speed, high)
+        if not above.already:
+            to = high if above.parameter is None else above.parameter
+            return [
+                f"rest is unstable from {lost:.4g} m/s on, but no longer at {speed:.4g} m/s: it is "
+                f"stable from there to {to:.4g} m/s"
+            ]
+    return []
 
 
 def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmplitude:

@@ -314,6 +314,21 @@ def test_critical_speed_over_amplitude_and_its_smallest():
 
 
 @pytest.mark.further
+def test_a_vehicle_that_is_unstable_in_a_range_only_is_said_so():
+    """The sway of the coach is undamped from 17 m/s on; displaced at 60 m/s it comes to rest."""
+    coach = load_vehicle("coach_25t")
+    found = critical_speed(coach, RIGID, methods=("linear",), over_amplitude=False)
+    assert found.linear.speed == pytest.approx(17.0, abs=0.2)
+    (remark,) = [words for words in found.remarks if "no longer" in words]
+    assert "no longer at 41.54 m/s: it is stable" in remark
+    settings = railsim.Settings(initial={"front.outer.wheelset": {"y": 5e-3}})
+    run = railsim.simulate(coach, RIGID, speed=60.0, duration=16.0, settings=settings)
+    y, time = run["wheelset_lateral"], run["time"]
+    first, last = (np.ptp(y[(time >= t) & (time < t + 2.0)], axis=0).max() for t in (0.0, 14.0))
+    assert last < 0.02 * first
+
+
+@pytest.mark.further
 def test_where_friction_sticks_only_hunting_counts():
     """The sway of a wagon on links is undamped as long as they stick: that is no critical speed."""
     found = critical_speed(
