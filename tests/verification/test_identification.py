@@ -353,7 +353,7 @@ def test_all_variants_have_the_step_of_the_model(found):
 
 def test_a_run_counts_once(found):
     """Twice the same values would narrow the intervals by the root of two."""
-    with pytest.raises(railsim.InputError, match="run.toml is given twice; each run once"):
+    with pytest.raises(railsim.InputError, match=r"run\.toml is given twice; each run once"):
         railsim.identify(quarter(), [found[1], str(found[1])], [PRIMARY], workers=1)
 
 
