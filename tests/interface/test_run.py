@@ -273,10 +273,11 @@ def test_names_in_place_of_what_they_stand_for_are_told():
 @pytest.mark.parametrize("delay", [1.0, 4.0])
 def test_interrupt_leaves_nothing(tmp_path, delay):
     # RK4 at small steps runs for a minute: the interrupt comes early, while loading, or within it
-    arguments = [*COACH, "--speed", "2", "--set", "settings.scheme=rk4"]
-    arguments += ["--set", "settings.step=1e-4", "--out", str(tmp_path / "run.h5")]
+    arguments = [*COACH, "--speed", "20", "--set", "settings.scheme=rk4"]
+    arguments += ["--set", "settings.step=2e-5", "--out", str(tmp_path / "run.h5")]
     process = started(arguments)
     time.sleep(delay)
+    assert process.poll() is None
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
