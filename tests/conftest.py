@@ -39,7 +39,7 @@ def solutions_of_session(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def stored_solutions(request, solutions_of_session):
-    """Equilibria and steps are found once a session: this saves a fifth of its time.
+    """Equilibria and steps are found once a session: of six files of runs a fifth less time.
 
     They are found anew in a test that replaces something: it may be what finds them.
     """

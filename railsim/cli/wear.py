@@ -77,7 +77,7 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
     ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
     (coach, _, settings), ends = inputs[0], load_wheel_limits(limits)
     named = [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways]
-    _say_straights([way.track for way in ways], how["output"])
+    _remark_on_straights([way.track for way in ways], how["output"])
     _carry_out(
         WHEELS,
         {"vehicle": coach.name, "routes": named},
@@ -114,11 +114,11 @@ def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
     _, worn, settings = inputs[0]
     named = [{"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix]
     record = {"track": worn.name, "traffic": named}
-    _say_straights([worn], how["output"])
+    _remark_on_straights([worn], how["output"])
     _carry_out(RAILS, record, partial(rail_wear, worn, mix, settings=settings), rail_rows, **how)
 
 
-def _say_straights(tracks: "Sequence[Track]", output: cli.Output) -> None:
+def _remark_on_straights(tracks: "Sequence[Track]", output: cli.Output) -> None:
     """Remark on tracks of which a part only is curved: the mean wear is that over all."""
     from railsim.definitions.track.layout import curvature_sections
 
