@@ -85,6 +85,14 @@ def test_tables_of_a_notebook_show_names_literally(coach, result):
     assert '<td class="words">Q</td>' in result._repr_html_()
 
 
+def test_a_value_of_60_characters_is_the_longest_that_a_notebook_shows():
+    for resistance, shown in ((12.3456789012345, True), (123.4567890123456, False)):
+        drive = {"mode": "free", "resistance": (resistance, 0.0, 0.0)}
+        text, settings = str(drive), railsim.Settings(drive=drive)
+        assert len(text) == (60 if shown else 61)
+        assert (str(resistance) in settings._repr_html_()) is shown
+
+
 def test_a_result_says_what_it_is_of_and_draws_its_forces(result):
     vehicle, track = result.vehicle().name, result.track().name
     title = f"{vehicle} on {track} at {result.speed:g} m/s"
