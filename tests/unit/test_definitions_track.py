@@ -116,6 +116,14 @@ def test_unusual_track_is_remarked_on(plan, cant, more, expected):
     assert any(expected in remark for remark in remarks), remarks
 
 
+def test_a_radius_of_5_m_is_the_smallest():
+    for radius in (5.0, -5.0):
+        (section,) = curvature_sections(track([{**CIRCLE, "radius": radius}]))
+        assert section.start_value == 1.0 / radius
+        with pytest.raises(InputError, match="5 m at least"):
+            track([{**CIRCLE, "radius": math.nextafter(radius, 0.0)}])
+
+
 @pytest.mark.parametrize("name", ["straight", "curve_r500"])
 def test_shipped_track_gives_no_cause_for_remarks(name):
     assert track_remarks(load_track(name)) == []
