@@ -111,6 +111,19 @@ def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):
     assert any(names in remark.key and words in remark.text for remark in found), found
 
 
+def test_bodies_joined_in_a_ring_bounce_as_one():
+    """Three bodies, each on both others: f = sqrt(k/(3 m))/(2 pi) on the springs of the axle."""
+    data = vehicle(spring={"stiffness": [2e3, 2e3, 4e2]}).model_dump(exclude_none=True)
+    ring = ("frame", "bolster", "carbody")
+    data["bodies"] |= {name: BODY for name in ring}
+    for lower, upper in zip(ring, (*ring[1:], ring[0]), strict=True):
+        stiff = {"bodies": [upper, lower], "stiffness": [2e6, 2e6, 4e6]}
+        data["elements"][f"{lower}_{upper}"] = {**SPRING, **stiff}
+    (found,) = [r for r in vehicle_remarks(Vehicle.model_validate(data)) if "bounces" in r.text]
+    frequency = np.sqrt(2 * 4e2 / (3 * BODY["mass"])) / (2.0 * np.pi)
+    assert f"bounces at {frequency:.3g} Hz" in found.text
+
+
 def test_an_ordinary_vehicle_has_no_remark():
     assert vehicle_remarks(vehicle()) == []
 
