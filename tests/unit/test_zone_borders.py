@@ -1,11 +1,13 @@
-"""Borders of the test zones of EN 14363."""
+"""Borders of the test zones of EN 14363, and where their sections lie."""
 
 import math
 
 import pytest
 
-from railsim.assessment.sections import section_length, zone_of
+from railsim.assessment.sections import section_length, track_sections, zone_of
 from railsim.definitions.loading import load_running_limits
+from railsim.definitions.track.definition import Track
+from railsim.definitions.vehicle.tables import Service
 
 FULL = 0.150  # cant deficiency, m
 
@@ -44,3 +46,19 @@ def test_lengths_of_sections_hold_up_to_their_speeds(zone, km_h, length):
     """UIC 518: 100 m up to 140, 250 m up to 220 km/h: 1.1 times 200 km/h is still of these."""
     for standard in ("en14363", "uic518"):
         assert section_length(load_running_limits(standard).zones[zone], km_h / 3.6) == length
+
+
+def test_sections_end_before_the_cant_changes():
+    """Full curves of constant cant alone: a ramp inside a curve lies in no section."""
+    limits = load_running_limits("en14363")
+    service = Service(admissible_speed=40.0, cant_deficiency=0.15)
+    plan = [{"type": "CIR", "length": 1000.0, "radius": 500.0}]
+    cant = [
+        {"type": "CST", "length": 405.0, "cant": 0.10},
+        {"type": "LIR", "length": 95.0},
+        {"type": "CST", "length": 500.0, "cant": 0.12},
+    ]
+    track = Track(format="railsim-track/1", name="t", plan=plan, cant=cant, rounding=20.0)
+    found = track_sections(track, limits, service, (0.0, 1000.0), lambda _: 20.0)
+    # 100 m each, from 10 m, half of the rounding, behind a change to 10 m in front of the next
+    assert [s.begin for s in found] == [10.0, 110.0, 210.0, 510.0, 610.0, 710.0, 810.0]
