@@ -64,6 +64,16 @@ def test_rotation_under_load(cases, name):
 
 
 @pytest.mark.parametrize("name", CASES)
+def test_sideways_displacement_as_the_source_counts_it(cases, name):
+    """dx = s L (1 - cos(theta)) + H sin(theta), s = -1 below the mounting load (SPRINGS.md)."""
+    L, H, theta = 0.400, 0.159, cases[name].theta
+    s = -1.0 if name in ("ODM", "A.S.") else 1.0
+    expected = s * L * (1.0 - np.cos(theta)) + H * np.sin(theta)
+    for spring in ("outer", "inner"):  # as high as each other: h = 0
+        assert cases[name].lateral(spring) == pytest.approx(expected, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("name", CASES)
 def test_printed_rotation_is_met_within_the_source_s_own_pi(cases, name):
     printed = CASES[name][0]
     # the source turns radians into degrees with pi = 3.14 in part (0.05 %), and stops its
