@@ -32,6 +32,12 @@ def test_a_section_of_some_quantities_in_the_units_of_tables(result, tmp_path):
     np.testing.assert_allclose(values[:, 2], 1e-3 * result.Q[inside, 0, 0])
 
 
+def test_both_ends_of_a_section_belong_to_it(result):
+    ends = result.distance[5], result.distance[20]
+    part = selected(result, ["Q"], between=ends)
+    np.testing.assert_array_equal(part.time, result.time[5:21])
+
+
 def test_units_of_positions_and_angles_are_shown_ones_too(result):
     part = selected(result, ["body_position"], shown_units=True)
     assert part.quantities["body_position"].component("yaw").unit == "mrad"
