@@ -106,8 +106,9 @@ def _gas_spring(
     extended = n(spring.extended)
     if stroke is not None and row.extended is not None:
         factor, constant = (n(x) for x in row.extended)
-        long = (c for c in strokes if factor * c + constant >= lengths.most + unlock)
-        fitting = (c for c in long if (factor - 1.0) * c + constant <= lengths.least)
+        longest, shortest = lengths.most + unlock, lengths.least * (1.0 + ROUNDING)
+        long = (c for c in strokes if factor * c + constant >= longest * (1.0 - ROUNDING))
+        fitting = (c for c in long if (factor - 1.0) * c + constant <= shortest)
         stroke = next(fitting, None)
         if stroke is None:
             least, most = lengths.least * 1e3, lengths.most * 1e3
@@ -129,13 +130,12 @@ def _gas_spring(
 
 def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
     """Strokes of a row that are long enough, the shortest first; of a range some more."""
-    n = result.model.number
+    n, enough = result.model.number, needed * (1.0 - ROUNDING)
     if row.strokes is not None:
-        return [n(s) for s in row.strokes if n(s) >= needed]
+        return [n(s) for s in row.strokes if n(s) >= enough]
     assert row.stroke is not None
     low, high = n(row.stroke[0]), n(row.stroke[1])
-    first = max(low, needed)
-    return [] if first > high else list(np.linspace(first, high, 101))
+    return [] if enough > high else list(np.linspace(np.clip(needed, low, high), high, 101))
 
 
 def _with_row(

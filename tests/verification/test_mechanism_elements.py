@@ -249,6 +249,27 @@ def test_rows_of_catalogues_are_computed_with_their_own_numbers():
     assert ak["force_highest"] == pytest.approx(np.max(forces))
 
 
+@pytest.mark.parametrize("start", [0.1, 0.2, 0.4])
+def test_a_gas_spring_fits_that_is_used_over_all_its_stroke(load, start):
+    """The slide moves by 0.3 m towards a wall at 1 m: extended 1 - start, pressed 0.7 m - start."""
+    least = round(0.7 - start, 3)
+    rows = {
+        "of its length": f"strokes = [0.3], extended = [1.0, {least}]",
+        "of a range": f"stroke = [0.1, 0.3], extended = [1.0, {least}]",
+        "made to length": "strokes = [0.3]",
+        "1 mm less": f"strokes = [0.299], extended = [1.0, {least}]",
+        "1 mm longer": f"strokes = [0.3], extended = [1.0, {least + 0.001}]",
+        "1 mm shorter": f"strokes = [0.3], extended = [1.0, {least - 0.001}]",
+    }
+    each = (f'{{ name = "{name}", {row}, F1 = [50, 200] }}' for name, row in rows.items())
+    catalogue = f"[catalogues]\nc = [{', '.join(each)}]\n"
+    text = f'{SLIDE}{catalogue}[[selection]]\nelement = "gas"\ncatalogue = "c"\n'
+    changes = [f"{key}={start}" for key in ("start.slide.x", "driver.start")]
+    changes += [f"driver.end={start + 0.3}", f"elements.gas.extended={1.0 - start}"]
+    found = {c.name.partition(": ")[2]: c.fits for c in selection(analyse(load(text, *changes)))}
+    assert {name: found[name] for name in rows} == {n: not n.startswith("1 mm") for n in rows}
+
+
 def test_tolerance_of_F1_and_locks_of_the_source():
     changes = ["parameters.front_F1=300", "parameters.r_A=0.4"]
     changes += ["parameters.front_extended=0.48", "parameters.front_stroke=0.18"]
