@@ -61,6 +61,18 @@ def test_one_pad_against_its_closed_loop(height):
     assert (left > 1e-9) == (height > 0.01)
 
 
+def test_without_friction_the_loads_are_those_of_the_twist_and_its_opposite():
+    """Each spring's load changes by k w, as of `closed` without its pad."""
+    balance = steady(with_one_pad().replace(elements={}), STRAIGHT, Settings(), WALKING_PACE)
+    height = 0.003
+    loop = twist_loop(balance, STRAIGHT, [0.5 * height, -0.5 * height], held=True)
+    assert loop.share.tolist() == [1.0, -1.0]
+    t = STIFFNESS * loop.share * 0.5 * height / 1.5 * BASE
+    change = 2.0 * BASE / 1.5 * t[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    np.testing.assert_allclose(loop.Q - balance.Q0, change, atol=1e-3 * np.abs(change).max())
+    assert loop.on_level == (0.0, 0.0)
+
+
 def test_loop_of_a_wagon_is_its_own_mirror_image():
     """Y25: what twist and opposite leave, and the loads of both, change sides; loads add up."""
     balance = steady(load_vehicle("wagon_y25"), STRAIGHT, Settings(), WALKING_PACE)
