@@ -16,7 +16,7 @@ from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
-from railsim.stability.critical_speed import _by_ramp, critical_speed
+from railsim.stability.critical_speed import OF_CONICITY, _by_ramp, _speeds, critical_speed
 from railsim.stability.diagram import diagram
 from railsim.stability.motion import Stretch
 from railsim.stability.ramp import ramp, sustained
@@ -53,6 +53,19 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
     assert back[66.0] < THRESHOLD
     lowest = lowest_of(branches)
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
+
+
+def test_three_quarters_of_a_diagrams_speeds_lie_near_the_linear_critical_speed():
+    """12 of 16 from 0.8 to 1.25 times 60 m/s, the others in equal steps above."""
+    speeds = _speeds(SimpleNamespace(low=20.0, high=120.0), 60.0, 16)
+    assert speeds[:12] == pytest.approx(np.linspace(48.0, 75.0, 12))
+    assert speeds[12:] == pytest.approx([86.25, 97.5, 108.75, 120.0])
+
+
+def test_amplitudes_of_the_conicity_are_there_once_each_with_that_of_the_standard():
+    """EN 15302 states the conicity at 3 mm; a second equal amplitude would be a step."""
+    assert np.all(np.diff(OF_CONICITY) > 0.05e-3)
+    assert np.any(np.isclose(OF_CONICITY, 3e-3, rtol=1e-12))
 
 
 def test_diagram_follows_what_hunts_below_its_lowest_speed():
