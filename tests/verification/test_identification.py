@@ -203,6 +203,18 @@ def test_a_combination_that_nothing_shows_is_said_in_words():
     assert "infinite" in words
 
 
+@pytest.mark.parametrize(("spread", "said"), [(0.49, ()), (0.52, ("52 %",))])
+def test_what_is_known_to_less_than_half_is_unknown(spread, said):
+    """A parameter of singular value s is known to 1/s, and to 50 % at least or not at all."""
+    vehicle = in_series()
+    parameters = parsed(["lower.stiffness.z"], vehicle, TRACK)
+    singular, vectors = np.array([1.0 / spread]), np.eye(1)
+    one = Identified(vehicle, tuple(parameters), np.zeros(1), np.eye(1), singular, vectors, ())
+    assert len(one.unidentified) == len(said)
+    for words, known in zip(one.unidentified, said, strict=True):
+        assert f"say nothing about lower.stiffness.z (standard deviation {known})" in words
+
+
 @pytest.mark.further
 def test_two_springs_in_series_are_named(tmp_path):
     lower, upper = "lower.stiffness.z", "upper.stiffness.z"
