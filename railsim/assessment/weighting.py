@@ -48,12 +48,10 @@ class Weighting:
         found: Complexes
         found = s**2 / (s**2 + s * w1 / Q1 + w1**2) * w2**2 / (s**2 + s * w2 / Q1 + w2**2)
         found = found * (w4**2 / w3) * (s + w3) / (s**2 + s * w4 / self.Q2 + w4**2)
-        if self.f5 < math.inf:
-            w5, w6 = 2.0 * np.pi * self.f5, 2.0 * np.pi * self.f6
-            above = s**2 / w5**2 + s / (self.Q3 * w5) + 1.0
-            below = s**2 / w6**2 + s / (self.Q4 * w6) + 1.0
-            found = found * self.K * above / below
-        return found
+        w5, w6 = 2.0 * np.pi * self.f5, 2.0 * np.pi * self.f6
+        above = s**2 / w5**2 + s / (self.Q3 * w5) + 1.0
+        below = s**2 / w6**2 + s / (self.Q4 * w6) + 1.0
+        return found * self.K * above / below
 
     def gain(self, f: Floats) -> Floats:
         """Magnitude of the response.

@@ -182,7 +182,7 @@ def _force_zeros(dense: Motion) -> tuple[float, ...]:
     rates = Rates(friction=dense.model.sense)
     if not np.any(generalised_force(dense, rates)):
         return ()
-    return tuple(zeros(dense, lambda m: -generalised_force(m, rates)))
+    return tuple(zeros(dense, lambda m: generalised_force(m, rates)))
 
 
 def _reactions(motion: Motion, output: Mapping[str, Any]) -> dict[str, Reaction]:
