@@ -4,6 +4,7 @@ import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from railsim import cli
 from railsim.definitions.loading import load_mechanism
 from railsim.files.sources import find_file, shipped_names
+from railsim.mechanisms.optimised_file import optimised_text
 
 FEW = ["--set", "sampling.points=51"]
 FOUR_BAR = """
@@ -184,6 +186,18 @@ def test_out_writes_a_self_contained_page_pictures_and_positions(tmp_path, capsy
     assert rows[0].startswith("travel [rad],length [m]")
     lines = refused(capsys, "atr95", "--out", str(folder), *FEW)
     assert "--overwrite" in lines[0]
+
+
+def test_optimised_file_has_what_was_in_force_and_says_where_it_is_from(write):
+    changes, found = ["parameters.bore=0.2", "parameters.a1=0.16"], {"a1": 0.17}
+    searched = load_mechanism("atr95_lift_5", changes)
+    optimum = SimpleNamespace(
+        definition=searched, parameters=found, starts=(None,), seed=1, objective=1.0, feasible=True
+    )
+    again = load_mechanism(write(optimised_text("atr95_lift_5", optimum, changes, None)))
+    assert again.parameters == {**searched.parameters, **found}
+    homes = {name: again.provenance_of(name) for name in ("bore", "a1", "a2")}
+    assert homes == {"bore": "set", "a1": "optimised", "a2": "printed"}
 
 
 @pytest.mark.slow
