@@ -29,7 +29,7 @@ from .fastsim_simd import BOUNDS, PER_L, RESULTS, W_ACROSS, W_ALONG, W_SUM, Y_PE
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
 WORK_ROWS = 16
-_COLUMNS_MIN = 24  # least number of strips that a march takes (three vectors of eight)
+_COLUMNS_MIN = 16  # least number of strips that a march takes (two vectors of eight)
 # Added under the root: the least traction (relative to the bound) that counts is 1e-15.
 _TINY = 1e-30
 # A bound below this is none: its inverse would overflow [N].
@@ -162,18 +162,18 @@ def _march_plain(work, m, nx, bounds):
 
 @compiled
 def _march_simd(work, m, nx, bounds):
-    """Do what `_march_plain` does in blocks of 3 to 5 vectors of 8 strips; m >= 24."""
+    """Do what `_march_plain` does in blocks of 2 to 4 vectors of 8 strips; m >= 16."""
     vectors = m // 8
-    blocks = (vectors + 4) // 5
+    blocks = (vectors + 3) // 4
     first = 0
     while blocks > 0:
         size = (vectors + blocks - 1) // blocks
-        if size == 3:
-            fastsim_simd.march_3(work, first, bounds, nx)
-        elif size == 4:
+        if size == 4:
             fastsim_simd.march_4(work, first, bounds, nx)
+        elif size == 3:
+            fastsim_simd.march_3(work, first, bounds, nx)
         else:
-            fastsim_simd.march_5(work, first, bounds, nx)
+            fastsim_simd.march_2(work, first, bounds, nx)
         first += 8 * size
         vectors -= size
         blocks -= 1

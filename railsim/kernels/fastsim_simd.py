@@ -2,7 +2,7 @@
 
 Why this exists: left to the compiler, the march keeps the state of the strips in memory (13
 accesses per cell for some 20 operations) and divides by a square root (27 clock cycles per 8
-strips).  Here the state of 24 to 40 strips stays in registers over the whole march, and the
+strips).  Here the state of 16 to 32 strips stays in registers over the whole march, and the
 reciprocal square root comes from the processor's 14-bit estimate and one cubic correction,
 ``r (1 + e/2 + 3/8 e^2)`` with ``e = 1 - s r^2``, whose error is below 1e-12.  Gain on an AVX-512
 machine: see docs/performance.md and benchmarks/fastsim_benchmark.py.
@@ -133,9 +133,9 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
             registers.store(builder.load(slot), data, index(row, v))
 
 
+march_2 = _block_march(2)
 march_3 = _block_march(3)
 march_4 = _block_march(4)
-march_5 = _block_march(5)
 
 
 @intrinsic
