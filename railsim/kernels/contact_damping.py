@@ -34,6 +34,7 @@ from railsim.kernels.contact_table import (
     K_Y,
     N_PATCH,
 )
+from railsim.kernels.lanes import LANES, load_lanes, spread, square_root, store_lanes, where_beyond
 from railsim.kernels.support import (
     D_Y_SLIP,
     D_Z_SLIP,
@@ -53,7 +54,7 @@ HEAVY = 4.0
 LEAST, MOST = 0.03, 0.5
 
 
-@compiled(python=False, ordered=True)
+@compiled(python=False)
 def creep_slopes(n, patches, speed, G, along, across, secant_along):
     """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
@@ -69,30 +70,31 @@ def creep_slopes(n, patches, speed, G, along, across, secant_along):
         Read only.
     speed, G : float
         Speed of travel [m/s]; shear modulus, reduced by the third body [Pa].
-    along, across, secant_along : float64[>= n]
+    along, across, secant_along : float64[>= n, by eights]
         Written; zero without friction or load.  `secant_along`: the force along over the slip.
     """
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     c11, c22, c23 = patches.c11, patches.c22, patches.c23
     xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
-    per_speed = 1.0 / speed
-    for i in range(n):
-        loaded = mu_N[i] > 0.0
-        limit = 1.0 / (mu_N[i] if loaded else 1.0)
-        ab = a[i] * b[i]
+    one, zero, per_speed = spread(1.0), spread(0.0), 1.0 / speed
+    for i in range(0, n, LANES):
+        k11, k22, load = load_lanes(c11, i), load_lanes(c22, i), load_lanes(mu_N, i)
+        ab = load_lanes(a, i) * load_lanes(b, i)
         unit = G * ab
-        x = unit * c11[i] * xi_x[i] * limit
-        y = unit * (c22[i] * xi_y[i] + c23[i] * sqrt(ab) * phi[i]) * limit
+        limit = unit / where_beyond(load, 0.0, load, one)
+        spin = load_lanes(c23, i) * square_root(ab) * load_lanes(phi, i)
+        x = limit * k11 * load_lanes(xi_x, i)
+        y = limit * (k22 * load_lanes(xi_y, i) + spin)
         square = x * x + y * y
-        u = sqrt(square)
-        slides = u >= 3.0
-        secant = 1.0 / u if slides else 1.0 - u / 3.0 + square / 27.0
-        tangent = 0.0 if slides else (1.0 - u / 3.0) * (1.0 - u / 3.0)
+        u = square_root(square)
+        left = one - u * (1.0 / 3.0)
+        secant = where_beyond(u, 3.0, one / u, left + square * (1.0 / 27.0))
+        tangent = where_beyond(u, 3.0, zero, left * left)
         share = x * x / (square + 1e-300)
-        scale = unit * per_speed if loaded else 0.0
-        along[i] = scale * c11[i] * (share * tangent + (1.0 - share) * secant)
-        across[i] = scale * c22[i] * (share * secant + (1.0 - share) * tangent)
-        secant_along[i] = scale * c11[i] * secant
+        scale = where_beyond(load, 0.0, unit * per_speed, zero)
+        store_lanes(along, i, scale * k11 * (secant + share * (tangent - secant)))
+        store_lanes(across, i, scale * k22 * (tangent + share * (secant - tangent)))
+        store_lanes(secant_along, i, scale * k11 * secant)
 
 
 @compiled(python=False)

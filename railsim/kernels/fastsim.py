@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from . import compiled, fastsim_simd
 from .aligned import aligned_zeros
 from .fastsim_simd import BOUNDS, PER_L, RESULTS, W_ACROSS, W_ALONG, W_SUM, Y_PER_L
+from .lanes import LANES, larger, load_few, smaller, spread, square_root, store_lanes, where_beyond
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
 WORK_ROWS = 16
@@ -97,7 +98,13 @@ def kalker_lookup(n, patches, table):
         c33[i] = table[node, 3] + w * (table[node + 1, 3] - table[node, 3])
 
 
-@compiled(python=False, ordered=True)
+@compiled(inline=True)
+def size(x):
+    """|x|, lane by lane."""
+    return larger(x, -x)
+
+
+@compiled(python=False)
 def _patch_slopes(n, nx, patches, G, work):
     """Growth per cell of the scaled traction of every patch, at the middle strip.
 
@@ -105,27 +112,27 @@ def _patch_slopes(n, nx, patches, G, work):
     dx xi_x/(L1 p0), dx xi_y/(L2 p0), dx phi a/(L3 p0), dx phi b/(L3 p0).  Zero without contact or
     friction.
     """
-    a, b, mu_N = patches.a, patches.b, patches.mu_N
-    c11, c22, c23 = patches.c11, patches.c22, patches.c23
-    xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
-    sx, sy, spin_a, spin_b = work[3], work[4], work[5], work[6]
-    for i in range(n):
-        loaded = mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0
-        unit = math.pi * G * a[i] * b[i] / ((mu_N[i] if loaded else 1.0) * nx)
-        slip = 0.375 * unit
-        spin = (
-            (4.0 / math.pi) * unit * c23[i] * phi[i] * math.sqrt(b[i] / (a[i] if loaded else 1.0))
-        )
-        x = slip * c11[i] * xi_x[i]
-        y = slip * c22[i] * xi_y[i]
-        along = spin * a[i]
-        across = spin * b[i]
-        total = abs(x) + abs(y) + abs(along) + abs(across)
-        scale = min(1.0, _GROWTH_MAX / (total + 1.0)) if loaded else 0.0
-        sx[i] = scale * x
-        sy[i] = scale * y
-        spin_a[i] = scale * along
-        spin_b[i] = scale * across
+    per_cell, zero = math.pi * G / nx, spread(0.0)
+    for i in range(0, n, LANES):
+        left = n - i
+        # of a number that is none or negative and 0 the larger one is 0
+        a = larger(load_few(patches.a, i, left), zero)
+        b = larger(load_few(patches.b, i, left), zero)
+        mu_N = larger(load_few(patches.mu_N, i, left), zero)
+        unit = per_cell * a * b / where_beyond(mu_N, _NO_LOAD, mu_N, spread(1.0))
+        narrow = square_root(b / where_beyond(a, 0.0, a, spread(1.0)))
+        c23_phi = load_few(patches.c23, i, left) * load_few(patches.phi, i, left)
+        spin = (4.0 / math.pi) * unit * c23_phi * narrow
+        x = 0.375 * unit * load_few(patches.c11, i, left) * load_few(patches.xi_x, i, left)
+        y = 0.375 * unit * load_few(patches.c22, i, left) * load_few(patches.xi_y, i, left)
+        along, across = spin * a, spin * b
+        total = size(x) + size(y) + size(along) + size(across)
+        scale = smaller(spread(1.0), _GROWTH_MAX / (total + 1.0))
+        scale = where_beyond(mu_N, _NO_LOAD, scale, zero)
+        store_lanes(work[3], i, scale * x)
+        store_lanes(work[4], i, scale * y)
+        store_lanes(work[5], i, scale * along)
+        store_lanes(work[6], i, scale * across)
 
 
 @compiled

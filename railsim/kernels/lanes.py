@@ -177,11 +177,14 @@ def _load(builder, pointer, count):
         mask = [min(k, count) for k in range(LANES)]
         zero = ir.Constant(_few(count), [0.0] * count)
         return builder.shuffle_vector(narrow, zero, ir.Constant(ir.VectorType(INDEX, LANES), mask))
+    return _load_masked(builder, pointer, _mask(count))
+
+
+def _load_masked(builder, pointer, mask):
     bits = ir.VectorType(ir.IntType(1), LANES)
     kind = ir.FunctionType(VECTOR, [ir.PointerType(VECTOR), INDEX, bits, VECTOR])
     load = cgutils.get_or_insert_function(builder.module, kind, "llvm.masked.load.v8f64.p0")
-    zero = Registers(builder).zero
-    return builder.call(load, [pointer, ir.Constant(INDEX, 8), _mask(count), zero])
+    return builder.call(load, [pointer, ir.Constant(INDEX, 8), mask, Registers(builder).zero])
 
 
 def _store(builder, value, pointer, count):
@@ -322,6 +325,21 @@ def load_lanes(typingctx, array, offset):
 
 
 @intrinsic
+def load_few(typingctx, array, offset, n):
+    """As `load_lanes`, of which only the first `n` are read; the others are 0."""
+
+    def codegen(context, builder, sig, args):
+        kind = ir.VectorType(INT, LANES)
+        one = builder.insert_element(ir.Constant(kind, ir.Undefined), args[2], INDEX(0))
+        same = ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES)
+        many = builder.shuffle_vector(one, one, same)
+        there = builder.icmp_signed(">", many, ir.Constant(kind, list(range(LANES))))
+        return _load_masked(builder, _pointer(context, builder, sig.args[0], *args[:2]), there)
+
+    return lanes(array, types.intp, types.intp), codegen
+
+
+@intrinsic
 def store_lanes(typingctx, array, offset, x):
     """Store eight numbers one after the other in the flat array."""
 
@@ -441,3 +459,4 @@ if numba.config.DISABLE_JIT:
     square_root, sine, cosine = plain.square_root, plain.sine, plain.cosine
     load_rows, store_rows, add_rows = plain.load_rows, plain.store_rows, plain.add_rows
     load_lanes, store_lanes, add_to_pairs = plain.load_lanes, plain.store_lanes, plain.add_to_pairs
+    load_few = plain.load_few

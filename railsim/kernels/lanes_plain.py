@@ -56,6 +56,12 @@ def load_lanes(array, offset):
     return array.reshape(-1)[offset : offset + LANES].copy()
 
 
+def load_few(array, offset, n):
+    """The first `n` of eight numbers that follow each other; the others are 0."""
+    found = array.reshape(-1)[offset : offset + min(n, LANES)]
+    return np.pad(found, (0, LANES - len(found)))
+
+
 def store_lanes(array, offset, x):
     """Store eight numbers one after the other."""
     array.reshape(-1)[offset : offset + LANES] = x

@@ -53,7 +53,7 @@ def work_arrays(system: System) -> Work:
     n = len(system.bodies.kind)
     n_wheelsets = len(system.contact.body)
     of_wheel = N_PATCH * parts_of_wheel(system.contact.rails)
-    n_patches = 2 * of_wheel * n_wheelsets
+    n_patches = -(-2 * of_wheel * n_wheelsets // LANES) * LANES  # by eights
     n_frames = len(system.frame_offset)
     n_tracks = n_wheelsets * system.support.elastic
     return Work(

@@ -15,9 +15,11 @@ from railsim.kernels.lanes import (
     eight,
     eight_from,
     eight_in_pairs,
+    load_few,
     load_rows,
     square_root,
     starts,
+    store_lanes,
     store_rows,
     where_beyond,
 )
@@ -34,6 +36,13 @@ def turn(table, out, n):
         rows = starts(eight_from(first, n), WIDTH)
         a, b, c, d, e = load_rows(table, rows, 1, 5)
         store_rows(out, rows, 2, (e, d, c, b, a, a + 2.0 * b))
+
+
+@compiled
+def some(x, out, n):
+    """Copy `n` numbers, by eights; what is beyond them is 0."""
+    for first in range(0, n, LANES):
+        store_lanes(out, first, load_few(x, first, n - first))
 
 
 @compiled
@@ -103,6 +112,18 @@ def test_rows_that_meet_in_one_row_are_all_added(n):
         expected[j] += 1.0 - row
     # one after the other, as here: to the last bit
     np.testing.assert_array_equal(total, expected)
+
+
+@pytest.mark.parametrize("n", [1, 7, 8, 9, 15, 16])
+def test_numbers_beyond_the_last_one_are_not_read(n):
+    x, out = np.arange(1.0, 25.0), np.full(24, -1.0)
+    some(x, out, n)
+    end = -(-n // LANES) * LANES
+    expected = np.concatenate([x[:n], np.zeros(end - n), np.full(24 - end, -1.0)])
+    np.testing.assert_array_equal(out, expected)
+    plain = lanes_plain.load_few(x[:n], n - n % LANES, n % LANES)  # as of an array that ends there
+    np.testing.assert_array_equal(plain[: n % LANES], x[n - n % LANES : n])
+    assert not np.any(plain[n % LANES :])
 
 
 def test_only_the_given_columns_are_added_to():
