@@ -227,9 +227,12 @@ class RootLocus(Plottable):
 
     @property
     def title(self) -> str:
-        """Vehicle, track and contact in words."""
-        first = self.sets[0]
-        return f"{first.vehicle}: {first.place}, contact {first.contact.words()}"
+        """Vehicle, track and contact in words, without what changes along the locus."""
+        first, places = self.sets[0], [modes.place.split(", ") for modes in self.sets]
+        same = [part for part in places[0] if all(part in place for place in places)]
+        speed = [] if self.key == "speed" else [f"{first.speed:g} m/s"]
+        words = ", ".join([*speed, *same, f"contact {first.contact.words()}"])
+        return f"{first.vehicle}: {words}"
 
 
 def numbered(names: Sequence[str]) -> list[str]:

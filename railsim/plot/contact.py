@@ -168,7 +168,8 @@ def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Flo
     levels = np.linspace(0.0, 0.8, 17)
     x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes
     filled = axes.contourf(x, y, values.T, levels, extend="max")
-    figure.colorbar(filled, ax=axes, label="equivalent conicity $\\tan\\gamma_e$")
+    none = "; white: none" if np.isnan(values).any() else ""
+    figure.colorbar(filled, ax=axes, label=f"equivalent conicity $\\tan\\gamma_e${none}")
     axes.set(xlabel="gauge (mm)", ylabel="amplitude $\\hat y$ (mm)")
     return figure
 

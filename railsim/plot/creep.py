@@ -124,7 +124,7 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
         image = _draw_traction(panel, solution, top)
         panel.set(xlim=(-reach_y, reach_y), ylim=(-reach_x, reach_x), aspect="equal")
         panel.grid(False)
-        T_x, T_y = (f"{T / friction_force:+.2f}" for T in (solution.T_x, solution.T_y))
+        T_x, T_y = (f"{T / friction_force:+z.2f}" for T in (solution.T_x, solution.T_y))
         panel.set_title(f"{title}\n$T_x$ {T_x}, $T_y$ {T_y} $\\mu N$".replace("-", "−"))
     label_grid(axes, len(solutions), columns, ("to the right (mm)", "forward (mm)"))
     bar = figure.add_axes((1.0 - 0.8 / wide, 0.2, 0.12 / width * 0.3, 0.6))

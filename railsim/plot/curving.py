@@ -133,7 +133,7 @@ def _plan(axes: Axes, found: Curving) -> None:
             axes.plot(*np.transpose(wheel), color=colours[name], lw=4.0, zorder=3)
     # to the right is downwards
     axes.set(xlim=(np.min(x) - 2.0, np.max(x) + 2.0), ylim=(1.9, -1.9), aspect="equal")
-    axes.set(xticks=[], yticks=[])
+    axes.set(xticks=[], yticks=[], anchor="W")  # room for the title of a short vehicle
     axes.set_title(
         f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
         f"running to the right; angle of attack and displacement {EXAGGERATED:g} times"

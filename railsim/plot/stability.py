@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from railsim.linear.stationary import TwistLoop
 from railsim.notation import SIDES
-from railsim.plot.style import DISTINCT, LIMIT, Picture, distinct, say, single, styled
+from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, note, say, single, styled
 from railsim.stability.branches import THRESHOLD, Branch
 from railsim.stability.result import Conicity, CriticalSpeed
 
@@ -109,6 +109,7 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
         lines: list[tuple[str, float | None, Any]] = [
             (f"linear, {found.contact.words()}", lost.speed, "-"),
             ("the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))),
+            ("the same, cells of the runs", lost.speed_of_runs, (0, (6, 2))),
         ]
         for words, speed, dashes in lines:
             if speed is not None:
@@ -177,7 +178,10 @@ def map_figure(
     if not any(np.isfinite(values).any() for values in speeds.values()):
         say(axes, "no critical speed inside the range at any point; the table says why")
         return figure
-    axes.set_ylim(0.0, None)
+    axes.set_ylim(0.0, 1.05 * max(map(np.nanmax, speeds.values())))
+    points = np.concatenate([values.ravel() for values in speeds.values()])
+    if missing := int(np.isnan(points).sum()):
+        axes.set_title(f"{missing} of {len(points)} points: no critical speed, see the table")
     axes.legend()
     return figure
 
@@ -188,16 +192,17 @@ def twist_figure(loops: Mapping[str, TwistLoop], limit: float, title: str) -> Fi
 
     `loops`: By the name of the twist. `limit`: Of dQ/Q0 [1].
     """
-    figure = Picture(9.6, 3.8)
-    figure.suptitle(title)
+    figure = Picture(9.6, 3.8, title)
     panels = figure.subplots(1, max(1, len(loops)), sharey=True, squeeze=False)[0]
     for panel, (name, loop) in zip(panels, loops.items(), strict=False):
         wheelset, side = loop.worst
         way = np.append(0.0, loop.share) if len(loop.share) > 2 else loop.share
         unloading = loop.unloading[:, wheelset, side]
         values = np.append(0.0, unloading) if len(loop.share) > 2 else unloading
-        panel.plot(100.0 * way, values, "o-", ms=2.5)
-        panel.axhline(limit, color="0.3", ls="--", lw=0.8)
+        panel.plot(100.0 * way, values, "o-", ms=2.5, color=DISTINCT[0])
+        panel.axhline(limit, color=LIMIT, ls=DASHED, lw=0.8)
+        look = {"frame": BESIDE, "color": LIMIT}
+        note(panel, f"limit {limit:g}", (1.0, limit), (-3, 2.5), "right", "bottom", **look)
         panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
         panel.set(title=f"{name},\nwheelset {wheelset + 1} {SIDES[side]}")
         panel.set(xlabel="of the twist (%)")

@@ -458,8 +458,11 @@ def _conclude(
     if only_ramp:
         kept = [[p for p in one.points if p.speed >= one.end] for one in found.branches]
         branches = [Branch("ramp", points) for points in kept]
-    found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.high)
-    found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.high)
+    top = found.high
+    if branches and all(branch.direction == "continuation" for branch in branches):
+        top = max(point.speed for branch in branches for point in branch.points)  # followed to
+    found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", top)
+    found.instability_limit = first_beyond(branches, force, "sum_Y_rms", top)
     if only_ramp and (found.amplitude_limit.reached or found.instability_limit.reached):
         found.remarks.append(
             "limits: lowest speeds on the falling ramp; at constant speed they are exceeded from "

@@ -206,7 +206,7 @@ class CriticalSpeed(Plottable):
             ("rms of sum_Y above {:.3g} kN", 1e-3, self.instability_limit),
         ):
             if limit is not None:
-                more = "" if limit.reached else f"not reached up to {self.high:g} m/s"
+                more = "" if limit.reached else f"not reached up to {limit.searched_to:.4g} m/s"
                 yield words.format(scale * limit.limit), limit.speed, None, None, more
 
     def verdict(self) -> str:

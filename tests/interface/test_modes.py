@@ -65,14 +65,14 @@ def test_root_locus_in_json_and_folder(capsys, tmp_path):
 
 
 def test_root_locus_over_a_key(capsys):
-    assert (
-        main(
-            ["modes", "coach_manchester", "--over", "track.friction=0.2:0.4:2", "--json", "--quiet"]
-        )
-        == 0
-    )
+    command = ["modes", "coach_manchester", "--over", "track.friction=0.2:0.4:2", "--quiet"]
+    assert main([*command, "--json"]) == 0
     records = json.loads(capsys.readouterr().out)
     assert [record["parameter"]["value"] for record in records] == [0.2, 0.4]
+    # what varies does not stand among what is the same
+    assert main(command) == 0
+    words = ": 20 m/s, straight track, rails ballasted, contact tangent; least damped"
+    assert words in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

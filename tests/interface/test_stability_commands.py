@@ -1,6 +1,7 @@
 """``railsim critical-speed`` and ``railsim curving``: tables, JSON, pictures, refusals."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ import pytest
 import railsim
 from railsim.cli import main
 from railsim.linear.steady import NotConverged
+from railsim.linear.vehicle import Contact
+from railsim.plot.stability import map_figure
 from railsim.stability import critical_speed, curving
+from railsim.stability.branches import Branch, Point
 from railsim.studies.stability_map import map_table
 
 
@@ -164,6 +168,32 @@ def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
     expected = 0.1 * (0.75 + 0.08 * 0.1) / (0.75 - 0.46 * 0.1)
     assert near == pytest.approx([expected] * len(near), rel=5e-3)
     assert len(near) > 10
+
+
+def test_picture_of_a_short_wagon_in_a_curve_has_its_whole_title():
+    figure = railsim.curving(railsim.load_vehicle("wagon_uic_link"), radius=[300.0]).plot()
+    figure.draw_without_rendering()
+    for axes in figure.get_axes():
+        for title in (axes.title, axes._left_title):
+            assert title.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_speed_to_which_a_limit_was_not_reached_is_that_to_which_motions_were_followed():
+    followed = Branch("continuation", [Point(40.0, 1e-4, 4.5), Point(45.0, 1.8e-3, 4.7)])
+    where = {"rails": "", "friction": "", "law": "", "linear_law": ""}
+    found = critical_speed.CriticalSpeed(Contact(), conditions=where, low=5.0, high=120.0)
+    found.branches, found.nonlinear = [followed], {"continuation": followed.points[0]}
+    coach = railsim.load_vehicle("coach_manchester")
+    begins = SimpleNamespace(Q0=np.full((4, 2), 7e4), already=False, parameter=40.0)
+    critical_speed._conclude(found, coach, begins, begins)
+    words = [row[-1] for row in found.table().rows if "above" in row[0]]
+    assert words == ["not reached up to 45 m/s"] * 2
+
+
+def test_a_map_says_how_many_points_have_no_critical_speed():
+    axes = map_figure({"conicity": [0.1, 0.2]}, {"linear": np.array([70.0, np.nan])}, "").axes[0]
+    assert axes.get_title(loc="left").startswith("1 of 2 points: no critical speed")
+    assert axes.get_ylim()[1] > 70.0
 
 
 def test_curving_over_a_grid(capsys, tmp_path):

@@ -80,6 +80,15 @@ def test_both_branches_of_a_wagon_are_told_and_drawn(tmp_path, capsys):
     assert (out / "stationary.png").stat().st_size > 5000
 
 
+def test_limit_in_the_picture_has_its_value():
+    figure = stationary(
+        railsim.load_vehicle("coach_manchester"),
+        railsim.load_track("straight"),
+        load_stationary_limits("stationary"),
+    ).plot()
+    assert all(axes.texts[0].get_text() == "limit 0.6" for axes in figure.axes)
+
+
 def test_load_to_one_side_is_leant_to_its_own_side():
     """The mirror image has the same worst wheel on the other side, and the same roll coefficient.
 
