@@ -48,9 +48,10 @@ def overlay(
                 side = line.labels.get("side", "left")
                 look: Any = {"color": style.distinct(index), "ls": style.SIDE_LINES[side]}
                 axes.plot(result[over], line.values * panel.quantity.scale, **look)
-        panel = next(panel for panel in same if panel is not None)
-        _label(axes, panel.quantity, _heading(panel))
-        draw_limit(axes, panel.quantity, results.values())
+        held = [panel for panel in same if panel is not None]
+        quantity = held[0].quantity
+        _label(axes, quantity, _heading(held))
+        draw_limit(axes, quantity, results.values())
         style.shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     _legend(figure, list(results), {line.labels.get("side") for line in lines}, 0)
@@ -98,14 +99,16 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     return figure
 
 
-def _heading(panel: Panel) -> str:
-    """Name of a quantity, with the place that all its lines share."""
-    quantity = panel.quantity
-    labels = {
-        label for line in panel.lines for dim, label in line.labels.items() if dim != "side"
-    } - {quantity.long_name.rpartition(", ")[2]}
-    where = f": {unformatted(labels.pop())}" if len(labels) == 1 else ""
-    return capitalised(quantity) + where
+def _heading(held: Sequence[Panel]) -> str:
+    """Name of a quantity, with the place that all lines of a result share."""
+    quantity, places = held[0].quantity, dict[str, None]()
+    for panel in held:
+        labels = {v for line in panel.lines for dim, v in line.labels.items() if dim != "side"}
+        labels -= {quantity.long_name.rpartition(", ")[2]}
+        if len(labels) != 1:
+            return capitalised(quantity)
+        places[unformatted(labels.pop())] = None
+    return f"{capitalised(quantity)}: {' / '.join(places)}"
 
 
 def _label(axes: Axes, quantity: Quantity, heading: str) -> None:

@@ -136,19 +136,25 @@ def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[S
 
 
 def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
-    """Shade transitions and curves; with `named`, write what they are above the axes."""
+    """Shade transitions and curves; with `named`, write what they are above the axes.
+
+    Where there is no room for all names, those of curves come first.
+    """
     for span in shown:
         axes.axvspan(span.low, span.high, color=SHADES[span.section.type], lw=0, zorder=0)
     if not named or not shown:
         return
     low, high = axes.get_xlim()
-    width = 72.0 * axes.bbox.width / axes.figure.dpi
-    for span in shown:
+    letter = LETTER * (high - low) / (72.0 * axes.bbox.width / axes.figure.dpi)
+    names: list[tuple[float, float, str]] = []  # middle, half of the width, words
+    for span in sorted(shown, key=lambda span: span.section.type):  # CIR before CLO
         words = "CLO" if span.section.type == "CLO" else f"R {1.0 / span.section.start_value:.6g}"
-        if width * (span.high - span.low) / (high - low) < LETTER * len(words):
-            continue
-        at, look = (0.5 * (span.low + span.high), 1.0), {"fontsize": 6.5, "color": "0.4"}
-        note(axes, words.replace("-", "−"), at, (0, 2), "center", "bottom", frame=ABOVE, **look)
+        middle, half = 0.5 * (span.low + span.high), 0.5 * letter * len(words)
+        if all(abs(middle - other) >= half + reach for other, reach, _ in names):
+            names.append((middle, half, words.replace("-", "−")))
+    look: Any = {"fontsize": 6.5, "color": "0.4", "frame": ABOVE}
+    for middle, _, words in sorted(names):
+        note(axes, words, (middle, 1.0), (0, 2), "center", "bottom", **look)
     axes.set_title(axes.get_title(loc="left"), pad=14.0)
 
 

@@ -6,6 +6,7 @@ they are not constant.  Constants stand in the line under the title.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,7 @@ def _table_rows(track: Track, s: Floats) -> list[_Row]:
 
 def _constants(track: Track) -> str:
     """Return a line of what is the same along the track."""
-    rail = " / ".join(dict.fromkeys(unformatted(name) for name in track.rail))
+    rail = " / ".join(dict.fromkeys(unformatted(Path(name).name) for name in track.rail))
     tilt = f"1:{1.0 / track.inclination:.3g}" if track.inclination else "upright"
     words = [f"gauge {1e3 * track.gauge:g} mm", f"rail {rail} {tilt}"]
     if track.friction_table is None:

@@ -25,7 +25,7 @@ BODY, WHEEL, LEVER = "0.25", "0.55", "0.78"
 FILL, OUTLINE = (0.34, 0.66, 0.88, 0.10), "#8fb4cf"
 BOX: Any = {"ls": "", "marker": "s", "ms": 7, "mfc": "none", "mec": "0.35", "mew": 1.0}
 # The leading wheelset and those as near to it as this are shown once more in detail [m].
-BOGIE = 4.0
+BOGIE = 4.8
 # Names of bodies as near as this are written above each other [m].
 NEAR = (3.0, 0.4)
 

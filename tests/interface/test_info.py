@@ -141,6 +141,13 @@ def test_vehicle_drawing_shows_every_body_and_kind_of_element():
     assert "shear spring (4)" in labels
 
 
+def test_leading_end_of_a_drawing_holds_the_whole_bogie_of_three_axles():
+    """Co-Co, 2.16 m between axles, the front bogie's middle axle at x = 5.39 m."""
+    low, high = vehicle_figure(load_vehicle("locomotive_coco_b")).axes[2].get_xlim()
+    assert low < 5.39 - 2.16
+    assert high > 5.39 + 2.16
+
+
 def test_static_loads_add_up_to_the_weight(capsys):
     static = data_of(capsys, "coach_manchester", "--static")["static"]
     total = sum(sum(pair) for pair in static["Q0"].values())

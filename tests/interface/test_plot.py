@@ -12,14 +12,16 @@ from matplotlib.figure import Figure
 from railsim.cli import main
 from railsim.definitions.excitations.measured_file import recordings
 from railsim.definitions.loading import load_track
+from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import InputError
 from railsim.files.sources import read_source
 from railsim.notation import QUANTITIES
 from railsim.plot.histories import STUDY, histories, widen
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
-from railsim.plot.style import HUES, SHADES, wheelset_colours
+from railsim.plot.style import HUES, SHADES, shade, spans, wheelset_colours
 from railsim.plot.track import track_figure
+from railsim.result import Result
 from railsim.result.export import selected
 from railsim.track.irregularity import displacement
 
@@ -103,6 +105,14 @@ def test_curve_and_transitions_are_shaded_where_they_are(result):
         (420.0, 480.0, transition),
     ]
     assert [text.get_text() for text in axes.texts][:3] == ["CLO", "R 250", "CLO"]
+
+
+def test_where_names_do_not_fit_side_by_side_those_of_curves_stay():
+    axes = Figure(figsize=(3.0, 2.0)).subplots()
+    axes.set_xlim(0.0, 3000.0)
+    sections = curvature_sections(load_track("curve_r250"))
+    shade(axes, spans(sections, *[np.array([0.0, 980.0])] * 2), named=True)
+    assert [text.get_text() for text in axes.texts] == ["R 250"]
 
 
 def test_over_time_the_shades_are_where_the_reference_body_was(result):
@@ -250,6 +260,14 @@ def test_radii_in_the_plan_have_their_sign():
     assert [text.get_text() for text in plan.texts] == ["R 150 m", "R \N{MINUS SIGN}150 m"]
 
 
+def test_rail_from_a_file_is_called_by_its_name_without_its_folders():
+    words = [
+        text.get_text() for text in track_figure(load_track("crossing_56e1_r245_1in9.25")).texts
+    ]
+    assert any("rail rail_56e1_vertical.csv upright" in word for word in words)
+    assert not any("/sections/" in word for word in words)
+
+
 def test_track_figure_shows_curvature_and_cant_as_they_act():
     plan, curvature, cant = track_figure(load_track("curve_r250")).axes
     s, kappa = drawn(curvature)[0].get_data()
@@ -268,6 +286,16 @@ def test_overlay_has_a_colour_for_every_result(result):
     first, second = drawn(axes)
     assert first.get_color() != second.get_color()
     np.testing.assert_allclose(second.get_ydata(), 0.5 * first.get_ydata())
+
+
+def test_overlay_names_the_wheelset_of_each_vehicle(result):
+    """The leading wheelset of a coach and that of a wagon have other names."""
+    coordinates = {"wheelset": ["front", "b", "c", "rear"], "side": ["left", "right"]}
+    held = {name: result.quantities[name] for name in ("time", "distance", "Y")}
+    wagon = Result({name: result[name] for name in held}, held, coordinates, result.attributes)
+    both, one = overlay({"coach": result, "wagon": wagon}, ["Y:1", "Y"]).axes
+    assert both.get_title(loc="left") == "Guiding force: front.outer.wheelset / front"
+    assert one.get_title(loc="left") == "Guiding force"
 
 
 def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(tmp_path, capsys):
