@@ -93,9 +93,11 @@ def in_words(value: Any) -> str:
 
     Examples
     --------
-    >>> in_words((10, 10)), in_words(True), in_words(None), in_words(0.1 + 0.2)
-    ('10, 10', 'yes', 'none', '0.3')
+    >>> in_words((10, 10)), in_words(True), in_words(None), in_words({"mu": 0.1 + 0.2})
+    ('10, 10', 'yes', 'none', 'mu 0.3')
     """
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {in_words(part)}" for key, part in value.items())
     if isinstance(value, tuple | list):
         return ", ".join(map(in_words, value)) or "none"
     if value is None or isinstance(value, bool):

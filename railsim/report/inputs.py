@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import track_remarks
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.description.rest import rest_frequencies
 from railsim.errors import InputError, ModelError
@@ -17,7 +18,7 @@ from railsim.report.document import Drawing, Section, Table, in_words, of_values
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.result import Result
 from railsim.simulation.assumptions import assumptions
-from railsim.text import printable
+from railsim.text import printable, shortened
 
 Record = Mapping[str, Any]
 MOST_SHOWN = 12  # values of an input of a study
@@ -78,14 +79,18 @@ def what_was_run(
     if used and not results:
         section.texts.append("Vehicles and tracks as their files are now; results were not kept.")
     for name, vehicle in vehicles.items():
-        words = f"{vehicle.name}. {vehicle.source or ''}"
+        words = f"{_named(vehicle, name)}{vehicle.source or ''}"
         kinds = [kind.replace("_", " ") for kind in element_kinds(vehicle)]
         section.drawings.append(Drawing(name, words, Markup(vehicle_svg(vehicle)), kinds))
     for name, variants in tracks.items():
         rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
         values = sorted({mu for track in variants for mu in track.frictions})
         friction = ", ".join(f"{mu:g}" for mu in values)
-        words = f"{variants[0].name}. Friction {friction}; rails {rails}."
+        unusual = dict.fromkeys(
+            str(remark) for track in variants for remark in track_remarks(track)
+        )
+        words = f"{_named(variants[0], name)}Friction {friction}; rails {rails}."
+        words += f" Remarks: {'; '.join(unusual)}." if unusual else ""
         section.drawings.append(Drawing(name, words, Markup(track_svg(variants[0]))))
     section.details += _at_rest(results)
     if len(vehicles) > 1:
@@ -97,6 +102,11 @@ def what_was_run(
     if results:
         section.tables.append(_settings(results))
     return section
+
+
+def _named(one: Vehicle | Track, label: str) -> str:
+    """Return the name of a file's content where its label does not say it."""
+    return "" if one.name == label else f"{one.name}. "
 
 
 def _at_rest(results: Mapping[str, Result]) -> list[Table]:
@@ -153,7 +163,7 @@ def differing(vehicles: Sequence[Any]) -> dict[str, list[str]]:
     """Return the keys in which vehicles differ, each with the value of every vehicle in words."""
     flat = [dict(_flat(vehicle.model_dump())) for vehicle in vehicles]
     return {
-        key: [in_words(values.get(key, "—")) for values in flat]
+        key: [shortened(in_words(values.get(key, "—"))) for values in flat]
         for key in dict.fromkeys(key for values in flat for key in values)
         if key not in ("name", "source") and len({str(values.get(key)) for values in flat}) > 1
     }
@@ -165,7 +175,7 @@ def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
         return [row for name, value in pairs for row in _flat(value, name)]
     if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
         count = f"{len(node)} row{'s' * (len(node) > 1)}"
-        return [(key, f"{count}: {'; '.join(map(in_words, node))}"[:60])]
+        return [(key, f"{count}: {'; '.join(map(in_words, node))}")]
     return [(key, node)]
 
 

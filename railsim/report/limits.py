@@ -108,16 +108,19 @@ def _told_apart(assessments: Sequence[Assessment], runs: Mapping[str, Result]) -
 
 
 def _reasons(one: Assessment) -> Table:
-    """Return the verdicts of a vehicle with a row for each reason; equal verdicts once."""
+    """Return the verdicts of a vehicle with a row for each reason; what is equal once."""
     deciding, rows, failed = getattr(one.limits, "deciding", ()), list[list[str]](), list[int]()
     groups: dict[Verdict, list[str]] = {}
     for name, verdict in one.verdicts.items():
         words = WORDS[name] + ("" if name in deciding else " (for information)")
         groups.setdefault(verdict, []).append(words)
+    each = [dict.fromkeys(verdict.reasons) for verdict in groups]
+    of_all = [r for r in each[0] if all(r in own for own in each)] if len(each) > 1 else []
     for verdict, names in groups.items():
-        for k, reason in enumerate(verdict.reasons or ("",)):
+        for k, reason in enumerate([r for r in verdict.reasons if r not in of_all] or ("",)):
             failed += [len(rows)] if KINDS.get(verdict.value) == FAILED else []
             rows.append(["" if k else ", ".join(names), "" if k else verdict.value, reason])
+    rows += [["" if k else "all of these", "", reason] for k, reason in enumerate(of_all)]
     header, caption = ["verdict on", "", "reasons"], f"Verdicts: {one.vehicle}"
     return Table(header, rows, caption, range(3), failed)
 
@@ -208,8 +211,8 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
         rows.append(("approved for", f"{3.6 * service.admissible_speed:.0f} km/h, cant deficiency "
                      f"{1e3 * service.cant_deficiency:.0f} mm, {service.category}"))  # fmt: skip
     rows += [
-        (f"measuring point {name}", f"on {s.body}, {s.along:.2f} m ahead of the "
-         f"reference body's origin, {-s.arm[2]:.2f} m above that of its body")
+        (f"measuring point {name}", f"on {s.body}, {_off(s.along, 'ahead of', 'behind')} the "
+         f"reference body's origin, {_off(-s.arm[2], 'above', 'below')} that of its body")
         for name, s in sensors(vehicle).items()
     ]  # fmt: skip
     rows.append(("wheel forces", "Y and Q of every wheel, in the contact"))
@@ -222,6 +225,10 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
         rows.append(("frequency of the instability", f"{one.hunting_frequency:.2f} Hz"))
     caption = f"Vehicle, measuring points, profiles: {one.vehicle}"
     return Table(["", ""], [[*row] for row in rows], caption, (0, 1))
+
+
+def _off(distance: float, on: str, back: str) -> str:
+    return f"{abs(distance):.2f} m {on if distance >= 0.0 else back}"
 
 
 def _sources(limits: Any) -> Table:

@@ -25,7 +25,7 @@ from railsim.cli import main
 from railsim.definitions import Settings
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day, in_words
-from railsim.report.inputs import _flat, _settings
+from railsim.report.inputs import _flat, _settings, differing, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
@@ -307,6 +307,44 @@ def test_values_are_told_in_words():
 @pytest.mark.parametrize(("count", "words"), [(1, "1 row: 0, 1"), (2, "2 rows: 0, 1; 0, 1")])
 def test_rows_of_a_table_are_counted_in_the_differences(count, words):
     assert _flat({"damper": [(0.0, 1.0)] * count}) == [("damper", words)]
+
+
+def test_tables_that_differ_far_behind_their_beginning_are_differences():
+    rows = [(0.01 * k, 100.0 * k) for k in range(12)]
+    bogies = {"placements": [{"name": "front", "position": (9.5, 0.0, 0.0)}]}
+    one, other = (
+        SimpleNamespace(model_dump=lambda end=end: {"damper": [*rows, (1.0, end)], **bogies})
+        for end in (5e3, 6e3)
+    )
+    ((key, words),) = differing([one, other]).items()
+    assert key == "damper"
+    assert words == ["13 rows: 0, 0; 0.01, 100; 0.02, 200; 0.03, 300; 0.04, 400..."] * 2
+    assert _flat(bogies) == [("placements", "1 row: name front, position 9.5, 0, 0")]
+
+
+def test_remarks_on_a_track_stand_beside_its_drawing_and_names_once():
+    result = example_result()
+    (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": result})
+    coach, curve = what_was_run([used], {"a": result}, {}).drawings
+    assert curve.words == (
+        "Friction 0.4; rails elastic (ballasted). Remarks: plan.2: a cant of 150 mm is more than "
+        "(R - 100 m)/2 = 75 mm."
+    )
+    assert not coach.words.startswith(coach.title)
+
+
+def test_reasons_of_all_verdicts_are_told_once_and_points_below_a_body_are_below():
+    found = assessed({"run": example_result()})[1]
+    verdicts = next(table for table in found.tables if table.caption.startswith("Verdicts"))
+    reasons = [row[2] for row in verdicts.rows]
+    assert len(reasons) == len(set(reasons))
+    assert "all of these" in [row[0] for row in verdicts.rows]
+    setup = next(table for table in found.details if table.caption.startswith("Vehicle,"))
+    places = {row[0]: row[1] for row in setup.rows}
+    assert places["measuring point floor_rear"] == (
+        "on carbody, 9.50 m behind the reference body's origin, 0.60 m below that of its body"
+    )
+    assert not any("-0.00" in words for words in places.values())
 
 
 def test_thinned_curves_keep_every_peak_and_their_order():
