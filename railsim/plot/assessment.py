@@ -169,9 +169,12 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
             ax.set_title(f"zone {zone}", loc="right", fontsize=9)
             unit = row.criterion.unit.replace("-", "1")
             ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
-    if any(names):  # beside the axes, where it hides no value
-        handles = [key(name, marker="o", ls="", color=distinct(k)) for k, name in enumerate(names)]
-        figure.legend(handles=handles, loc="outside lower left", ncols=len(names))
+    looks: dict[str, Any] = {"regression": {}, "upper bound": {"ls": "--"}}
+    looks |= {"estimate": {"marker": "D", "ls": ""}, "limit": {"color": LIMIT}}
+    handles = [key(words, **{"color": "0.25"} | look) for words, look in looks.items()]
+    if any(names):
+        handles += [key(name, marker="o", ls="", color=distinct(k)) for k, name in enumerate(names)]
+    figure.legend(handles=handles, loc="outside lower left", ncols=4)  # where it hides no value
     return figure
 
 
@@ -291,8 +294,8 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     index.plot([], [], "-", color="0.3", label="lateral")
     index.plot([], [], "--", color="0.3", label="vertical")
     for ax in (mean, index):
-        ax.set_ylim(bottom=0.0)
         ax.margins(y=0.15)
+        ax.set_ylim(bottom=0.0)
     handles = [handle for ax in (mean, index) for handle in ax.get_legend_handles_labels()[0]]
     figure.legend(handles=handles, loc="outside right upper")
     return figure

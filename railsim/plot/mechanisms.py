@@ -26,6 +26,7 @@ from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.plot import style
 from railsim.plot.point_names import name_points
+from railsim.text import unformatted
 
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
@@ -229,7 +230,9 @@ def angles_figure(result: Analysis) -> Figure:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
         axes.axhline(limit, color=style.LIMIT, lw=0.9)
         look: Any = {"frame": style.BESIDE, "fontsize": 8, "color": style.LIMIT}
-        style.note(axes, "limit", (1.0, limit), (0, 0), "right", "bottom", **look)
+        limited = [name for name, angle in result.definition.angles.items() if angle.limited]
+        words = unformatted(f"limit of {', '.join(limited)}")
+        style.note(axes, words, (1.0, limit), (0, 0), "right", "bottom", **look)
     return figure
 
 

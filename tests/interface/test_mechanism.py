@@ -12,7 +12,9 @@ import pytest
 from railsim import cli
 from railsim.definitions.loading import load_mechanism
 from railsim.files.sources import find_file, shipped_names
+from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.optimised_file import optimised_text
+from railsim.plot.mechanisms import angles_figure
 
 FEW = ["--set", "sampling.points=51"]
 FOUR_BAR = """
@@ -514,3 +516,9 @@ def test_equal_reasons_of_a_catalogue_are_one_row_on_the_terminal_only(capsys):
     assert "front: 3ML p 30 % ... front: 4SL p 100 % (30 rows)" in out
     rows = answer(capsys, "tilting_one_spring", *FEW)["selection"]
     assert sum(row["catalogue"] == "rigid_lock" for row in rows) == 30
+
+
+def test_limit_in_the_picture_of_angles_names_those_that_it_limits():
+    """mu_s is smaller than the limit at the start, and not limited."""
+    (axes,) = angles_figure(analyse(load_mechanism("atr95_lift_5"))).axes
+    assert [text.get_text() for text in axes.texts] == ["limit of mu, mu_prime"]
