@@ -1,5 +1,6 @@
 """``railsim assess-track``: a recorded track judged by vehicles."""
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -53,7 +54,8 @@ def command(
     output.written += found.write()
     table, strip = found.table(), heat_strip(found.cells, found.shares, CELL)
     output.write("heat_strip.png", strip)
-    page = assessed_track_page(found.table(), found.share, strip, found.notes, found.sections)
+    given = found.table(), found.share, strip, found.notes, found.sections
+    page = assessed_track_page(Path(recording).name, *given)
     output.write("report.html", page)
     more = len(table) - SHOWN
     table.rows = table.rows[:SHOWN]

@@ -42,5 +42,7 @@ def irregularity_figure(found: Irregularity) -> Figure:
             )  # fmt: skip
     axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")
     axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="share of the variance explained")
+    if len(found.pieces) > 1:
+        axes[SHOWN].set_title(f"a line for each of {len(found.pieces)} pieces of the run")
     axes[SHOWN].legend(loc="lower right")
     return figure

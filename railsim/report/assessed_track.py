@@ -18,9 +18,12 @@ METHOD = (
 
 
 def assessed_track_page(
-    places: Table, share: float, strip: Figure, notes: Sequence[str], sections: Table
+    track: str, places: Table, share: float, strip: Figure, notes: Sequence[str], sections: Table
 ) -> str:
-    """Return the page as HTML: places beyond a share of a limit, heat strip, sections."""
+    """Return the page as HTML: places beyond a share of a limit, heat strip, sections.
+
+    `track`: name of the recording.
+    """
     number = len(places)
     at = f"{number} place{'s' * (number != 1)}"
     text = f"At {at} a vehicle exceeds {100.0 * share:g} % of a limit."
@@ -33,4 +36,4 @@ def assessed_track_page(
         Section("Vehicles and geometry limits", [*notes], [sections]),
     ]
     verdict = {"text": text, "ok": number == 0}
-    return document("Track judged by vehicles", parts, METHOD, verdict)
+    return document(f"{track} judged by vehicles", parts, METHOD, verdict)

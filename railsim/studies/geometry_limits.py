@@ -21,6 +21,12 @@ GEOMETRY = (
     (230.0, 1.2, 0.8, 9.0, 7.0),
     (300.0, 1.0, 0.7, 8.0, 6.0),
 )
+COMPARED = (
+    ("level", "standard deviation of level", ".2f"),
+    ("alignment", "standard deviation of alignment", ".2f"),
+    ("level_peak", "largest level", ".1f"),
+    ("alignment_peak", "largest alignment", ".1f"),
+)
 
 
 class RecordedGeometry:
@@ -59,12 +65,11 @@ class RecordedGeometry:
         """
         row = next((row for row in GEOMETRY if 3.6 * speed <= row[0] + 1e-3), GEOMETRY[-1])
         columns: list[Column | str] = [
-                   Column("begin", unit="m", format=".0f"), Column("end", unit="m", format=".0f"),
-                   Column("level", "standard deviation of level D1", "mm", ".2f"),
-                   Column("alignment", "standard deviation of alignment D1", "mm", ".2f"),
-                   Column("level_peak", "largest level D1", "mm", ".1f"),
-                   Column("alignment_peak", "largest alignment D1", "mm", ".1f"),
-                   "geometry", "vehicles"]  # fmt: skip
+            Column(name, unit="m", format=".0f") for name in ("begin", "end")
+        ]
+        for (name, words, form), limit in zip(COMPARED, row[1:], strict=True):
+            columns.append(Column(name, f"{words} D1, limit {limit:g}", "mm", form))
+        columns += ["geometry", "vehicles"]
         rows, flagged = [], np.zeros(5, dtype=np.int64)
         first, last = self.s[0], self.s[-1] + STEP
         edges = first + SECTION * np.arange(max(1, round((last - first) / SECTION)) + 1)

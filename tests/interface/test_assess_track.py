@@ -114,6 +114,14 @@ def test_command(judged, recording, capsys, monkeypatch):
     page = (judged[2] / "report.html").read_text(encoding="utf-8")
     assert "alignment" in page
     assert "false alarms" in page
+    assert f"<title>{recording.name} judged by vehicles</title>" in page
+    # EN 13848-5 up to 160 km/h, as in `geometry_limits.GEOMETRY`
+    for words in (
+        "of level D1, limit 1.4",
+        "of alignment D1, limit 1",
+        "largest level D1, limit 10",
+    ):
+        assert words in page
     assert "missed" in data["flagged"]
 
 
