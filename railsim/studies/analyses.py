@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from railsim.definitions.study.analyses import (
+    Analysis,
     AssessAnalysis,
     CriticalSpeedAnalysis,
     CurvingAnalysis,
@@ -22,6 +23,8 @@ from railsim.studies.case import Case
 Numbers = dict[str, float]
 Outcome = tuple[Numbers, Sequence[str]]
 
+LARGEST = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "car_roll")
+"""Of steady curving: magnitudes over the wheels or wheelsets."""
 LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
@@ -34,6 +37,15 @@ def analysed(case: Case, result: Result | None) -> tuple[Numbers, list[str]]:
         found |= {f"{name}.{key}": value for key, value in numbers.items()}
         said += [f"{name}: {remark}" for remark in remarks]
     return found, said
+
+
+def numbers_of(analysis: Analysis) -> tuple[str, ...]:
+    """Return the names of the numbers of an analysis; empty where a standard says them."""
+    if isinstance(analysis, CurvingAnalysis):
+        return (*LARGEST, "sum_abs_Y", "T_gamma", "T_gamma_largest")
+    if isinstance(analysis, CriticalSpeedAnalysis):
+        return ("linear", "frequency", *analysis.methods)
+    return ("damping", "frequency") if isinstance(analysis, ModesAnalysis) else ()
 
 
 def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Outcome:
@@ -142,8 +154,7 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Ou
     )
     if found.converged.item() == FAILED:
         raise ModelError(f"no steady state on a radius of {analysis.radius:g} m")
-    names = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "car_roll")
-    numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in names}
+    numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in LARGEST}
     numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards: no derailment
     numbers["sum_abs_Y"] = float(np.max(np.abs(found.Y).sum(axis=-1)))
     numbers["T_gamma"] = float(np.sum(found.T_gamma))

@@ -24,9 +24,13 @@ from typing import Any
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import needs_run
 from railsim.definitions.study.definition import Study, value_texts
-from railsim.errors import Fault, Faults, InputError, argument_error, input_error
+from railsim.definitions.study.design import Optimise
+from railsim.errors import Fault, Faults, InputError, argument_error, input_error, nearest
 from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
+from railsim.result.extremes import BY_SIGN, PEAK_QUANTITIES
+from railsim.result.facts import FACTS
+from railsim.studies.analyses import numbers_of
 from railsim.studies.case import Case, Loader, Overrides, run_labels, run_name
 from railsim.studies.rows import PERMITTED, Row, made_rows
 from railsim.studies.spec import RunSpec, StudySpec
@@ -209,6 +213,7 @@ def check_study(study: Study) -> None:
     """
     spec = StudySpec.of_file(study)
     if study.optimise is not None:
+        _check_quantities(study, study.optimise)
         bounds = {
             key: [str(variable.low), str(variable.high)]
             for path, variable in study.optimise.variables.items()
@@ -218,13 +223,41 @@ def check_study(study: Study) -> None:
     Plan(spec).cases()
 
 
+def _check_quantities(study: Study, wanted: Optimise) -> None:
+    """Refuse quantities that no run of an optimisation can have."""
+    names = [f"{name}_{end}" for name in PEAK_QUANTITIES
+             for end in (("max", "min") if name in BY_SIGN else ("peak",))]  # fmt: skip
+    known = [*names, "speed", *FACTS] if needs_run(study.analyses) else []
+    of_all: set[str] = set()  # analyses whose standard says their numbers
+    for own, analysis in study.analyses.items():
+        known += [f"{own}.{number}" for number in numbers_of(analysis)]
+        of_all |= set() if numbers_of(analysis) else {own}
+    faults = Faults()
+    for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints)):
+        for number, one in enumerate(ones):
+            # at the middle of a curve, if the track has one; where and when; after a filter
+            middle = re.sub(r"_(mid|median)\d*$", "", one.quantity)
+            peak = re.sub(r"_(time|distance|20hz)$", "", one.quantity)
+            at_curve = (
+                needs_run(study.analyses) and middle != one.quantity and middle in PEAK_QUANTITIES
+            )
+            if peak in known or at_curve or one.quantity.partition(".")[0] in of_all:
+                continue
+            key = f"optimise.{table}.{number}.quantity"
+            found = f"no run has '{one.quantity}'"
+            faults.append(Fault("study", key, found, nearest(one.quantity, known), "--optimise"))
+    faults.check()
+
+
 @contextmanager
 def faults_of_file(file: str, *, assignments: bool = True) -> Iterator[None]:
     """Let faults of what an option would give name the study file that gives it.
 
     `assignments`: all of them are the file's.
     """
-    options = {f"--{name}" for name in OF_FILE} | ({"--set"} if assignments else set())
+    options = {f"--{name}" for name in (*OF_FILE, "optimise")} | (
+        {"--set"} if assignments else set()
+    )
     try:
         yield
     except InputError as error:

@@ -9,7 +9,6 @@ import pytest
 import railsim
 from railsim.cli import main
 from railsim.definitions.loading import load_study, load_vehicle
-from railsim.errors import InputError
 
 STUDY = """format = "railsim-study/1"
 name = "Primary stiffness in a curve"
@@ -150,10 +149,32 @@ def test_faults_of_the_file(tmp_path, capsys, old, new, words):
     assert not (tmp_path / "o").exists()
 
 
-def test_a_quantity_that_no_run_has(tmp_path):
-    file = written(tmp_path, STUDY.replace("curve.attack", "curve.atack").replace("= 6", "= 1"))
-    with pytest.raises(InputError, match=r"no run has 'curve.atack'.*'curve.attack'"):
-        railsim.optimise(file, out=tmp_path / "o", workers=1)
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("curve.attack", "curve.atack", "objectives.1.quantity: no run has 'curve.atack'; did you"),
+        ("curve.Y_over_Q", "Y_over_Q_peak", "constraints.0.quantity: no run has 'Y_over_Q_peak'"),
+        ("curve.T_gamma", "kurve.T_gamma", "objectives.0.quantity: no run has 'kurve.T_gamma'"),
+    ],
+)
+def test_a_quantity_that_no_run_has_is_found_before_any(tmp_path, capsys, old, new, words):
+    """Steady curving alone: the study has no run in the time domain, and no peaks."""
+    file = written(tmp_path, STUDY.replace(old, new))
+    for command in (["validate"], ["optimise", "--out", str(tmp_path / "o")]):
+        assert main([*command, file]) != 0
+        assert f"study.toml: optimise.{words}" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize(
+    "quantity", ["T_gamma_peak", "dQ_over_Q0_min_20hz", "Y_median2", "Y_mid", "Q_peak_distance"]
+)
+def test_columns_of_a_run_are_quantities(tmp_path, capsys, quantity):
+    run = 'kind = "run"\n[analyses.judged]\nkind = "assess"'
+    text = STUDY.replace('kind = "curving"\nradius = 300.0\ncant = 0.15', run)
+    text = text.replace("curve.T_gamma", quantity).replace("curve.attack", "judged.largest_share")
+    file = written(tmp_path, text.replace("curve.Y_over_Q", "Y_over_Q_peak"))
+    assert main(["validate", file]) == 0, capsys.readouterr().err
 
 
 def test_a_study_without_the_table(tmp_path, capsys):
