@@ -84,6 +84,7 @@ def _map(
     workers: int | None,
     output: cli.Output,
 ) -> None:
+    from railsim.definitions.units_of_keys import unit_of_input
     from railsim.plot.stability import map_figure
     from railsim.studies.stability_map import map_speeds, map_table, stability_map
 
@@ -91,9 +92,11 @@ def _map(
     with output.studying("critical speed") as studying:
         found = stability_map(points, how, folder=output.folder, workers=workers, **studying)
     axes = {name: values for name, values in ranges.items() if len(values) > 1}
+    units = {name: unit_of_input(points[0], name) for name in axes}
+    shown = {f"{name} ({units[name]})" if units[name] else name: axes[name] for name in axes}
     title = f"{points[0].vehicle.name}: critical speed"
     output.write(FILES[0], found)
-    output.write(FILES[1], lambda: map_figure(axes, map_speeds(found), title))
+    output.write(FILES[1], lambda: map_figure(shown, map_speeds(found), title))
     remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
     output.answer(found, [map_table(found, list(axes))], remarks)
 

@@ -107,6 +107,7 @@ def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) 
 
 def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":
     """Root locus over one key of the inputs."""
+    from railsim.definitions.units_of_keys import unit_of_input
     from railsim.linear.modes import parameter_locus
     from railsim.linear.vehicle import Contact, LinearVehicle, smooth_law
 
@@ -117,4 +118,5 @@ def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "Ro
         coach, rails, settings = given.inputs([f"{key}={value!r}"])
         return LinearVehicle(coach, rails, contact=contact, settings=smooth_law(settings), **how)
 
-    return parameter_locus(prepared, key, cli.values_of(text, "--over"), speed)
+    values = cli.values_of(text, "--over")
+    return parameter_locus(prepared, key, values, speed, unit_of_input(given.inputs(), key))

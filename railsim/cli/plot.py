@@ -90,11 +90,14 @@ def command(
 def _study_figure(
     file: str, selections: tuple[str, ...], against: Text, family: Text, kind: Text
 ) -> "Figure":
+    from railsim.cli.report import used_inputs
     from railsim.plot.study import curves_figure, map_figure, ranking_figure
+    from railsim.report.inputs import inputs_of, units_of
     from railsim.report.spread import columns, parameters
 
     ended = ("complete", "derailed", "stopped")
-    records = [record for record in gather([file]).records if record["status"] in ended]
+    gathered = gather([file])
+    records = [record for record in gathered.records if record["status"] in ended]
     known = columns(records)
     if not known:
         raise input_error(file, "no run has values", "a study with finished runs")
@@ -104,7 +107,12 @@ def _study_figure(
         for name in names
         if name not in known
     )
-    varied = {name: _quantity(column) for name, column in parameters(records).items()}
+    first = gathered.results([name for name in gathered.paths][:1])
+    used = inputs_of(records, first) or used_inputs(Path(file))
+    varied = {
+        name: _quantity(column)
+        for name, column in parameters(records, units_of(records, used)).items()
+    }
     faults += [
         Fault(option, "", f"'{name}' was not varied", nearest(name, varied))
         for option, name in (("--against", against), ("--family", family))

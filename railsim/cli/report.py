@@ -71,13 +71,13 @@ def write_report(
     stems = list(dict.fromkeys(folder_of(file).resolve().stem for file in files))
     names = str(study) if study else listed(stems, 4)
     every = found.results([record["name"] for record in with_files])
-    used = [] if results or not found.inputs else _used(folder_of(files[0]))
+    used = [] if results or not found.inputs else used_inputs(folder_of(files[0]))
     measured = [as_section(part, number) for number, part in enumerate(parts, start=1)]
     runs = found.records, results, found.remarks, every, found.inputs, used
     write_text(path, page(title or names, *runs, assessments, measured))
 
 
-def _used(folder: Path) -> "list[Used]":
+def used_inputs(folder: Path) -> "list[Used]":
     """Inputs of a study without results: the first run of each vehicle on each track.
 
     From the files as they are now; nothing where they are gone or no longer what they were.

@@ -165,6 +165,7 @@ class RootLocus(Plottable):
     key: str  # ``speed`` or the key of the parameter
     values: tuple[float, ...]  # of it
     sets: tuple[Modes, ...]  # one for each value
+    unit: str = ""  # of the values
 
     @property
     def eigenvalues(self) -> Complexes:
@@ -213,8 +214,7 @@ class RootLocus(Plottable):
 
     def table(self) -> Table:
         """Return the least damped oscillation from 0.3 to 40 Hz at every value."""
-        unit = "m/s" if self.key == "speed" else ""
-        columns = [Column(self.key, unit=unit, format="g"), Column("mode"), FREQUENCY, DAMPING]
+        columns = [Column(self.key, unit=self.unit, format="g"), Column("mode"), FREQUENCY, DAMPING]
         rows: list[list[Any]] = []
         for value, modes in zip(self.values, self.sets, strict=True):
             least = modes.least_damped
@@ -334,7 +334,7 @@ def root_locus(
     prepared = _prepared(vehicle, track, contact, **how)
     sets = followed(prepared.linearised, speeds, FOLLOWED)
     named = [_named(prepared, found, speed) for found, speed in zip(sets, speeds, strict=True)]
-    return RootLocus("speed", tuple(speeds), tuple(named))
+    return RootLocus("speed", tuple(speeds), tuple(named), "m/s")
 
 
 def _prepared(
@@ -349,7 +349,11 @@ def _prepared(
 
 
 def parameter_locus(
-    prepared: Callable[[float], LinearVehicle], key: str, values: Sequence[float], speed: float
+    prepared: Callable[[float], LinearVehicle],
+    key: str,
+    values: Sequence[float],
+    speed: float,
+    unit: str = "",
 ) -> RootLocus:
     """Return the modes of a vehicle over any parameter of its files, called `key`, at a speed.
 
@@ -360,7 +364,7 @@ def parameter_locus(
     sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
     each = zip(sets, values, strict=True)
     named = [_named(of(value), found, speed, (key, value)) for found, value in each]
-    return RootLocus(key, tuple(values), tuple(named))
+    return RootLocus(key, tuple(values), tuple(named), unit)
 
 
 def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[float]:

@@ -60,7 +60,7 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
 
 
 def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> None:
-    words = "speed (m/s)" if locus.key == "speed" else locus.key
+    words = f"{locus.key} ({locus.unit})" if locus.unit else locus.key
     damping.axhline(0.0, color=LIMIT, lw=0.8)
     title = "Damping; below zero unstable"
     damping.set(xlabel=words, ylabel="damping ratio (%)", title=title)
@@ -70,9 +70,8 @@ def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> Non
     frequency.set(xlabel=words, ylabel="undamped frequency (Hz)", title="Frequency")
     frequency.set(ylim=(0.0, None))
     plane.axvline(0.0, color=LIMIT, lw=0.8)
-    towards = "higher speed" if locus.key == "speed" else f"higher {locus.key}"
     plane.set(xlabel="growth Re λ (1/s)", ylabel="frequency Im λ/2π (Hz)")
-    plane.set(title=f"Root locus; arrows point towards {towards}")
+    plane.set(title=f"Root locus; arrows point towards higher {locus.key}")
     plane.set(xlim=(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1]), ylim=(0.0, None))
 
 

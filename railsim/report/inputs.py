@@ -9,6 +9,7 @@ from markupsafe import Markup
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import track_remarks
+from railsim.definitions.units_of_keys import unit_of_input
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.description.rest import rest_frequencies
 from railsim.errors import InputError, ModelError
@@ -47,6 +48,12 @@ def inputs_of(records: Sequence[Record], results: Mapping[str, Result]) -> list[
         names = str(own.get("vehicle", vehicle.name)), str(own.get("track", track.name))
         found.append(Used(*names, vehicle, track, result.settings(), result.speed))
     return found
+
+
+def units_of(records: Sequence[Record], used: Sequence[Used]) -> dict[str, str]:
+    """Return the units of what was varied, by the labels of the runs."""
+    keys = dict.fromkeys(label for record in records for label in record["labels"] if "." in label)
+    return {key: next(filter(None, (unit_of_input(one, key) for one in used)), "") for key in keys}
 
 
 def _assumed(used: Sequence[Used]) -> Table:

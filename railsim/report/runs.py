@@ -23,7 +23,7 @@ from railsim.plot.assessment import assessment_figure
 from railsim.report import document as doc
 from railsim.report import spread
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.inputs import Used, inputs_of, what_was_run
+from railsim.report.inputs import Used, inputs_of, units_of, what_was_run
 from railsim.report.limits import assessed, remark_table
 from railsim.report.published import beside_published
 from railsim.result import Result
@@ -36,6 +36,7 @@ PEAKS = (
     "numbered from the leading end."
 )
 MOST_ROWS = 300  # of a table on the page
+MOST_UNITS = 4  # runs whose inputs say the units of what was varied
 
 
 def page(
@@ -67,18 +68,20 @@ def page(
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
     verdicts, limits = assessed(results if assessable is None else assessable)
     peaks = any(record["name"] in results for record in _done(records))
+    used = inputs_of(records, results) or list(used)
+    units = units_of(records, used[:MOST_UNITS])
     sections = [_peaks(records, results)] if peaks or len(records) < spread.LEAST else []
     sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
     if len(_done(records)) > max(spread.LEAST, len(results)):
-        sections.append(_worst(records))
+        sections.append(_worst(records, units))
     if found and (data["curves"] or peaks):
         sections.append(_curves(len(data["curves"]), records, results))
     if limits.tables or limits.details:
         sections.append(limits)
     if len(records) >= spread.LEAST:
-        sections.append(_spread(records, data, inputs))
+        sections.append(_spread(records, data, inputs, units))
     sections += [*_published(results), *measured]
-    sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs))
+    sections.append(what_was_run(used, results, inputs))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report", "templates/runs.html", title=title,
@@ -155,10 +158,11 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Sect
     return doc.Section("Peaks", texts, tables=[table] if shown else [], id="peaks")
 
 
-def _worst(records: Sequence[Record]) -> doc.Section:
+def _worst(records: Sequence[Record], units: Mapping[str, str]) -> doc.Section:
     """The runs with the largest values, and where the study has them."""
     done = _done(records)
-    table = doc.Table(["", *(f"{k}." for k in range(1, spread.WORST + 1))], spread.worst_rows(done))
+    header = ["", *(f"{k}." for k in range(1, spread.WORST + 1))]
+    table = doc.Table(header, spread.worst_rows(done, units))
     text = (
         f"The largest of {len(done)} runs by magnitude, over all wheels; the table of runs below "
         "has the rest, and the command of each."
@@ -197,10 +201,13 @@ def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result
 
 
 def _spread(
-    records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str, Any]
+    records: Sequence[Record],
+    data: dict[str, Any],
+    inputs: Mapping[str, Any],
+    units: Mapping[str, str],
 ) -> doc.Section:
     """Table of all runs, and what their values depend on."""
-    done, varied = _done(records), spread.parameters(records)
+    done, varied = _done(records), spread.parameters(records, units)
     data["spread"] = {
         "parameters": varied,
         "columns": spread.columns(records),

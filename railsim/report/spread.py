@@ -19,10 +19,13 @@ WORST = 5  # runs of each quantity
 RANKED = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")  # for the worst runs
 
 
-def parameters(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
+def parameters(
+    records: Sequence[Record], units: Mapping[str, str] | None = None
+) -> dict[str, dict[str, Any]]:
     """Return the parameters that differ between runs, by name: ``words``, ``unit``, ``values``.
 
-    Numbers are numbers; the words are the end of the name that tells it from all others.
+    Numbers are numbers; the words are the end of the name that tells it from all others. `units`:
+    By name, as of `railsim.report.inputs.units_of`.
 
     Examples
     --------
@@ -37,7 +40,7 @@ def parameters(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
         if len(set(map(str, values))) > 1:
             found[name] = {
                 "words": _short(name, names),
-                "unit": "m/s" if name == "speed" else "",
+                "unit": "m/s" if name == "speed" else (units or {}).get(name, ""),
                 "values": _numbers(values),
             }
     return found
@@ -151,13 +154,15 @@ def spread_rows(records: Sequence[Record]) -> list[list[str]]:
     return rows
 
 
-def worst_rows(records: Sequence[Record]) -> list[list[tuple[str, str] | str]]:
+def worst_rows(
+    records: Sequence[Record], units: Mapping[str, str] | None = None
+) -> list[list[tuple[str, str] | str]]:
     """Return the runs with the largest values of each quantity, with what tells them apart.
 
     The quantities are those by which the runs with curves are chosen; where no run has any of
     them, those of analyses and functions of the user.
     """
-    there, varied = columns(records), parameters(records)
+    there, varied = columns(records), parameters(records, units)
     rows: list[list[tuple[str, str] | str]] = []
     own = [key for key in there if "_mid" not in key and not key.endswith(tuple(WORDS))]
     for key in [name for name in RANKED if name in there] or own:

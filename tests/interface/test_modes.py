@@ -73,6 +73,9 @@ def test_root_locus_over_a_key(capsys):
     assert main(command) == 0
     words = ": 20 m/s, straight track, rails ballasted, contact tangent; least damped"
     assert words in capsys.readouterr().out
+    mass = ["modes", "coach_manchester", "--over", "vehicle.carbody.mass=3e4:4e4:2", "--quiet"]
+    assert main(mass) == 0
+    assert "\nvehicle.carbody.mass (kg)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

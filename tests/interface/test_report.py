@@ -23,6 +23,7 @@ from test_study import simulated as simulated
 import railsim
 from railsim.cli import main
 from railsim.definitions import Settings
+from railsim.definitions.units_of_keys import unit_of_input
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day, in_words
 from railsim.report.inputs import _flat, _settings, differing, inputs_of, what_was_run
@@ -402,6 +403,27 @@ def records(number):
         }
         runs.append({"name": f"run{i}", "file": "", "labels": labels, **facts})
     return runs
+
+
+def test_parameters_have_the_units_that_the_manual_says():
+    """Mass [kg], stiffness of a bushing [N/m], damping of a damper and of a roll bar."""
+    inputs = inputs_of([], {"a": example_result()})
+    units = {
+        "vehicle.bodies.carbody.mass": "kg",
+        "vehicle.primary.stiffness.x": "N/m",
+        "vehicle.secondary_vertical_damper.damping": "N s/m",
+        "vehicle.anti_roll_bar.stiffness": "N m/rad",
+        "track.friction": "",
+        "track.cant.1.cant_end": "m",
+        "settings.output_rate": "1/s",
+        "vehicle.nothing.mass": "",
+        "speed": "",
+    }
+    assert {key: unit_of_input(inputs[0], key) for key in units} == units
+    runs = [{**r, "labels": {"vehicle.carbody.mass": f"{i}e4"}} for i, r in enumerate(records(5))]
+    found = page("t", runs, {"run0": example_result(), "run1": example_result()})
+    assert '"unit":"kg"' in found
+    assert "mass 40000 kg" in found
 
 
 def test_spread_has_the_values_of_every_run():

@@ -84,6 +84,7 @@ window.railsimStudy = function (data, tools) {
       series = series.filter(function (_, i) { return i === 0 || i % 3 === 1; });
     }
     var across = tools.axis(words(x), 24);
+    across.space = 80; /* between 40,000,000 and the next */
     if (!numeric) {
       across.splits = function () { return xs; };
       across.values = function (_, s) { return s.map(function (v) { return groups.labels[v] || ""; }); };
