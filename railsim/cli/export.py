@@ -21,7 +21,8 @@ def command(
     """Write a result, or some of its quantities, as CSV, for MATLAB and Octave, or as Parquet.
 
     CSV and Parquet have a column for each wheel, body or sensor of each quantity; a MATLAB file
-    holds the arrays with their dimensions.
+    holds the arrays with their dimensions.  Of CSV and Parquet a QUANTITY may select wheels, bodies
+    and components, as in `railsim plot`: Y:1:left.
 
     \b
     Example:
@@ -33,4 +34,4 @@ def command(
 
     out = output.file("", ENDINGS)
     part = selected(open_run(file), quantities, shown_units=units == "shown", **how)
-    output.wrote(export(part, out, overwrite=output.overwrite))
+    output.wrote(export(part, out, quantities, overwrite=output.overwrite))

@@ -6,7 +6,7 @@ their names with their dimensions, and ``units``, names and facts of the run as 
 """
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from railsim.errors import Faults, argument_error, argument_fault, nearest
 from railsim.files.access import check_file, whole_file
 from railsim.result.data import Result
 from railsim.result.filters import even_step, low_passed, outward_quotient
+from railsim.result.labels import all_labels
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
@@ -25,17 +26,26 @@ MOST_INSTANTS = 10_000_000  # of an export at equal times
 POSITIONS = ("time", "distance", "mileage", "wheelset_distance")  # quantities that are not filtered
 
 
-def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
+def export(
+    result: Result, path: str | Path, quantities: Sequence[str] = (), *, overwrite: bool = False
+) -> Path:
     """Write a result to a file whose ending says the format.
 
-    Raises InputError: the file exists and may not be overwritten, its ending is none of `ENDINGS`,
-    or what writes it is not installed.
+    `quantities`: Columns of CSV and Parquet, as of `selected`; by default all. Raises InputError:
+    the file exists and may not be overwritten, its ending is none of `ENDINGS`, or what writes it
+    is not installed; single wheels of a MATLAB file.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
-    write = {".csv": _csv, ".mat": _matlab, ".parquet": _parquet}[path.suffix.lower()]
     with whole_file(path) as partial:
-        write(result, partial)
+        if path.suffix.lower() == ".mat":
+            if labelled := [name for name in quantities if ":" in name]:
+                allowed = "a MATLAB file holds whole quantities; CSV and Parquet hold columns"
+                raise argument_error("quantities", "some places", allowed, labelled[0], "QUANTITY")
+            _matlab(result, partial)
+        else:
+            write = _csv if path.suffix.lower() == ".csv" else _parquet
+            write(_columns(result, quantities), partial)
     return path
 
 
@@ -49,18 +59,25 @@ def selected(
 ) -> Result:
     """Return a part of a result: some quantities over a section, in other units.
 
-    `quantities`: Names; by default all.  Time and distance are kept always. `between`: Section of
+    `quantities`: Names, perhaps with labels as in ``Y:1:left``, by which `export` chooses; by
+    default all.  Time and distance are kept always. `between`: Section of
     the track, by the distance of the reference body [m]. `rate`: Values at equal times, as many
     per second, interpolated linearly; values that change faster than half of it are filtered
     before (`low_passed`) [1/s]. `shown_units`: In the units of tables and plots (kN, mm) instead
     of SI. Raises InputError: A quantity that the result does not have; a section that was not run;
     a rate that is no number above 0.
     """
-    faults = Faults(
-        argument_fault("quantities", n, "no such quantity", nearest(n, result), "QUANTITY")
-        for n in quantities
-        if n not in result
-    )
+    faults = Faults()
+    for selection in quantities:
+        name, *labels = selection.split(":")
+        known: Iterable[str] = result
+        if name in result:
+            known = all_labels(result.quantities[name].dims[1:], result.coordinates)
+        wrong = [label for label in labels if label not in known] if name in result else [name]
+        found = f"no label '{wrong[0]}'" if name in result and wrong else "no such quantity"
+        if wrong:
+            allowed = nearest(wrong[0], known)
+            faults.append(argument_fault("quantities", selection, found, allowed, "QUANTITY"))
     time, distance = result["time"], result["distance"]
     low, high = between or (-np.inf, np.inf)
     rows = np.flatnonzero((distance >= low) & (distance <= high))
@@ -70,7 +87,8 @@ def selected(
     if rate is not None:
         faults.require(0.0 < rate < np.inf, "rate", f"found {rate:g}", "above 0 per s")
     faults.check()
-    wanted = dict.fromkeys(["time", "distance", *(quantities or result)])
+    names = [selection.partition(":")[0] for selection in quantities]
+    wanted = dict.fromkeys(["time", "distance", *(names or result)])
     chosen = {name: quantity for name, quantity in result.quantities.items() if name in wanted}
     instants = time[rows]
     if rate is not None and len(rows):
@@ -123,13 +141,18 @@ def _at(instants: Floats, time: Floats, values: Floats) -> Floats:
     return found.T.reshape(len(instants), *values.shape[1:])
 
 
-def _columns(result: Result) -> list[tuple[str, str, Floats]]:
+Columns = list[tuple[str, str, Floats]]
+
+
+def _columns(result: Result, quantities: Sequence[str] = ()) -> Columns:
     """Return name, unit and values of every column, time first."""
-    return [("time", "s", result["time"]), *result.columns()]
+    over_time = [q for q in quantities if result.quantities[q.partition(":")[0]].dims[0] == "time"]
+    names = dict.fromkeys(["distance", *over_time] if quantities else [])
+    names.pop("time", None)
+    return [("time", "s", result["time"]), *result.columns(*names)]
 
 
-def _csv(result: Result, path: Path) -> None:
-    found = _columns(result)
+def _csv(found: Columns, path: Path) -> None:
     table = np.stack([values for _, _, values in found], axis=1)
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -153,15 +176,15 @@ def _matlab(result: Result, path: Path) -> None:
         savemat(file, data, long_field_names=True, oned_as="column", do_compression=True)
 
 
-def _parquet(result: Result, path: Path) -> None:
+def _parquet(found: Columns, path: Path) -> None:
     try:
         import pandas
         import pyarrow  # noqa: F401 - what writes it
     except ImportError as error:
-        found = f"the package '{error.name}' is not installed"
+        words = f"the package '{error.name}' is not installed"
         allowed = "install it with: pip install pandas pyarrow"
-        raise argument_error("path", found, allowed, option="--out") from None
-    frame = pandas.DataFrame({name: values for name, _, values in _columns(result)})
-    frame.attrs = {"units": {name: unit for name, unit, _ in _columns(result)}}
+        raise argument_error("path", words, allowed, option="--out") from None
+    frame = pandas.DataFrame({name: values for name, _, values in found})
+    frame.attrs = {"units": {name: unit for name, unit, _ in found}}
     with open(path, "wb") as file:
         frame.to_parquet(file)

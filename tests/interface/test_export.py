@@ -38,6 +38,23 @@ def test_both_ends_of_a_section_belong_to_it(result):
     np.testing.assert_array_equal(part.time, result.time[5:21])
 
 
+def test_single_wheels_are_columns_as_plot_takes_them(result, tmp_path, capsys):
+    file = str(result.to_hdf5(tmp_path / "run.h5"))
+    command = ["export", file, "Y:1:left", "Q:2", "sum_Y", "--out"]
+    assert main([*command, str(tmp_path / "part.csv")]) == 0
+    with (tmp_path / "part.csv").open(encoding="utf-8") as stream:
+        header, *rows = csv.reader(stream)
+    first, second = result.wheelsets[:2]
+    assert header[2:5] == [f"Y:{first}:left (N)", f"Q:{second}:left (N)", f"Q:{second}:right (N)"]
+    assert header[5:] == [f"sum_Y:{name} (N)" for name in result.wheelsets]
+    np.testing.assert_allclose(np.array(rows, dtype=float)[:, 4], result.Q[:, 1, 1])
+    assert main([*command, str(tmp_path / "part.mat")]) == 2
+    assert "QUANTITY: Y:1:left: some places; a MATLAB file holds" in capsys.readouterr().err
+    assert not (tmp_path / "part.mat").exists()
+    assert main(["export", file, "Y:lef", "--out", str(tmp_path / "a.csv")]) == 2
+    assert "Y:lef: no label 'lef'; did you mean 'left'?" in capsys.readouterr().err
+
+
 def test_units_of_positions_and_angles_are_shown_ones_too(result):
     part = selected(result, ["body_position"], shown_units=True)
     assert part.quantities["body_position"].component("yaw").unit == "mrad"
