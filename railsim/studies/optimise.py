@@ -173,9 +173,6 @@ def optimise(
     check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
     with nullcontext() if isinstance(file, Study) else faults_of_file(str(file)):
         check_study(definition)
-    folder = Path(out)
-    check_folder(folder)
-    _check_folder(folder, definition, resume=resume, overwrite=overwrite)
     execution = Execution(
         workers=workers,
         scheduler=scheduler,
@@ -183,6 +180,9 @@ def optimise(
         progress=progress,
         on_remark=on_remark,
     )
+    folder = Path(out)
+    check_folder(folder)
+    _check_folder(folder, definition, resume=resume, overwrite=overwrite)
     evaluation = Evaluation(definition, wanted, folder, execution)
     sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)
     search(wanted.method, Task(evaluation, *sizes, wanted.evaluations, wanted.batch, wanted.seed))

@@ -153,11 +153,14 @@ class Execution:
     on_remark: Callable[[str], None] | None = None
 
     def __post_init__(self) -> None:
-        """Raise InputError: `workers` is no number of processes."""
+        """Raise InputError: `workers` is no number of processes, or beside a scheduler's own."""
         if self.workers is not None and not (
             isinstance(self.workers, Integral) and self.workers > 0
         ):
             raise argument_error("workers", f"found {self.workers!r}", "a whole number above 0")
+        if self.workers is not None and self.scheduler is not None:
+            allowed = "not with it: the runs are on its own workers"
+            raise argument_error("workers", f"{self.workers} beside `scheduler`", allowed)
 
 
 def kept_quantities(keep: str) -> tuple[str, ...]:

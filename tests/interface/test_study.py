@@ -415,8 +415,15 @@ def test_validate_refuses_what_is_no_index(tmp_path, text, words, capsys):
 
 def test_missing_dask_is_answered_with_the_install_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert main(arguments(tmp_path, 20, more=["--scheduler", "tcp://localhost:1"])) == 2
+    command = [word for word in arguments(tmp_path, 20) if word not in ("--workers", "1")]
+    assert main([*command, "--scheduler", "tcp://localhost:1"]) == 2
     assert "pip install 'railsim[distributed]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_processes_beside_those_of_a_scheduler_are_refused(tmp_path, capsys):
+    assert main(arguments(tmp_path, 20, more=["--scheduler", "tcp://localhost:1"])) == 2
+    assert "--workers: 1 beside --scheduler; " in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
