@@ -104,7 +104,7 @@ def described_runs(file: str) -> "Description":
         for record in found.records
     ]
     table = Table(["run", *keys, "status"], ({k: str(v) for k, v in row.items()} for row in rows))
-    title = f"{folder_of(file)}: {len(rows)} runs, {ended}"
+    title = f"{folder_of(file)}: {len(rows)} run{'s' * (len(rows) != 1)}, {ended}"
     data = {"kind": "runs", "folder": str(folder_of(file)), "status": statuses, "runs": rows}
     return Description(data, [title, "", table, *found.remarks])
 

@@ -204,6 +204,8 @@ def test_runs_of_a_folder_are_listed_whichever_way_it_is_given(capsys, tmp_path)
     assert [line.split()[0] for line in lines[3:5]] == ["one", "two"]
     data = data_of(capsys, str(tmp_path))
     assert [run["status"] for run in data["runs"]] == ["complete", "complete"]
+    (tmp_path / "two.h5").unlink()
+    assert lines_of(capsys, str(tmp_path))[0].endswith(": 1 run, 1 complete")
 
 
 def test_wrong_file_is_status_2(capsys, tmp_path):
