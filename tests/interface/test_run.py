@@ -297,6 +297,22 @@ def test_interrupt_just_after_a_hidden_file_was_created_leaves_nothing(tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--load", "ful"], "--load: no load"),
+        (["--set", "vehicle.load=ful"], "--set: vehicle.load: no"),
+    ],
+)
+@pytest.mark.parametrize("command", [["run", "--speed", "20"], ["modes"]])
+def test_an_unknown_load_case_names_the_option_that_was_given(command, option, words, capsys):
+    name, *more = command
+    assert main([name, "coach_manchester", "straight", *more, *option]) == 2
+    shown = capsys.readouterr().err
+    assert words in shown.replace("--set: load", "--set: vehicle.load")
+    assert "allowed: design, laden" in shown
+
+
 @pytest.mark.parametrize("command", ["run", "study", "compare", "plot"])
 def test_help_loads_neither_numba_nor_matplotlib(command):
     check = (
