@@ -10,6 +10,8 @@ from importlib import import_module
 
 from generators import GENERATORS
 
+from railsim.errors import nearest
+
 
 def main(words: Sequence[str]) -> int:
     """Run the generators that are named."""
@@ -21,8 +23,15 @@ def main(words: Sequence[str]) -> int:
         lines = [f"  {name:11} {what}" for name, what in GENERATORS.items()]
         print("python docs/generate.py [NAME[:PART] ...]", *lines, sep="\n")
         return 0 if unknown <= {"-h", "--help"} else 2
+    modules = {name: import_module(f"generators.{name}") for name in wanted}
     for name, parts in wanted.items():
-        import_module(f"generators.{name}").make(parts)
+        known = getattr(modules[name], "PARTS", parts)  # any, where they are folders
+        if wrong := [part for part in parts if part not in known]:
+            allowed = nearest(wrong[0], known) if known else "it has none"
+            print(f"{name}: no part '{wrong[0]}'; {allowed}")
+            return 2
+    for name, parts in wanted.items():
+        modules[name].make(parts)
     return 0
 
 

@@ -229,12 +229,14 @@ def time_table() -> str:
     return table(("normal contact", "processor time of both cores, s"), body)
 
 
+PARTS = {
+    "rigid": rigid_table,
+    "exact": exact_table,
+    "tables": curving_table,
+    "building": time_table,
+}
+
+
 def make(parts):
     """Fill the tables of these names."""
-    makers = {
-        "rigid": rigid_table,
-        "exact": exact_table,
-        "tables": curving_table,
-        "building": time_table,
-    }
-    fill_page(PAGE, makers, parts)
+    fill_page(PAGE, PARTS, parts)

@@ -193,16 +193,19 @@ def pictures():
     save(figure, DOCS / "img" / "creep_traction.png", overwrite=True)
 
 
+MAKERS = {
+    "fastsim": fastsim_table,
+    "creep_laws": laws_table,
+    "creep_curves": curves_table,
+    "solver": solver_table,
+    "coefficients": coefficients_table,
+    "law_curving": curving_table,
+}
+PARTS = (*MAKERS, "pictures")
+
+
 def make(parts):
     """Fill the tables of these names, draw the `pictures`."""
-    makers = {
-        "fastsim": fastsim_table,
-        "creep_laws": laws_table,
-        "creep_curves": curves_table,
-        "solver": solver_table,
-        "coefficients": coefficients_table,
-        "law_curving": curving_table,
-    }
     if "pictures" in parts or not parts:
         pictures()
-    fill_page(PAGE, makers, parts)
+    fill_page(PAGE, MAKERS, parts)

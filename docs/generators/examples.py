@@ -106,6 +106,9 @@ def run(names: Sequence[str]) -> None:
             (PAGES / f"{script.stem}.md").write_text(page(script, printed.getvalue()), "utf-8")
 
 
+PARTS = (*(script.stem for script in SCRIPTS), "pages")
+
+
 def make(words):
     """Run the examples, or some of them, and write their pages; `pages` writes texts only."""
     if "pages" not in words:

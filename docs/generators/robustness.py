@@ -100,6 +100,9 @@ def rigid():
     return table(head, map(rigid_row, RIGID_CASES))
 
 
+PARTS = ("rigid", "grid")
+
+
 def make(parts):
     """Fill the table, or print the differences."""
     if "rigid" in parts:

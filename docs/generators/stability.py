@@ -54,6 +54,9 @@ PICTURES: dict[str, Callable[[], Figure]] = {
 }
 
 
+PARTS = tuple(PICTURES)
+
+
 def make(parts: Sequence[str]) -> None:
     """Draw these pictures, by default all."""
     for name in parts or PICTURES:

@@ -110,6 +110,9 @@ def _digits(value: float) -> str:
     return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.3f}"
 
 
+PARTS = ()
+
+
 def make(parts: Sequence[str]) -> None:
     """Fill the tables and draw the first picture."""
     draw_first_picture()

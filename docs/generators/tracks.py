@@ -140,6 +140,9 @@ def picture(omega, density):
         save(figure, DOCS / "img" / "irregularity_spectra.png", overwrite=True)
 
 
+PARTS = ("convergence", "variance")
+
+
 def make(parts):
     """Fill the tables of these names, and draw the picture."""
     omega, density, variance = spectra()

@@ -417,6 +417,9 @@ def overview(text: str) -> str:
     return filled(text, {"vehicles": vehicles_table(), "tracks": tracks_table()})
 
 
+PARTS = (*VEHICLES, "data")
+
+
 def make(parts):
     """Write the pages of these vehicles, by default of all."""
     compute = "data" not in parts

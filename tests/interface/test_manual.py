@@ -49,6 +49,16 @@ def test_every_generator_of_the_manual_is_registered():
     assert all("\ndef make(" in (folder / f"{name}.py").read_text("utf-8") for name in modules)
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["vehicles", "stability", "tracks", "contact", "creep", "robustness", "examples", "tables"],
+)
+def test_a_part_that_a_generator_does_not_have_is_refused(name, capsys, monkeypatch):
+    monkeypatch.setattr(import_module(f"generators.{name}"), "make", None)
+    assert import_module("generate").main([f"{name}:typo"]) == 2
+    assert f"{name}: no part 'typo'; " in capsys.readouterr().out
+
+
 def test_every_public_name_is_in_the_reference():
     pages = [ROOT / "docs" / "reference.md", *(ROOT / "docs" / "reference").glob("*.md")]
     text = "\n".join(page.read_text("utf-8") for page in pages)
