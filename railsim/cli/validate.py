@@ -89,7 +89,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         index = check_index(Path(file))
         return f"study of {len(index.runs)} runs, {index.status}", []
 
-    from railsim.definitions.loading import load_any
+    from railsim.definitions.loading import load_any, load_scenario
     from railsim.errors import Faults
     from railsim.profiles.used import profile_faults
 
@@ -101,6 +101,10 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         return definition.KIND, [{"key": "channels", "text": remark} for remark in run.remarks]
     if definition.KIND == "study":
         _check_runs(file)
+    if definition.KIND == "scenario":
+        from railsim.studies.campaign import curve_faults
+
+        Faults(curve_faults(load_scenario(file), file)).check()
     Faults(profile_faults(definition, file)).check()
     return definition.KIND, [dict(vars(remark)) for remark in cli.remarks_on(definition)]
 

@@ -7,7 +7,7 @@ independent seeds of its track, scaled to the target quality.
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -25,9 +25,10 @@ from railsim.cant import curve_speed
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
-from railsim.definitions.loading import load_running_limits, load_scenario, load_vehicle
+from railsim.definitions.loading import load_running_limits, load_scenario, load_track, load_vehicle
 from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
 from railsim.definitions.track.elements import Circle
+from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
@@ -40,6 +41,7 @@ from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
+from railsim.track.alignment import Alignment
 
 MOST = 20  # seeds of a part
 STEP = 10  # between two of them: seeds of the zones' own tracks lie in between
@@ -80,6 +82,7 @@ def campaign(
     folder = Path(out)
     check_folder(folder)
     plan = load_scenario(scenario)
+    Faults(curve_faults(plan, str(scenario))).check()
     cases = scenario_cases(plan, names, assignments)
     spec = StudySpec(
         folder=os.path.relpath(Path.cwd(), folder),
@@ -159,6 +162,38 @@ def scenario_cases(
             cases += repeated(case, limits, service, number) if limits else [case]
     Faults(dict.fromkeys(faults)).check()
     return cases
+
+
+def curve_faults(scenario: Scenario, file: str) -> Iterator[Fault]:
+    """Yield the parts whose `radius` or `cant` no curve of their track comes near.
+
+    `file`: that the faults name. They are between the smallest and the largest of its curves, which
+    may lead to either hand.
+    """
+    texts = [a.removeprefix("track.") for a in scenario.assignments if a.startswith("track.")]
+    for name, part in scenario.parts.items():
+        if part.speed.radius is None:
+            continue
+        try:
+            track = load_track(part.track, texts)
+        except InputError:
+            continue  # told when the runs are loaded
+        curves = [one for one in curvature_sections(track) if one.type == "CIR"]
+        middles = np.array([0.5 * (one.begin + one.end) for one in curves])
+        cants = 1e3 * np.abs(Alignment(track).cant(middles))
+        radii = np.array([1.0 / abs(one.start_value) for one in curves])
+        for key, value, known, unit in (
+            ("radius", part.speed.radius, radii, "m"),
+            ("cant", 1e3 * abs(part.speed.cant), cants, "mm"),
+        ):
+            where = file, f"parts.{name}.speed.{key}", f"{value:g} {unit}"
+            if not curves:
+                yield Fault(*where, f"'{short_name(part.track)}' has no curve")
+                break
+            low, high = float(known.min()), float(known.max())
+            if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
+                allowed = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
+                yield Fault(*where, f"{allowed} {unit} in the curves of '{short_name(part.track)}'")
 
 
 def part_speed(speed: Speed, service: Service) -> float:

@@ -137,6 +137,25 @@ def test_speed_from_the_cant_deficiency():
     assert [round(v, 1) for v in speeds.values()] == [36.7, 35.0, 29.7, 23.0]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("radius = 300.0", "radius = 500.0", "radius: 500 m; 286 to 340 m in the"),
+        ("cant = 0.12", "cant = 0.15", "cant: 150 mm; 120 mm in the curves of"),
+        ("en14363_zone4", "straight", "radius: 300 m; 'straight' has no curve"),
+    ],
+)
+def test_curve_of_a_part_is_one_of_its_track(tmp_path, capsys, old, new, words):
+    """Zone 4 has curves of 286 to 340 m with 120 mm: 23 m/s on R 300 m is a mean of them."""
+    file = tmp_path / "small.toml"
+    file.write_text(SMALL.replace(old, new))
+    command = ["study", "--scenario", str(file), "--vehicles", "coach_manchester", "--out"]
+    for arguments in (["validate", str(file)], [*command, str(tmp_path / "out")]):
+        assert main(arguments) == 2
+        assert f"small.toml: parts.zone4.speed.{words}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 SMALL = """format = "railsim-scenario/1"
 name = "small"
 standard = "en14363"
