@@ -101,6 +101,10 @@ def optimum_of(
     for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
         if margin < -FEASIBLE:
             breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
+    if (wanted := judge.wanted.min_transmission_angle) is not None:
+        limit, angles = after.model.number(wanted), after.min_angles
+        for name in breaches.keys() & angles.keys():  # margins are of the squares of their sines
+            breaches[name] = max(limit - angles[name], 0.0)
     kept, active = best.feasible and not breaches, _active(judge, judged, x)
     values = judged.objective, objective_before
     return Optimum(better, before, after, *values, kept, breaches, active, starts, seed)

@@ -221,7 +221,11 @@ def optimum_sentences(optimum: "Optimum") -> list[str]:
         f"{len(optimum.starts) - len(assembled)} could not be assembled",
     ]
     if not optimum.feasible:
-        breaches = ", ".join(f"{name} by {value:.6g}" for name, value in optimum.breaches.items())
+        angles = optimum.after.min_angles
+        breaches = ", ".join(
+            f"{name} by {shown(value, 'rad') if name in angles else f'{value:.6g}'}"
+            for name, value in optimum.breaches.items()
+        )
         found.append(f"no start keeps all constraints; least broken (SI): {breaches}")
     return found
 

@@ -9,6 +9,7 @@ from railsim.mechanisms.checks import checks
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
+from railsim.mechanisms.tables import optimum_sentences
 
 # an arm against a torque; the rod's angle at the pin is largest, asin(d/r), within the travel
 ARM = """
@@ -100,6 +101,7 @@ def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
     assert not best.feasible  # at 17 positions 0.19287 passes
     gap = np.arcsin(0.19287 / 0.3) - np.radians(40.0)
     assert best.breaches["mu"] == pytest.approx(gap, rel=1e-2)
+    assert f"mu by {np.degrees(best.breaches['mu']):.6g} deg" in optimum_sentences(best)[-1]
 
 
 def test_the_least_angle_is_that_between_the_positions(tmp_path):
