@@ -9,9 +9,10 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.mechanism import definition as written
 from railsim.definitions.mechanism.values import points_of
+from railsim.errors import InputError
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia, rubs
 from railsim.mechanisms.inversion import driver_at
-from railsim.mechanisms.kinematics import Motion, solve
+from railsim.mechanisms.kinematics import Motion, driver_words, solve
 from railsim.mechanisms.links import Course
 from railsim.mechanisms.model import Model
 
@@ -223,5 +224,20 @@ def free_motion(
         reached = found.status == 1 and bool(abs(found.y[0, -1] - until) < NEAR)
         t, state = float(found.t[-1]), np.array([found.y[0, -1], 0.0])
     time, (s, rates) = (np.concatenate(parts, axis=-1) for parts in zip(*legs, strict=True))
-    generalised_force(solve(model, s))  # a gas spring beyond its stroke is reported here
+    _check_strokes(model, s, until)
     return FreeMotion(time, s, rates, reached)
+
+
+def _check_strokes(model: Model, s: Floats, until: float) -> None:
+    """Refuse, by InputError, a free motion that takes a gas spring beyond its stroke."""
+    try:
+        generalised_force(solve(model, s))
+    except InputError:
+        low, high = sorted((model.start, model.end))
+        outside = s[(s < low - NEAR) | (s > high + NEAR)]
+        if not len(outside):
+            raise
+        end = driver_words(model, low if outside[0] < low else high)
+        found = f"it swings past the end of the travel at {end}"
+        allowed = f"a release that reaches {driver_words(model, until)}, or a shorter duration"
+        raise model.refusal("release", found, allowed) from None

@@ -270,6 +270,8 @@ def test_search_without_a_solution_gives_the_least_broken_compromise(capsys):
         ("atr95", ["actuators.lift.heights=[0.1,0.2]"], "actuators.lift", "rows of 'forces'"),
         ("atr95_lift_5", ["optimise.objective=constant"], "optimise.target", "needs one"),
         ("tilting_one_spring", ["parameters.release_at=2.0"], "release.start", "114.59"),
+        ("tilting_one_spring", ["release.until=1.2"], "release: it swings past the end of",
+         "the travel at -35.0000 deg; a release that reaches 68.7549 deg"),
         ("watt_axlebox_guide", ["parameters.lift=0.5"], "joints.", "cannot be assembled"),
         ("atr95_lift_5", ["parameters.travel=-1.2"], "joints.rod", "from here on"),
         ("tilting_one_spring", ["parameters.front_stroke=120"], "parameters.front_stroke",
