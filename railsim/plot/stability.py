@@ -178,8 +178,8 @@ def map_figure(
     if not any(np.isfinite(values).any() for values in speeds.values()):
         say(axes, "no critical speed inside the range at any point; the table says why")
         return figure
-    axes.set_ylim(0.0, 1.05 * max(map(np.nanmax, speeds.values())))
     points = np.concatenate([values.ravel() for values in speeds.values()])
+    axes.set_ylim(0.0, 1.05 * np.nanmax(points))
     if missing := int(np.isnan(points).sum()):
         axes.set_title(f"{missing} of {len(points)} points: no critical speed, see the table")
     axes.legend()
