@@ -83,6 +83,19 @@ def as_speed(text: object) -> float:
         raise click.BadParameter(words) from None
 
 
+def in_unit(unit: str) -> Callable[[object], float]:
+    """Return a type of options: a number in a unit, which may stand behind it, ``350m``."""
+
+    def read(text: object) -> float:
+        try:
+            return float(str(text).strip().removesuffix(unit))
+        except ValueError:
+            words = f"'{text}' is not a number in {unit}, such as 350 or 350{unit}"
+            raise click.BadParameter(words) from None
+
+    return read
+
+
 def names_of(kind: str) -> Callable[..., list[Any]]:
     """Return what completes an argument in a shell: names of shipped files, or a file."""
 
@@ -137,9 +150,9 @@ optional_track = click.argument(
 
 
 extent_options = together(
-    option("--start", "Start in m along the track; default 0.", "S", float),
-    option("--duration", "Length of the run in s.", "T", float),
-    option("--until", "End of the run in m along the track.", "S", float),
+    option("--start", "Start in m along the track; default 0.", "S", in_unit("m")),
+    option("--duration", "Length of the run in s.", "T", in_unit("s")),
+    option("--until", "End of the run in m along the track.", "S", in_unit("m")),
 )
 
 

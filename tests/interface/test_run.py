@@ -313,6 +313,21 @@ def test_an_unknown_load_case_names_the_option_that_was_given(command, option, w
     assert "allowed: design, laden" in shown
 
 
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--until", "5km"], "'--until': '5km' is not a number in m, such as 350 or 350m"),
+        (["--start", "0,5"], "'--start': '0,5' is not a number in m, such as 350 or 350m"),
+        (["--duration", "5min"], "'--duration': '5min' is not a number in s"),
+        (["--until", "5000 m"], "--until: found 5000 m; more than the start, 0 m, and at most 980"),
+        (["--until", "nan"], "--until: found nan m; more than the start"),
+    ],
+)
+def test_a_distance_or_time_that_is_none_is_told_with_its_unit(option, words, capsys):
+    assert main(["run", "coach_manchester", "curve_r250", "--speed", "20", *option]) == 2
+    assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["run", "study", "compare", "plot"])
 def test_help_loads_neither_numba_nor_matplotlib(command):
     check = (
