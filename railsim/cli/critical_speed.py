@@ -52,7 +52,7 @@ def command(
     Example:
       railsim critical-speed coach_manchester --method linear
       railsim critical-speed coach_manchester --method all --out stability --overwrite
-      railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
+      railsim critical-speed coach_manchester --method linear --conicity 0.05:0.2:7 --out map
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """
     workers = how.pop("workers")

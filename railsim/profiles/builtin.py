@@ -20,6 +20,7 @@ SPACING = 0.05
 S1002_OUTER = (1.364323640, -0.066666667)
 S1002_FLANK_END = -39.764473993
 S1002_FLANK = (-93.576667419, -2.747477419)
+S1002_ARC = (-58.558326413, 8.834924130, 20.0)  # centre and radius of the section F
 S1002_TREAD = (
     0.0,
     -3.358537058e-2,
@@ -61,7 +62,7 @@ S1002_SECTIONS: dict[str, tuple[float, Height]] = {
     # name of the section in EN 13715: upper end [mm], height
     "H": (-62.764705882, _circle(-49.5, 9.519259302, 20.5)),
     "G": (-49.662510381, _circle(-55.0, 16.0, 12.0)),
-    "F": (S1002_FLANK_END, _circle(-58.558326413, 8.834924130, 20.0)),
+    "F": (S1002_FLANK_END, _circle(*S1002_ARC)),
     "E": (-38.426669071, _polynomial(S1002_FLANK)),
     "D": (-35.0, _circle(-26.210665, 16.446, -13.0)),
     "C": (-26.0, _polynomial(S1002_ROOT)),
@@ -125,7 +126,8 @@ def cone(taper: float) -> Profile:
     """Straight cone with the flange of S1002.
 
     The tread is a cone of the given taper; flank, tip and back are those of S1002, the fillet of
-    13 mm between them is tangent to both, as S1002's own.
+    13 mm between them is tangent to both, as S1002's own; of a cone steeper than 0.24 to the arc
+    below the flank.
 
     `taper`: taper, 0.05 for 1:20 [1].
     """
@@ -134,8 +136,16 @@ def cone(taper: float) -> Profile:
     lines = np.array([[taper, 1.0], [-slope, 1.0]])
     right_side = np.array([0.0, level]) + radius * np.hypot(lines[:, 0], 1.0)
     centre_y, centre_z = np.linalg.solve(lines, right_side)
-    start = centre_y - radius * taper / np.hypot(taper, 1.0)
     end = centre_y + radius * slope / np.hypot(slope, 1.0)
+    if end < S1002_FLANK_END:  # of a steep cone the fillet meets the arc F below the flank
+        (arc_y, arc_z, arc_radius), apart = S1002_ARC, S1002_ARC[2] + radius
+        above = radius * np.hypot(taper, 1.0) - arc_z
+        b, c = arc_y + taper * above, arc_y**2 + above**2 - apart**2
+        root = np.sqrt(max(b**2 - (1.0 + taper**2) * c, 0.0))
+        centre_y = (b + root) / (1.0 + taper**2)
+        centre_z = radius * np.hypot(taper, 1.0) - taper * centre_y
+        end = arc_y + arc_radius / apart * (centre_y - arc_y)
+    start = centre_y - radius * taper / np.hypot(taper, 1.0)
 
     def height(y: Floats) -> Floats:
         fillet = centre_z - np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
@@ -143,7 +153,7 @@ def cone(taper: float) -> Profile:
         flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
         return np.where(y > start, -taper * y, np.where(y > end, fillet, flange))
 
-    ratio = f"1:{1.0 / taper:.0f}"
+    ratio = f"1:{1.0 / taper:.3g}"
     source = f"cone of {ratio}, flank, tip and back of S1002, fillet of 13 mm"
     return _wheel(f"cone {ratio}", height, source)
 

@@ -8,7 +8,7 @@ from railsim.contact import build_contact_table, contact_geometry
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
 from railsim.profiles import Profile, load_profile
-from railsim.profiles.builtin import DEFINITIONS, RAIL_HEADS
+from railsim.profiles.builtin import DEFINITIONS, RAIL_HEADS, cone
 
 WHEEL, RAIL = points("S1002"), points("60E1")
 LATERAL = np.linspace(-0.005, 0.005, 21)
@@ -81,6 +81,17 @@ def test_cone_on_a_rail_has_wickens_conicity(name, taper):
     found = np.polyfit(geometry.lateral, geometry.delta_r, 1)[0] / 2
     # the contact's distance from the track's centre differs from b by a few millimetres
     assert found == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("taper", [0.05, 0.24, 0.25, 0.3125, 0.5])
+def test_fillet_of_a_cone_is_tangent_to_cone_and_flange(taper):
+    """No sharper curve than its 13 mm from the flange to the tread, also of steep cones."""
+    profile = cone(taper)
+    steps = np.diff(profile.y), np.diff(profile.z)
+    turn = np.diff(np.unwrap(np.arctan2(steps[1], steps[0]))) / np.hypot(*steps)[1:]
+    there = (profile.y[1:-1] > -47e-3) & (profile.y[1:-1] < 50e-3)
+    assert np.max(np.abs(turn[there])) == pytest.approx(1.0 / 13e-3, rel=1e-5)
+    assert profile.name == f"cone 1:{1.0 / taper:.3g}"
 
 
 @pytest.mark.parametrize(
