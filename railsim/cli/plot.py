@@ -1,6 +1,7 @@
 """``railsim plot``: time histories of a result, a study over its parameters, a track in plan."""
 
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,7 +102,9 @@ def _study_figure(
     known = columns(records)
     if not known:
         raise input_error(file, "no run has values", "a study with finished runs")
-    names = selections or [name for name in DEFAULT if name in known] or list(known)[:4]
+    # summary.csv calls peaks by magnitude so
+    given = [name if name in known else re.sub("_peak$", "_abs", name) for name in selections]
+    names = given or [name for name in DEFAULT if name in known] or list(known)[:4]
     faults = Faults(
         Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
         for name in names

@@ -24,7 +24,7 @@ def folder(tmp_path, simulated):
     return tmp_path / "s"
 
 
-@points("chosen", [[], ["--kind", "map"], ["Y_over_Q_abs", "--kind", "ranking"]], always=(1,))
+@points("chosen", [[], ["--kind", "map"], ["Y_over_Q_peak", "--kind", "ranking"]], always=(1, 2))
 def test_study_is_drawn(folder, capsys, chosen):
     assert main(["plot", str(folder), *chosen]) == 0
     assert capsys.readouterr().out.strip() == str(folder / "study.png")
