@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib
@@ -44,6 +45,7 @@ DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#
 
 SIDE_LINES = {"left": "-", "right": (0, (4.0, 1.6))}
 SHADES = {"CLO": "0.95", "CIR": "0.90"}
+LETTERS = 10.0  # of a title on an inch
 LETTER = 4.0  # width of a letter of a section's name, in axes not yet laid out [points]
 
 LIMIT = "#b3122b"
@@ -69,7 +71,8 @@ class Picture(Figure):
         if edges:
             self.subplots_adjust(*edges)
         if title:
-            self.suptitle(title, x=0.012, ha="left")
+            lines = [fill(line, int(LETTERS * width)) for line in title.splitlines()]
+            self.suptitle("\n".join(lines), x=0.012, ha="left")
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
@@ -150,6 +153,8 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
     for span in sorted(shown, key=lambda span: span.section.type):  # CIR before CLO
         words = "CLO" if span.section.type == "CLO" else f"R {1.0 / span.section.start_value:.6g}"
         middle, half = 0.5 * (span.low + span.high), 0.5 * letter * len(words)
+        if span.high - span.low < (2.0 * half if words == "CLO" else 0.5 * letter):
+            continue
         if all(abs(middle - other) >= half + reach for other, reach, _ in names):
             names.append((middle, half, words.replace("-", "−")))
     look: Any = {"fontsize": 6.5, "color": "0.4", "frame": ABOVE}

@@ -113,6 +113,22 @@ def test_where_names_do_not_fit_side_by_side_those_of_curves_stay():
     sections = curvature_sections(load_track("curve_r250"))
     shade(axes, spans(sections, *[np.array([0.0, 980.0])] * 2), named=True)
     assert [text.get_text() for text in axes.texts] == ["R 250"]
+    axes = Figure(figsize=(6.0, 2.0)).subplots()
+    axes.set_xlim(0.0, 420.1)  # the curve ends 0.1 m before, and nothing of the transition is seen
+    shade(axes, spans(sections, *[np.array([0.0, 420.1])] * 2), named=True)
+    assert [text.get_text() for text in axes.texts] == ["CLO", "R 250"]
+
+
+def test_a_long_title_is_on_lines_within_the_picture(result):
+    words = "A vehicle whose name is so long that no picture holds it on one line of its title. "
+    attributes = {**result.attributes, "vehicle_toml": result.attributes["vehicle_toml"].replace(
+        "Passenger coach, Manchester primary suspension", 2 * words)}  # fmt: skip
+    held = {name: result.quantities[name] for name in ("time", "distance", "Q")}
+    arrays = {name: result[name] for name in held}
+    figure = histories(Result(arrays, held, result.coordinates, attributes))
+    figure.draw_without_rendering()
+    assert figure._suptitle.get_window_extent().x1 <= figure.bbox.x1
+    assert figure.get_suptitle().replace("\n", " ").startswith((2 * words).strip())
 
 
 def test_over_time_the_shades_are_where_the_reference_body_was(result):
