@@ -217,7 +217,9 @@ class Criterion:
         return 1e-3 if self.unit == "kN" else 1.0
 
     def text(self, value: float) -> str:
-        """Value in the unit of tables."""
+        """Value in the unit of tables; a hyphen where there is none."""
+        if math.isnan(value):
+            return "-"
         return f"{self.scale * value:.3f}" if self.scale == 1.0 else f"{self.scale * value:.2f}"
 
 

@@ -52,6 +52,11 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Sect
         found.details.append(remark_table([words]))
         return verdicts, found
     running, remarks = _assessed(runs, "en14363")
+    judged = {name for one in running for name in one.runs}
+    left = [r for name, r in runs.items() if name not in judged and {"Y", "Q"} <= set(r)]
+    for name in dict.fromkeys(result.vehicle().name for result in left):
+        words = "not assessed after EN 14363, as the remarks on these values say"
+        verdicts.append((OPEN, f"{name}: {words}."))
     running = _told_apart(running, runs)
     derailment, more = _assessed(runs, "safety")
     for one in running:
@@ -312,7 +317,8 @@ def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
         mean = f"{row.estimate.N} value, mean {row.criterion.scale * row.estimate.mean:.3g}"
         words = [mean, row.place]
     small = ", ".join(filter(None, [*words, zone.population.name]))
-    return f"{row.criterion.scale * row.estimate.value:.3g}", small
+    value = row.criterion.scale * row.estimate.value
+    return "-" if math.isnan(value) else f"{value:.3g}", small
 
 
 def _limit(row: Row) -> tuple[str, str]:

@@ -144,7 +144,7 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Sect
             row += [""] * (1 + number - len(row))
             wheelset = peak.get("wheelset", "")
             where = f"wheelset {wheelsets.index(wheelset) + 1} " if wheelset in wheelsets else ""
-            where += f"{peak.get('side', '')} at {peak['distance']:.1f} m"
+            where += f"{peak.get('side', '')} at {peak['distance']:.1f}\N{NO-BREAK SPACE}m"
             row.append((quantity.text(peak["value"]), where))
     table = doc.Table(
         ["", *(printable(str(record["name"])) for record in shown)],
@@ -225,7 +225,8 @@ def _spread(
     note = "Peaks and medians over full curves by magnitude, over all wheels."
     caption = f"Spread over {len(done)} runs"
     table = doc.Table(header, spread.spread_rows(done), caption, (0, 2, 5), note=note)
-    section = doc.Section("Over the study", plots=["runs"], details=[table], id="spread")
+    details = [table] if table.rows else []
+    section = doc.Section("Over the study", plots=["runs"], details=details, id="spread")
     if len(done) >= spread.LEAST and varied:
         section.texts = [f"Varied: {', '.join(varied)}."]
         section.plots.insert(0, "spread")

@@ -21,6 +21,7 @@ from test_study import arguments
 from test_study import simulated as simulated
 
 import railsim
+from railsim.assessment.criteria import CRITERIA
 from railsim.cli import main
 from railsim.definitions import Settings
 from railsim.definitions.units_of_keys import unit_of_input
@@ -32,6 +33,7 @@ from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
 from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
+from railsim.result.export import selected
 from railsim.result.facts import run_facts
 
 BROWSER = next(
@@ -346,6 +348,21 @@ def test_reasons_of_all_verdicts_are_told_once_and_points_below_a_body_are_below
         "on carbody, 9.50 m behind the reference body's origin, 0.60 m below that of its body"
     )
     assert not any("-0.00" in words for words in places.values())
+
+
+def test_a_run_without_forces_leaves_its_vehicle_without_a_verdict_and_that_is_said():
+    whole = example_result()
+    part = selected(whole, ["Q"])
+    verdicts, _ = assessed({"whole": whole, "part": part})
+    words = "not assessed after EN 14363, as the remarks on these values say."
+    assert [text for _, text in verdicts] == [f"{whole.vehicle().name}: {words}"]
+    assert assessed({"part": part})[0] == []  # kept without forces: nothing was to be assessed
+
+
+def test_values_that_do_not_exist_are_no_nan_on_the_page():
+    """The only section of zone 4 has no standard deviation and so no estimate."""
+    for criterion in CRITERIA.values():
+        assert criterion.text(float("nan")) == "-"
 
 
 def test_thinned_curves_keep_every_peak_and_their_order():
