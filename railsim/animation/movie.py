@@ -79,7 +79,9 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
     view.set(xlim=(-15.0, 15.0), ylim=(4.5, -4.5), aspect="equal")
     view.set_axis_off()
     at_s = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"
-    view.set_title(f"{scene.title}\nt {scene.time[frame]:.2f} s{at_s}", fontsize=8, loc="left")
+    larger = "" if gain == 1.0 else f"; motion of the bodies {gain:g} times"
+    words = f"{scene.title}\nt {scene.time[frame]:.2f} s{at_s}{larger}"
+    view.set_title(words, fontsize=8, loc="left")
     for side, axes in enumerate(sections):
         _draw_section(axes, scene, frame, side)
 
@@ -174,6 +176,7 @@ def _draw_section(axes: Axes, scene: Scene, frame: int, side: int) -> None:
     middle = -750.0 if side == 0 else 750.0
     axes.set(xlim=(middle - 80.0, middle + 80.0), ylim=(45.0, -35.0), aspect="equal")
     axes.tick_params(labelsize=6)
+    axes.set_ylabel("mm", fontsize=6)
     if scene.Q is None or scene.Y is None:
         return
     Q, Y = 1e-3 * scene.Q[frame, 0, side], 1e-3 * scene.Y[frame, 0, side]

@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from example_result import example_result
+from matplotlib.figure import Figure
 from scipy.interpolate import CubicSpline
 
 import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
-from railsim.animation.movie import _polygons
+from railsim.animation.movie import _polygons, draw
 from railsim.animation.page import scene_data
 from railsim.animation.scene import _drawn
 from railsim.cli import main
@@ -207,6 +208,14 @@ def test_film_has_a_picture_for_each_frame(result, tmp_path):
     with Image.open(path) as film:
         assert film.n_frames == 4
         assert np.asarray(film.convert("RGB")).std() > 10.0
+
+
+def test_a_film_says_how_many_times_larger_the_motion_is(result):
+    view, *sections = Figure().subplots(1, 3)
+    for gain, words in ((1.0, " m"), (20.0, " m; motion of the bodies 20 times")):
+        draw(view, sections, result_scene(result, frames=4), 1, gain)
+        assert view.get_title(loc="left").endswith(words)
+    assert [axes.get_ylabel() for axes in sections] == ["mm", "mm"]
 
 
 def test_a_moved_body_is_seen_where_it_would_be_if_it_stood_there(result):
