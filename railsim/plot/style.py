@@ -17,7 +17,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
@@ -43,6 +43,8 @@ HUES = (("#004a80", "#56a8e0"), ("#b8450a", "#f0a13c"), ("#00664b", "#5cc0a0"),
 DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#555555", "#8c2d19")
 """Colours of things that have no order, such as results that are compared."""
 
+PALER = 0.5  # share of the colour beside white in the second round of `DISTINCT`
+
 SIDE_LINES = {"left": "-", "right": (0, (4.0, 1.6))}
 SHADES = {"CLO": "0.95", "CIR": "0.90"}
 LETTERS = 10.0  # of a title on an inch
@@ -55,8 +57,10 @@ ABOVE, BESIDE = ("data", "axes fraction"), ("axes fraction", "data")
 
 
 def distinct(number: int) -> str:
-    """Return the colour of the thing of a number, after the last the first again."""
-    return DISTINCT[number % len(DISTINCT)]
+    """Return the colour of the thing of a number, after the last the first again, but paler."""
+    share = PALER ** (number // len(DISTINCT))
+    red, green, blue = (1.0 - share * (1.0 - c) for c in to_rgb(DISTINCT[number % len(DISTINCT)]))
+    return to_hex((red, green, blue))
 
 
 class Picture(Figure):

@@ -144,7 +144,7 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Sect
             row += [""] * (1 + number - len(row))
             wheelset = peak.get("wheelset", "")
             where = f"wheelset {wheelsets.index(wheelset) + 1} " if wheelset in wheelsets else ""
-            where += f"{peak.get('side', '')} at {peak['distance']:.1f}\N{NO-BREAK SPACE}m"
+            where += f"{peak.get('side', '')} at {peak['distance']:.1f} m"
             row.append((quantity.text(peak["value"]), where))
     table = doc.Table(
         ["", *(printable(str(record["name"])) for record in shown)],

@@ -19,7 +19,7 @@ from railsim.notation import QUANTITIES
 from railsim.plot.histories import STUDY, histories, widen
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
-from railsim.plot.style import HUES, SHADES, shade, spans, wheelset_colours
+from railsim.plot.style import DISTINCT, HUES, SHADES, distinct, shade, spans, wheelset_colours
 from railsim.plot.track import track_figure
 from railsim.result import Result
 from railsim.result.export import selected
@@ -87,6 +87,12 @@ def test_axes_of_rounding_errors_show_the_last_digit_of_tables():
     before = axes.get_ylim()
     widen(axes, QUANTITIES["sum_Y"])
     assert axes.get_ylim() == before
+
+
+def test_as_many_results_as_can_be_told_have_colours_of_their_own():
+    colours = [distinct(number) for number in range(16)]
+    assert colours[:8] == list(DISTINCT)
+    assert len(set(colours)) == 16
 
 
 def test_bogies_have_a_hue_and_their_leading_wheelsets_the_dark_shade():

@@ -155,6 +155,7 @@
     data.runs.forEach(function (name, i) {
       var row = made("tr", body), chip = made("span", made("td", row), name, "chip");
       chip.style.setProperty("--c", "var(--k" + (i % 8) + ")");
+      chip.classList.toggle("dashed", i > 7); /* the colours of the first again */
       chip.title = "show or hide";
       chip.addEventListener("click", function () {
         var off = chip.classList.toggle("off");
@@ -223,7 +224,7 @@
         scales: { x: { time: false }, y: { range: range(q) } },
         axes: [axis(over, 22), axis(q.symbol + (q.unit ? " (" + q.unit + ")" : ""), 46)],
         series: [{}].concat(data.runs.map(function (name, r) {
-          return { label: name, stroke: function () { return runColour(r); }, width: 1.4, points: { show: false } };
+          return { label: name, stroke: function () { return runColour(r); }, dash: r > 7 ? [6, 3] : undefined, width: 1.4, points: { show: false } };
         })),
         hooks: { drawClear: [shade(data)], draw: [limitLine(q)], setCursor: [told], setScale: [function (u, name) {
           if (name === "x" && plots.length === data.quantities.length && !zooming) { zoom(u.scales.x.min, u.scales.x.max); }
