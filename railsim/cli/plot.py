@@ -92,7 +92,7 @@ def _study_figure(
     file: str, selections: tuple[str, ...], against: Text, family: Text, kind: Text
 ) -> "Figure":
     from railsim.cli.report import used_inputs
-    from railsim.plot.study import curves_figure, map_figure, ranking_figure
+    from railsim.plot.study import curves_figure, map_figure, ranking_figure, say_above
     from railsim.report.inputs import inputs_of, units_of
     from railsim.report.spread import columns, parameters
 
@@ -129,13 +129,17 @@ def _study_figure(
     family = family or next((name for name in order if name != x), None)
     kind = kind or ("curves" if x and varied[x].numeric else "ranking")
     if kind == "ranking" or x is None:
-        return ranking_figure(quantities, [str(record["name"]) for record in records])
-    if kind == "map":
+        figure = ranking_figure(quantities, [str(record["name"]) for record in records])
+    elif kind == "map":
         if family is None:
             found = f"only '{x}' was varied"
             raise input_error("--kind", found, "a study over two parameters", key="map")
-        return map_figure(quantities, varied[x], varied[family])
-    return curves_figure(quantities, varied[x], varied[family] if family else None)
+        figure = map_figure(quantities, varied[x], varied[family])
+    else:
+        figure = curves_figure(quantities, varied[x], varied[family] if family else None)
+    if early := sum(record["status"] != "complete" for record in records):
+        say_above(figure, f"{early} of {len(records)} runs ended early: their values until then")
+    return figure
 
 
 def _quantity(column: "dict[str, Any]") -> "Column":

@@ -75,8 +75,13 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
 def _name_medians(figure: Figure, points: Sequence[Any], more: str = "") -> None:
     """Say above a picture that it shows medians, where several runs share a point."""
     if len(set(points)) < len(points):
-        words = f"Medians of the runs at each point{more}"
-        figure.suptitle(words, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
+        say_above(figure, f"Medians of the runs at each point{more}")
+
+
+def say_above(figure: Figure, words: str) -> None:
+    """Add a line above a picture."""
+    lines = "\n".join(filter(None, [figure.get_suptitle(), words]))
+    figure.suptitle(lines, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
 
 
 def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, member: Any) -> None:
@@ -134,9 +139,8 @@ def _draw_map(figure: Figure, axes: Axes, values: Any) -> None:
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if value < middle else "black"
-            axes.text(
-                column, row, f"{value:.3g}", ha="center", va="center", fontsize=7, color=colour
-            )
+            words = f"{float(f'{value:.3g}'):g}"  # 1570, not 1.57e+03
+            axes.text(column, row, words, ha="center", va="center", fontsize=7, color=colour)
 
 
 def _ticks(tell: Any, values: Sequence[Any]) -> None:

@@ -11,6 +11,7 @@ from test_study import simulated as simulated
 
 import railsim
 from railsim.cli import main
+from railsim.cli.plot import _study_figure
 from railsim.compare import differences
 from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
 
@@ -44,6 +45,16 @@ def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
     assert not (folder / "study.png").exists()
 
 
+@pytest.mark.parametrize("kind", ["curves", "map", "ranking"])
+def test_runs_that_ended_early_are_counted_above_the_picture(folder, kind):
+    index = json.loads((folder / "study.json").read_text())
+    assert _study_figure(str(folder), (), None, None, kind).get_suptitle().count("early") == 0
+    index["runs"][0]["status"] = "derailed"
+    (folder / "study.json").write_text(json.dumps(index))
+    words = "1 of 8 runs ended early: their values until then"
+    assert _study_figure(str(folder), (), None, None, kind).get_suptitle().endswith(words)
+
+
 def test_parameters_of_a_study_are_refused_of_a_track(tmp_path, capsys):
     out = str(tmp_path / "t.png")
     assert main(["plot", "curve_r250", "--kind", "map", "--out", out]) == 2
@@ -69,6 +80,9 @@ def test_curves_and_bands_hold_the_values():
 def test_map_and_ranking_hold_the_values():
     image = map_figure([VALUES], SPEED, VEHICLE).axes[0].get_images()[0]
     assert image.get_array().tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    large = Column("value", [1571.3, 0.5643, 3.0, 4.0, None])
+    texts = map_figure([large], SPEED, VEHICLE).axes[0].texts
+    assert [text.get_text() for text in texts] == ["1570", "0.564", "3", "4"]
     axes = ranking_figure([VALUES], ["p", "q", "r", "s", "t"]).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [4.0, 3.0, 2.0, 1.0]
     assert [t.get_text() for t in axes.get_yticklabels()] == ["s", "r", "q", "p"]
