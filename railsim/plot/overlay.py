@@ -36,8 +36,11 @@ def overlay(
     first = next(iter(results.values()))
     plans = [curvature_sections(result.track()) for result in results.values()]
     ends = [[(section.type, section.begin, section.end) for section in plan] for plan in plans]
-    alike = all(other == ends[0] for other in ends)
-    shown = style.spans(plans[0], first["distance"], first[over]) if alike else []
+    # over time a curve is not at one place for runs of different speeds
+    alike = over == "distance" or len({result.speed for result in results.values()}) == 1
+    alike = alike and all(other == ends[0] for other in ends)
+    longest = max(results.values(), key=lambda result: result["distance"][-1])
+    shown = style.spans(plans[0], longest["distance"], longest[over]) if alike else []
     same_radii = all(plan == plans[0] for plan in plans)
     count, words = max(map(len, drawn.values())), first.quantities[over].label
     figure, cells, across = _cells(count, 1.3, words)

@@ -56,6 +56,11 @@ def test_figures_of_the_study_are_the_default(result):
     assert all(unit in label for unit, label in zip(units, labels, strict=True))
 
 
+def test_title_says_how_a_run_ended_early():
+    for status, words in (("complete", "(72 km/h)"), ("derailed", "(72 km/h) · derailed")):
+        assert histories(example_result(status=status)).get_suptitle().endswith(words)
+
+
 def test_of_a_result_without_the_figures_of_the_study_everything_is_drawn(result):
     axes = histories(selected(result, ["Q"])).axes
     assert [ax.get_title(loc="left") or ax.get_title() for ax in axes] == ["Vertical wheel force"]
@@ -308,6 +313,16 @@ def test_overlay_has_a_colour_for_every_result(result):
     first, second = drawn(axes)
     assert first.get_color() != second.get_color()
     np.testing.assert_allclose(second.get_ydata(), 0.5 * first.get_ydata())
+
+
+def test_overlay_shades_what_the_longest_run_passed_and_over_time_of_one_speed_only(result):
+    short = example_result(duration=16.0)
+    for results in ({"short": short, "long": result}, {"long": result, "short": short}):
+        for over in ("distance", "time"):
+            assert len(shades(overlay(results, ["Y:1"], over=over).axes[0])) == 3
+    slower = {"one": result, "slower": example_result(speed=10.0, duration=60.0)}
+    assert len(shades(overlay(slower, ["Y:1"]).axes[0])) == 3
+    assert shades(overlay(slower, ["Y:1"], over="time").axes[0]) == []
 
 
 def test_overlay_names_the_wheelset_of_each_vehicle(result):
