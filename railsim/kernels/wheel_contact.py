@@ -99,6 +99,7 @@ from railsim.kernels.wheel_surface import note_surfaces
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
 STEEP = 3.0  # of a flange
+SHORTEST = 1e-9  # s, so that nothing is divided by zero
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 
 
@@ -386,20 +387,20 @@ def patch_contact(system, work, w, side, patch, wheel, n):
     )
     p_change += work.bump[patch, B_CHANGE]
     ahead = work.watch[AHEAD]
-    deepest = p + ahead * (p_rate + max(p_change, 0.0))
-    soon, elastic = 0.0, 0.0
-    if p > 0.0:
-        root = sqrt(p)
-        elastic = p * root * (t[k + 1] + root * t[k + 2])
-        change = max(abs(p_rate), abs(p_rate + p_change))
-        soon = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change
-    if deepest > max(p, 0.0):  # also from a light touch, where the stiffness is still small
-        root = sqrt(deepest)
-        soon = max(soon, (deepest * root * (t[k + 1] + root * t[k + 2]) - elastic) / ahead)
+    inside = max(p, 0.0)
+    root = sqrt(inside)
+    elastic = inside * root * (t[k + 1] + root * t[k + 2])
+    change = max(abs(p_rate), abs(p_rate + p_change))
+    soon = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change
+    # also from a light touch, where the stiffness is still small; without branches, as whether it
+    # comes closer alternates from step to step
+    deepest = max(inside, p + ahead * (p_rate + max(p_change, 0.0)))
+    deep = sqrt(deepest)
+    gained = deepest * deep * (t[k + 1] + deep * t[k + 2]) - elastic
+    soon = max(soon, gained / max(ahead, SHORTEST))
     soon *= max(1.0, work.watch[SIDEWAYS] * abs(t[k + G_Y]))
     work.force_rate[w] = max(work.force_rate[w], soon)
     if p > 0.0:
-        root = sqrt(p)
         c_y, c_z, a1, b1, tangent = under_load(t, k, max(elastic, 0.0))
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)
