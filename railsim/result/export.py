@@ -6,7 +6,7 @@ their names with their dimensions, and ``units``, names and facts of the run as 
 """
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,9 +31,9 @@ def export(
 ) -> Path:
     """Write a result to a file whose ending says the format.
 
-    `quantities`: Columns of CSV and Parquet, as of `selected`; by default all. Raises InputError:
-    the file exists and may not be overwritten, its ending is none of `ENDINGS`, or what writes it
-    is not installed; single wheels of a MATLAB file.
+    `quantities`: Columns of CSV and Parquet, such as ``Y:1:left``; by default all. Raises
+    InputError: the file exists and may not be overwritten, its ending is none of `ENDINGS`, what
+    writes it is not installed, or it is a MATLAB file and a part of a quantity is asked for.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
@@ -41,7 +41,8 @@ def export(
         if path.suffix.lower() == ".mat":
             if labelled := [name for name in quantities if ":" in name]:
                 allowed = "a MATLAB file holds whole quantities; CSV and Parquet hold columns"
-                raise argument_error("quantities", "some places", allowed, labelled[0], "QUANTITY")
+                found = "a part of a quantity"
+                raise argument_error("quantities", found, allowed, labelled[0], "QUANTITY")
             _matlab(result, partial)
         else:
             write = _csv if path.suffix.lower() == ".csv" else _parquet
@@ -59,24 +60,23 @@ def selected(
 ) -> Result:
     """Return a part of a result: some quantities over a section, in other units.
 
-    `quantities`: Names, perhaps with labels as in ``Y:1:left``, by which `export` chooses; by
-    default all.  Time and distance are kept always. `between`: Section of
-    the track, by the distance of the reference body [m]. `rate`: Values at equal times, as many
-    per second, interpolated linearly; values that change faster than half of it are filtered
-    before (`low_passed`) [1/s]. `shown_units`: In the units of tables and plots (kN, mm) instead
-    of SI. Raises InputError: A quantity that the result does not have; a section that was not run;
-    a rate that is no number above 0.
+    `quantities`: Names, by default all; labels behind them, as in ``Y:1:left``, are for `export`.
+    Time and distance are kept always. `between`: Section of the track, by the distance of the
+    reference body [m]. `rate`: Values at equal times, as many per second, interpolated linearly;
+    values that change faster than half of it are filtered before (`low_passed`) [1/s].
+    `shown_units`: In the units of tables and plots (kN, mm) instead of SI. Raises InputError: a
+    quantity or label that the result does not have; a section that was not run; a rate that is no
+    number above 0.
     """
     faults = Faults()
     for selection in quantities:
         name, *labels = selection.split(":")
-        known: Iterable[str] = result
-        if name in result:
-            known = all_labels(result.quantities[name].dims[1:], result.coordinates)
-        wrong = [label for label in labels if label not in known] if name in result else [name]
-        found = f"no label '{wrong[0]}'" if name in result and wrong else "no such quantity"
-        if wrong:
-            allowed = nearest(wrong[0], known)
+        there = name in result
+        dims = result.quantities[name].dims[1:] if there else ()
+        known = list(all_labels(dims, result.coordinates) if there else result)
+        for label in (label for label in (labels if there else [name]) if label not in known):
+            found = f"no label '{label}'" if there else "no such quantity"
+            allowed = nearest(label, known)
             faults.append(argument_fault("quantities", selection, found, allowed, "QUANTITY"))
     time, distance = result["time"], result["distance"]
     low, high = between or (-np.inf, np.inf)
@@ -146,10 +146,10 @@ Columns = list[tuple[str, str, Floats]]
 
 def _columns(result: Result, quantities: Sequence[str] = ()) -> Columns:
     """Return name, unit and values of every column, time first."""
-    over_time = [q for q in quantities if result.quantities[q.partition(":")[0]].dims[0] == "time"]
-    names = dict.fromkeys(["distance", *over_time] if quantities else [])
-    names.pop("time", None)
-    return [("time", "s", result["time"]), *result.columns(*names)]
+    over_time = (q for q in quantities if result.quantities[q.partition(":")[0]].dims[0] == "time")
+    names = ["distance", *(q for q in over_time if q != "time")] if quantities else []
+    columns = {column[0]: column for column in result.columns(*names)}  # each once
+    return [("time", "s", result["time"]), *columns.values()]
 
 
 def _csv(found: Columns, path: Path) -> None:

@@ -40,7 +40,7 @@ def test_both_ends_of_a_section_belong_to_it(result):
 
 def test_single_wheels_are_columns_as_plot_takes_them(result, tmp_path, capsys):
     file = str(result.to_hdf5(tmp_path / "run.h5"))
-    command = ["export", file, "Y:1:left", "Q:2", "sum_Y", "--out"]
+    command = ["export", file, "Y:1:left", "Q:2", "sum_Y", "Q:2:left", "--out"]  # that is in Q:2
     assert main([*command, str(tmp_path / "part.csv")]) == 0
     with (tmp_path / "part.csv").open(encoding="utf-8") as stream:
         header, *rows = csv.reader(stream)
@@ -49,7 +49,7 @@ def test_single_wheels_are_columns_as_plot_takes_them(result, tmp_path, capsys):
     assert header[5:] == [f"sum_Y:{name} (N)" for name in result.wheelsets]
     np.testing.assert_allclose(np.array(rows, dtype=float)[:, 4], result.Q[:, 1, 1])
     assert main([*command, str(tmp_path / "part.mat")]) == 2
-    assert "QUANTITY: Y:1:left: some places; a MATLAB file holds" in capsys.readouterr().err
+    assert "QUANTITY: Y:1:left: a part of a quantity; a MATLAB" in capsys.readouterr().err
     assert not (tmp_path / "part.mat").exists()
     assert main(["export", file, "Y:lef", "--out", str(tmp_path / "a.csv")]) == 2
     assert "Y:lef: no label 'lef'; did you mean 'left'?" in capsys.readouterr().err
