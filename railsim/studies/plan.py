@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.definitions.loading import load_track
-from railsim.definitions.study.analyses import needs_run
+from railsim.definitions.study.analyses import AssessAnalysis, needs_run
 from railsim.definitions.study.definition import Study, value_texts
 from railsim.definitions.study.design import Optimise
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error, nearest
@@ -225,28 +225,26 @@ def check_study(study: Study) -> None:
 
 def _check_quantities(study: Study, wanted: Optimise) -> None:
     """Refuse quantities that no run of an optimisation can have."""
-    names = [f"{name}_{end}" for name in PEAK_QUANTITIES
-             for end in (("max", "min") if name in BY_SIGN else ("peak",))]  # fmt: skip
-    known = [*names, "speed", *FACTS] if needs_run(study.analyses) else []
-    of_all: set[str] = set()  # analyses whose standard says their numbers
+    known, forms = list[str](), list[str]()
+    if needs_run(study.analyses):
+        known = [f"{name}_{end}" for name in PEAK_QUANTITIES
+                 for end in (("max", "min") if name in BY_SIGN else ("peak",))]  # fmt: skip
+        # where, when and after a filter; in the middle of a curve, if the track has one
+        forms += [rf"({'|'.join(known)})_(time|distance|20hz)"]
+        forms += [rf"({'|'.join(PEAK_QUANTITIES)})_(mid|median)\d*"]
+        known += ["speed", *(name for name in FACTS if not name.startswith("status"))]
     for own, analysis in study.analyses.items():
         known += [f"{own}.{number}" for number in numbers_of(analysis)]
-        of_all |= set() if numbers_of(analysis) else {own}
-    faults = Faults()
-    for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints)):
-        for number, one in enumerate(ones):
-            # at the middle of a curve, if the track has one; where and when; after a filter
-            middle = re.sub(r"_(mid|median)\d*$", "", one.quantity)
-            peak = re.sub(r"_(time|distance|20hz)$", "", one.quantity)
-            at_curve = (
-                needs_run(study.analyses) and middle != one.quantity and middle in PEAK_QUANTITIES
-            )
-            if peak in known or at_curve or one.quantity.partition(".")[0] in of_all:
-                continue
-            key = f"optimise.{table}.{number}.quantity"
-            found = f"no run has '{one.quantity}'"
-            faults.append(Fault("study", key, found, nearest(one.quantity, known), "--optimise"))
-    faults.check()
+        if isinstance(analysis, AssessAnalysis):  # the standard says its numbers
+            forms.append(rf"{own}\..*")
+    some = re.compile("|".join([*map(re.escape, known), *forms]))
+    Faults(
+        Fault("study", f"optimise.{table}.{number}.quantity", f"no run has '{one.quantity}'",
+              nearest(one.quantity, known), "--optimise")
+        for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints))
+        for number, one in enumerate(ones)
+        if not some.fullmatch(one.quantity)
+    ).check()  # fmt: skip
 
 
 @contextmanager
@@ -255,9 +253,8 @@ def faults_of_file(file: str, *, assignments: bool = True) -> Iterator[None]:
 
     `assignments`: all of them are the file's.
     """
-    options = {f"--{name}" for name in (*OF_FILE, "optimise")} | (
-        {"--set"} if assignments else set()
-    )
+    names = [*OF_FILE, "optimise", *(["set"] if assignments else [])]
+    options = {f"--{name}" for name in names}
     try:
         yield
     except InputError as error:

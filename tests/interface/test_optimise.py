@@ -167,14 +167,21 @@ def test_a_quantity_that_no_run_has_is_found_before_any(tmp_path, capsys, old, n
 
 
 @pytest.mark.parametrize(
-    "quantity", ["T_gamma_peak", "dQ_over_Q0_min_20hz", "Y_median2", "Y_mid", "Q_peak_distance"]
+    ("quantity", "there"),
+    [
+        *((name, True) for name in ("T_gamma_peak", "dQ_over_Q0_min_20hz", "Y_median2", "Y_mid")),
+        *((name, True) for name in ("Q_peak_distance", "speed", "step")),
+        # a text; by magnitude; no numbers of its own
+        *((name, False) for name in ("status", "Q_max", "curve.Q")),
+    ],
 )
-def test_columns_of_a_run_are_quantities(tmp_path, capsys, quantity):
+def test_columns_of_a_run_with_a_number_are_quantities(tmp_path, capsys, quantity, there):
     run = 'kind = "run"\n[analyses.judged]\nkind = "assess"'
     text = STUDY.replace('kind = "curving"\nradius = 300.0\ncant = 0.15', run)
     text = text.replace("curve.T_gamma", quantity).replace("curve.attack", "judged.largest_share")
     file = written(tmp_path, text.replace("curve.Y_over_Q", "Y_over_Q_peak"))
-    assert main(["validate", file]) == 0, capsys.readouterr().err
+    assert main(["validate", file]) == (0 if there else 2)
+    assert (f"no run has '{quantity}'" in capsys.readouterr().err) is not there
 
 
 def test_a_study_without_the_table(tmp_path, capsys):
