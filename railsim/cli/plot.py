@@ -102,20 +102,17 @@ def _study_figure(
     known = columns(records)
     if not known:
         raise input_error(file, "no run has values", "a study with finished runs")
-    # summary.csv calls peaks by magnitude so
-    given = [name if name in known else re.sub("_peak$", "_abs", name) for name in selections]
+    peaks = {re.sub("_abs$", "_peak", name): name for name in known}  # as in summary.csv
+    given = [peaks.get(name, name) for name in selections]
     names = given or [name for name in DEFAULT if name in known] or list(known)[:4]
     faults = Faults(
         Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
         for name in names
         if name not in known
     )
-    first = gathered.results([name for name in gathered.paths][:1])
-    used = inputs_of(records, first) or used_inputs(Path(file))
-    varied = {
-        name: _quantity(column)
-        for name, column in parameters(records, units_of(records, used)).items()
-    }
+    first = gathered.results(list(gathered.paths)[:1])
+    units = units_of(records, inputs_of(records, first) or used_inputs(folder_of(file)))
+    varied = {name: _quantity(column) for name, column in parameters(records, units).items()}
     faults += [
         Fault(option, "", f"'{name}' was not varied", nearest(name, varied))
         for option, name in (("--against", against), ("--family", family))

@@ -38,9 +38,11 @@ def parameters(
     for name in names:
         values = [record["labels"].get(name, "") for record in records]
         if len(set(map(str, values))) > 1:
+            unit = "m/s" if name == "speed" else (units or {}).get(name, "")
             found[name] = {
                 "words": _short(name, names),
-                "unit": "m/s" if name == "speed" else (units or {}).get(name, ""),
+                # a value such as 60km/h has its own
+                "unit": "" if str(values[0])[-1:].isalpha() else unit,
                 "values": _numbers(values),
             }
     return found

@@ -441,6 +441,8 @@ def test_parameters_have_the_units_that_the_manual_says():
     found = page("t", runs, {"run0": example_result(), "run1": example_result()})
     assert '"unit":"kg"' in found
     assert "mass 40000 kg" in found
+    own = [{"labels": {"track.speed": f"{speed}km/h"}} for speed in (60, 80)]
+    assert parameters(own, {"track.speed": "m/s"})["track.speed"]["unit"] == ""
 
 
 def test_spread_has_the_values_of_every_run():

@@ -36,6 +36,7 @@ def test_study_is_drawn(folder, capsys, chosen):
     ("chosen", "words"),
     [
         (["Y_over_Q_ab"], "did you mean 'Y_over_Q_abs'"),
+        (["Y_over_P_peak"], "QUANTITY: Y_over_P_peak: no such value"),
         (["--against", "fricton"], "'fricton' was not varied; did you mean 'track.friction'"),
     ],
 )
@@ -53,6 +54,14 @@ def test_runs_that_ended_early_are_counted_above_the_picture(folder, kind):
     (folder / "study.json").write_text(json.dumps(index))
     words = "1 of 8 runs ended early: their values until then"
     assert _study_figure(str(folder), (), None, None, kind).get_suptitle().endswith(words)
+
+
+@pytest.mark.parametrize("file", ["", "study.json", "summary.csv"])
+def test_what_was_varied_has_its_unit_without_results_too(tmp_path, simulated, file):
+    masses = {"vehicle.carbody.mass": [3e4, 4e4]}
+    railsim.study([COACH], CURVE, [10.0], grid=masses, keep="summary", out=tmp_path, workers=1)
+    figure = _study_figure(str(tmp_path / file), (), None, None, "curves")
+    assert "mass (kg)" in [axes.get_xlabel() for axes in figure.axes]
 
 
 def test_parameters_of_a_study_are_refused_of_a_track(tmp_path, capsys):
