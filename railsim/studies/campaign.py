@@ -27,8 +27,9 @@ from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.loading import load_running_limits, load_scenario, load_track, load_vehicle
 from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
+from railsim.definitions.track.alignment_rules import cant_at
 from railsim.definitions.track.elements import Circle
-from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
@@ -41,7 +42,6 @@ from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
-from railsim.track.alignment import Alignment
 
 MOST = 20  # seeds of a part
 STEP = 10  # between two of them: seeds of the zones' own tracks lie in between
@@ -165,10 +165,9 @@ def scenario_cases(
 
 
 def curve_faults(scenario: Scenario, file: str) -> Iterator[Fault]:
-    """Yield the parts whose `radius` or `cant` no curve of their track comes near.
+    """Yield the parts whose `radius` or `cant` is beyond those of the curves of their track.
 
-    `file`: that the faults name. They are between the smallest and the largest of its curves, which
-    may lead to either hand.
+    `file`: Name of the scenario's file. Curves to the left and to the right are alike.
     """
     texts = [a.removeprefix("track.") for a in scenario.assignments if a.startswith("track.")]
     for name, part in scenario.parts.items():
@@ -178,22 +177,22 @@ def curve_faults(scenario: Scenario, file: str) -> Iterator[Fault]:
             track = load_track(part.track, texts)
         except InputError:
             continue  # told when the runs are loaded
-        curves = [one for one in curvature_sections(track) if one.type == "CIR"]
-        middles = np.array([0.5 * (one.begin + one.end) for one in curves])
-        cants = 1e3 * np.abs(Alignment(track).cant(middles))
-        radii = np.array([1.0 / abs(one.start_value) for one in curves])
-        for key, value, known, unit in (
-            ("radius", part.speed.radius, radii, "m"),
-            ("cant", 1e3 * abs(part.speed.cant), cants, "mm"),
-        ):
-            where = file, f"parts.{name}.speed.{key}", f"{value:g} {unit}"
-            if not curves:
-                yield Fault(*where, f"'{short_name(part.track)}' has no curve")
-                break
-            low, high = float(known.min()), float(known.max())
+        cant = cant_sections(track)
+        curves = [
+            (1.0 / abs(one.start_value), 1e3 * abs(cant_at(cant, 0.5 * (one.begin + one.end))))
+            for one in curvature_sections(track)
+            if one.type == "CIR" and one.start_value  # 0: of infinite radius
+        ]
+        key, of_track = f"parts.{name}.speed", f"'{short_name(part.track)}'"
+        given = (("radius", "m", part.speed.radius), ("cant", "mm", 1e3 * abs(part.speed.cant)))
+        if not curves:
+            yield Fault(file, f"{key}.radius", f"{given[0][2]:g} m", f"{of_track} has no curve")
+        for (own, unit, value), known in zip(given, zip(*curves, strict=True), strict=False):
+            low, high = min(known), max(known)
             if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
-                allowed = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
-                yield Fault(*where, f"{allowed} {unit} in the curves of '{short_name(part.track)}'")
+                ends = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
+                allowed = f"{ends} {unit} in the curves of {of_track}"
+                yield Fault(file, f"{key}.{own}", f"{value:g} {unit}", allowed)
 
 
 def part_speed(speed: Speed, service: Service) -> float:

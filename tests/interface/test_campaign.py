@@ -143,12 +143,17 @@ def test_speed_from_the_cant_deficiency():
         ("radius = 300.0", "radius = 500.0", "radius: 500 m; 286 to 340 m in the"),
         ("cant = 0.12", "cant = 0.15", "cant: 150 mm; 120 mm in the curves of"),
         ("en14363_zone4", "straight", "radius: 300 m; 'straight' has no curve"),
+        ("en14363_zone4", "flat.toml", "radius: 300 m; 'flat' has no curve"),
     ],
 )
-def test_curve_of_a_part_is_one_of_its_track(tmp_path, capsys, old, new, words):
+def test_curve_of_a_part_is_one_of_its_track(tmp_path, capsys, monkeypatch, old, new, words):
     """Zone 4 has curves of 286 to 340 m with 120 mm: 23 m/s on R 300 m is a mean of them."""
     file = tmp_path / "small.toml"
     file.write_text(SMALL.replace(old, new))
+    flat = '{type = "CIR", length = 100.0, radius = inf}'
+    text = f'format = "railsim-track/1"\nname = "flat"\nplan = [{flat}]\n'
+    (tmp_path / "flat.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
     command = ["study", "--scenario", str(file), "--vehicles", "coach_manchester", "--out"]
     for arguments in (["validate", str(file)], [*command, str(tmp_path / "out")]):
         assert main(arguments) == 2

@@ -35,9 +35,9 @@ class Speed(Definition):
     cant_deficiency: Positive | None = None
     """Of the admissible cant deficiency, in a curve of `radius` and `cant` [1]"""
     radius: Positive | None = None
-    """[m]"""
+    """Not beyond the radii of the track's curves [m]"""
     cant: Finite = 0.0
-    """[m]"""
+    """Not beyond the cants in them [m]"""
 
     @check
     def _one_way(self) -> None:
