@@ -188,28 +188,21 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
         @wraps(function)
         def command(**values: Any) -> Any:
             own = {key: values.pop(key) for key in keys if key in values}
-            with _as_given(own):
+            try:
                 return function(**values, **{name: kind(**own)})
+            except InputError as error:
+                if own.get("load") is None:
+                    raise
+                raise InputError(  # --load stands for an assignment
+                    replace(fault, key="", option="--load")
+                    if fault.option == "--set" and fault.key in ("load", "vehicle.load")
+                    else fault
+                    for fault in error.faults
+                ) from None
 
         return together(*options)(command)  # type: ignore[return-value]
 
     return add
-
-
-@contextmanager
-def _as_given(options: Mapping[str, Any]) -> Iterator[None]:
-    """Let a fault of the assignment that stands for ``--load`` name this option."""
-    try:
-        yield
-    except InputError as error:
-        if options.get("load") is None:
-            raise
-        raise InputError(
-            replace(fault, key="", option="--load")
-            if fault.option == "--set" and fault.key in ("load", "vehicle.load")
-            else fault
-            for fault in error.faults
-        ) from None
 
 
 linearisation_options = together(

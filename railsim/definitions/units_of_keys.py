@@ -7,6 +7,9 @@ from typing import Any
 from railsim.definitions.base import Definition, meanings
 from railsim.files.key_paths import AXES, full_path, key_path
 
+UNIT = re.compile(r"(?!1$|SI$|.* or )(1|[A-Za-z]{1,3}2?)([ /][A-Za-z]{1,3}2?)*")
+"""No `m or rad`, `unit of the quantity`"""
+
 
 def unit_of_key(definition: Definition, key: str) -> str:
     """Return the unit of the number under a dotted key; empty where it has none, or one of several.
@@ -35,8 +38,7 @@ def unit_of_key(definition: Definition, key: str) -> str:
     except (KeyError, ValueError, TypeError, AttributeError, IndexError):
         return ""
     units = re.findall(r"\[([^\]]*)\]", said)
-    plain = len(units) == 1 and re.fullmatch(r"[\w/ ]+", units[0]) and " or " not in units[0]
-    return units[0] if plain and units[0] != "1" else ""
+    return units[0] if len(units) == 1 and UNIT.fullmatch(units[0]) else ""
 
 
 def unit_of_input(inputs: Any, key: str) -> str:

@@ -24,7 +24,8 @@ import railsim
 from railsim.assessment.criteria import CRITERIA
 from railsim.cli import main
 from railsim.definitions import Settings
-from railsim.definitions.units_of_keys import unit_of_input
+from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
+from railsim.definitions.vehicle.laws import Signal
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day, in_words
 from railsim.report.inputs import _flat, _settings, differing, inputs_of, what_was_run
@@ -437,6 +438,9 @@ def test_parameters_have_the_units_that_the_manual_says():
         "speed": "",
     }
     assert {key: unit_of_input(inputs[0], key) for key in units} == units
+    signal = Signal(quantity="speed")
+    keys = ("noise", "quantity", "delay")  # the first has the unit of the second, whichever
+    assert [unit_of_key(signal, key) for key in keys] == ["", "", "s"]
     runs = [{**r, "labels": {"vehicle.carbody.mass": f"{i}e4"}} for i, r in enumerate(records(5))]
     found = page("t", runs, {"run0": example_result(), "run1": example_result()})
     assert '"unit":"kg"' in found
