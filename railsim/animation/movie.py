@@ -79,7 +79,7 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
     view.set(xlim=(-15.0, 15.0), ylim=(4.5, -4.5), aspect="equal")
     view.set_axis_off()
     at_s = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"
-    larger = "" if gain == 1.0 else f"; motion of the bodies {gain:g} times"
+    larger = "" if gain == 1.0 else f"; motion of the bodies magnified {gain:g} times"
     words = f"{scene.title}\nt {scene.time[frame]:.2f} s{at_s}{larger}"
     view.set_title(words, fontsize=8, loc="left")
     for side, axes in enumerate(sections):

@@ -136,7 +136,7 @@ def _plan(axes: Axes, found: Curving) -> None:
     axes.set(xticks=[], yticks=[], anchor="W")  # room for the title of a short vehicle
     axes.set_title(
         f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
-        f"running to the right; angle of attack and displacement {EXAGGERATED:g} times"
+        f"running to the right; angle of attack and displacement magnified {EXAGGERATED:g} times"
     )
 
 

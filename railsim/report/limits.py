@@ -55,7 +55,7 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Sect
     judged = {name for one in running for name in one.runs}
     left = [r for name, r in runs.items() if name not in judged and {"Y", "Q"} <= set(r)]
     for name in dict.fromkeys(result.vehicle().name for result in left):
-        words = "not assessed after EN 14363, as the remarks on these values say"
+        words = "not assessed to EN 14363; the remarks on these values say why"
         verdicts.append((OPEN, f"{name}: {words}."))
     running = _told_apart(running, runs)
     derailment, more = _assessed(runs, "safety")

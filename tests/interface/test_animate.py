@@ -212,7 +212,7 @@ def test_film_has_a_picture_for_each_frame(result, tmp_path):
 
 def test_a_film_says_how_many_times_larger_the_motion_is(result):
     view, *sections = Figure().subplots(1, 3)
-    for gain, words in ((1.0, " m"), (20.0, " m; motion of the bodies 20 times")):
+    for gain, words in ((1.0, " m"), (20.0, " m; motion of the bodies magnified 20 times")):
         draw(view, sections, result_scene(result, frames=4), 1, gain)
         assert view.get_title(loc="left").endswith(words)
     assert [axes.get_ylabel() for axes in sections] == ["mm", "mm"]

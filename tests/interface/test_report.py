@@ -355,7 +355,7 @@ def test_a_run_without_forces_leaves_its_vehicle_without_a_verdict_and_that_is_s
     whole = example_result()
     part = selected(whole, ["Q"])
     verdicts, _ = assessed({"whole": whole, "part": part})
-    words = "not assessed after EN 14363, as the remarks on these values say."
+    words = "not assessed to EN 14363; the remarks on these values say why."
     assert [text for _, text in verdicts] == [f"{whole.vehicle().name}: {words}"]
     assert assessed({"part": part})[0] == []  # kept without forces: nothing was to be assessed
 
