@@ -187,11 +187,12 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
     def add(function: F) -> F:
         @wraps(function)
         def command(**values: Any) -> Any:
+            load = values.get("load")
             own = {key: values.pop(key) for key in keys if key in values}
             try:
                 return function(**values, **{name: kind(**own)})
             except InputError as error:
-                if own.get("load") is None:
+                if load is None:
                     raise
                 raise InputError(  # --load stands for an assignment
                     replace(fault, key="", option="--load")

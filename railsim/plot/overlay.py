@@ -36,8 +36,9 @@ def overlay(
     first = next(iter(results.values()))
     plans = [curvature_sections(result.track()) for result in results.values()]
     ends = [[(section.type, section.begin, section.end) for section in plan] for plan in plans]
-    # over time a curve is not at one place for runs of different speeds
-    alike = over == "distance" or len({result.speed for result in results.values()}) == 1
+    # over time a curve is not at one place for runs of different speeds or beginnings
+    begins = {(result.speed, float(result["distance"][0])) for result in results.values()}
+    alike = over == "distance" or len(begins) == 1
     alike = alike and all(other == ends[0] for other in ends)
     longest = max(results.values(), key=lambda result: result["distance"][-1])
     shown = style.spans(plans[0], longest["distance"], longest[over]) if alike else []

@@ -320,9 +320,13 @@ def test_overlay_shades_what_the_longest_run_passed_and_over_time_of_one_speed_o
     for results in ({"short": short, "long": result}, {"long": result, "short": short}):
         for over in ("distance", "time"):
             assert len(shades(overlay(results, ["Y:1"], over=over).axes[0])) == 3
-    slower = {"one": result, "slower": example_result(speed=10.0, duration=60.0)}
-    assert len(shades(overlay(slower, ["Y:1"]).axes[0])) == 3
-    assert shades(overlay(slower, ["Y:1"], over="time").axes[0]) == []
+    part = selected(result, ["Y"])
+    moved = {name: part[name] + 50.0 * (name == "distance") for name in part}
+    ahead = Result(moved, part.quantities, part.coordinates, part.attributes)
+    for other in (example_result(speed=10.0, duration=60.0), ahead):
+        assert len(shades(overlay({"one": result, "other": other}, ["Y:1"]).axes[0])) == 3
+        both = overlay({"one": result, "other": other}, ["Y:1"], over="time")
+        assert shades(both.axes[0]) == []
 
 
 def test_overlay_names_the_wheelset_of_each_vehicle(result):

@@ -304,10 +304,14 @@ def test_interrupt_just_after_a_hidden_file_was_created_leaves_nothing(tmp_path,
         (["--set", "vehicle.load=ful"], "--set: vehicle.load: no"),
     ],
 )
-@pytest.mark.parametrize("command", [["run", "--speed", "20"], ["modes"]])
+@pytest.mark.parametrize("command", [["run", "--speed", "20"], ["modes"], ["info"]])
 def test_an_unknown_load_case_names_the_option_that_was_given(command, option, words, capsys):
     name, *more = command
-    assert main([name, "coach_manchester", "straight", *more, *option]) == 2
+    if name == "info":  # of one file: its own keys
+        option = [option[0], option[1].removeprefix("vehicle.")]
+    else:
+        more = ["straight", *more]
+    assert main([name, "coach_manchester", *more, *option]) == 2
     shown = capsys.readouterr().err
     assert words in shown.replace("--set: load", "--set: vehicle.load")
     assert "allowed: design, laden" in shown
