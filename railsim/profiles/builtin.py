@@ -153,7 +153,7 @@ def cone(taper: float) -> Profile:
         flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
         return np.where(y > start, -taper * y, np.where(y > end, fillet, flange))
 
-    ratio = f"1:{1.0 / taper:.3g}"
+    ratio = f"1:{float(f'{1.0 / taper:.3g}'):g}"  # 1:3.33, 1:1000
     source = f"cone of {ratio}, flank, tip and back of S1002, fillet of 13 mm"
     return _wheel(f"cone {ratio}", height, source)
 
