@@ -109,7 +109,7 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
         lines: list[tuple[str, float | None, Any]] = [
             (f"linear, {found.contact.words()}", lost.speed, "-"),
             ("the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))),
-            ("the same, cells of the runs", lost.speed_of_runs, (0, (6, 2))),
+            ("the same with the cells of the runs", lost.speed_of_runs, (0, (6, 2))),
         ]
         for words, speed, dashes in lines:
             if speed is not None:
