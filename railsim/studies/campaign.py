@@ -27,9 +27,7 @@ from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.loading import load_running_limits, load_scenario, load_track, load_vehicle
 from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
-from railsim.definitions.track.alignment_rules import cant_at
 from railsim.definitions.track.elements import Circle
-from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
@@ -42,6 +40,7 @@ from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.plan import ROUGH_DURATION, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
+from railsim.track.curves import curves
 
 MOST = 20  # seeds of a part
 STEP = 10  # between two of them: seeds of the zones' own tracks lie in between
@@ -177,17 +176,12 @@ def curve_faults(scenario: Scenario, file: str) -> Iterator[Fault]:
             track = load_track(part.track, texts)
         except InputError:
             continue  # told when the runs are loaded
-        cant = cant_sections(track)
-        curves = [
-            (1.0 / abs(one.start_value), 1e3 * abs(cant_at(cant, 0.5 * (one.begin + one.end))))
-            for one in curvature_sections(track)
-            if one.type == "CIR" and one.start_value  # 0: of infinite radius
-        ]
+        found = [(1.0 / abs(one.curvature), 1e3 * abs(one.cant)) for one in curves(track)]
         key, of_track = f"parts.{name}.speed", f"'{short_name(part.track)}'"
         given = (("radius", "m", part.speed.radius), ("cant", "mm", 1e3 * abs(part.speed.cant)))
-        if not curves:
+        if not found:
             yield Fault(file, f"{key}.radius", f"{given[0][2]:g} m", f"{of_track} has no curve")
-        for (own, unit, value), known in zip(given, zip(*curves, strict=True), strict=False):
+        for (own, unit, value), known in zip(given, zip(*found, strict=True), strict=False):
             low, high = min(known), max(known)
             if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
                 ends = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))

@@ -57,7 +57,7 @@ def curves(track: Track) -> tuple[Curve, ...]:
     found = []
     for section in curvature_sections(track):
         curvature = max(section.start_value, section.end_value, key=abs)
-        if section.type == "CIR" and curvature:
+        if section.type == "CIR":
             height = cant_at(cant, 0.5 * (section.begin + section.end))
             found.append(Curve(section, curvature, height if curvature > 0.0 else -height))
     return tuple(found)

@@ -21,8 +21,10 @@ from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
 from railsim.plot.style import DISTINCT, HUES, SHADES, distinct, shade, spans, wheelset_colours
 from railsim.plot.track import track_figure
+from railsim.report.runs import page
 from railsim.result import Result
 from railsim.result.export import selected
+from railsim.result.extremes import mid_curves
 from railsim.track.irregularity import displacement
 
 
@@ -116,6 +118,18 @@ def test_curve_and_transitions_are_shaded_where_they_are(result):
         (420.0, 480.0, transition),
     ]
     assert [text.get_text() for text in axes.texts][:3] == ["CLO", "R 250", "CLO"]
+
+
+def test_a_circle_of_infinite_radius_is_straight_in_pictures_and_peaks(result):
+    plan = '[{type = "CIR", length = 500.0, radius = inf}]'
+    text = f'format = "railsim-track/1"\nname = "flat"\nplan = {plan}\n'
+    attributes = {**result.attributes, "track_toml": text}
+    arrays = {name: result[name] for name in result}
+    flat = Result(arrays, result.quantities, result.coordinates, attributes, result.profiles)
+    assert shades(histories(flat, ["Y"]).axes[0]) == []
+    assert not mid_curves(flat)
+    assert not any(t.get_text().startswith("R ") for t in track_figure(flat.track()).axes[0].texts)
+    assert page("t", [], {"flat": flat})
 
 
 def test_where_names_do_not_fit_side_by_side_those_of_curves_stay():

@@ -51,7 +51,7 @@ def cant_at(cant: Sequence[Section], s: float) -> float:
 def _cants(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> Iterator[Remark]:
     most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
     for section in plan:
-        if section.type != "CIR" or section.start_value == 0.0:  # of infinite radius
+        if section.type != "CIR":
             continue
         d = 1e3 * abs(cant_at(cant, 0.5 * (section.begin + section.end)))
         radius = 1.0 / abs(section.start_value)

@@ -135,7 +135,8 @@ def _sections(name: str, elements: Sequence[TrackElement]) -> tuple[list[Section
             faults += _end_faults(key, element.type, "end", end, behind)
         start, end = before if start is None else start, behind if end is None else end
         end_of_section = begin + element.length
-        sections.append(Section(key, element.type, begin, end_of_section, start or 0.0, end or 0.0))
+        kind = "STR" if element.type == "CIR" and not start else element.type  # of infinite radius
+        sections.append(Section(key, kind, begin, end_of_section, start or 0.0, end or 0.0))
         begin = end_of_section
     return sections, faults
 

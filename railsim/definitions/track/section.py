@@ -8,7 +8,7 @@ class Section:
     """One element of a list with its values at both ends: curvature, cant or gradient."""
 
     key: str  # in the file, e.g. ``plan.2``
-    type: str  # as written
+    type: str  # as written; a circle of infinite radius is STR
     begin: float  # arc length [m]
     end: float  # arc length [m]
     start_value: float  # [1/m], [m] or [1]
