@@ -98,7 +98,7 @@ def _map(
     output.write(FILES[0], found)
     output.write(FILES[1], lambda: map_figure(shown, map_speeds(found), title))
     remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
-    output.answer(found, [map_table(found, list(axes))], remarks)
+    output.answer(found, [map_table(found, units)], remarks)
 
 
 def _ranges(

@@ -121,13 +121,14 @@ def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
     }
 
 
-def map_table(records: Sequence[Record], parameters: Sequence[str]) -> Table:
+def map_table(records: Sequence[Record], parameters: Mapping[str, str]) -> Table:
     """Return the critical speeds of a map over its parameters, and why a linear one is missing.
 
-    `records`: see `stability_map`; `parameters`: keys that have several values.
+    `records`: see `stability_map`; `parameters`: keys that have several values,
+    with their units.
     """
     speeds = map_speeds(records)
-    columns = [Column(name, format="g") for name in parameters]
+    columns = [Column(name, unit=unit, format="g") for name, unit in parameters.items()]
     columns += [Column(words, unit="m/s", format=".2f") for words in speeds]
     rows = [
         [*(record["at"][name] for name in parameters), *(column[k] for column in speeds.values())]

@@ -364,7 +364,9 @@ def test_a_map_tells_stable_points_from_those_unstable_throughout():
         for k, (linear, low) in enumerate(points)
     ]  # fmt: skip
     records.append({"at": {"conicity": 9}, "linear": None, "nonlinear": None, "remarks": ["no"]})
-    rows = map_table(records, ["conicity"]).rows
+    mass = [{**record, "at": {"vehicle.mass": 3e4}} for record in records]
+    assert "vehicle.mass (kg)" in str(map_table(mass, {"vehicle.mass": "kg"}))
+    rows = map_table(records, {"conicity": ""}).rows
     assert [row[-1] for row in rows] == [
         "none to 80 m/s", "", "unstable at 20 m/s", "not computed"
     ]  # fmt: skip
