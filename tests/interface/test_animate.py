@@ -18,6 +18,7 @@ from railsim.animation.movie import _polygons, draw
 from railsim.animation.page import scene_data
 from railsim.animation.scene import _drawn
 from railsim.cli import main
+from railsim.cli.animate import _scene
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.outlines import body_boxes
 from railsim.errors import InputError
@@ -199,6 +200,19 @@ def test_command_writes_a_page_of_a_mode(tmp_path, capsys):
     assert (tmp_path / "modes.html").stat().st_size > 20_000
     assert main(["animate", str(modes), "--mode", "upper", "--overwrite"]) == 2
     assert "no such mode" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("film", "frames", "cycles", "pictures"),
+    [(True, None, 2, 60), (False, None, 3, 270), (True, 12, 3, 36)],
+)
+def test_a_mode_is_shown_through_whole_cycles(tmp_path, film, frames, cycles, pictures):
+    modes = tmp_path / "modes.json"
+    modes.write_text(json.dumps({"vehicle": "coach_manchester", "modes": [MODE]}))
+    scene = _scene(modes, film, vehicle=None, mode=None, between=None, frames=frames)
+    assert scene.time[-1] * MODE["frequency"] == pytest.approx(cycles)
+    assert len(scene.time) == pictures
+    np.testing.assert_allclose(scene.pose[-1], scene.pose[0], atol=1e-9)
 
 
 def test_film_has_a_picture_for_each_frame(result, tmp_path):
