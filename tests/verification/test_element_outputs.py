@@ -1,5 +1,7 @@
 """Outputs of elements, patches and rails against work, geometry and statics."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from dynamics import load_any_track, load_track, load_vehicle
@@ -11,6 +13,7 @@ import railsim
 from railsim.animation import result_scene
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.support import PRESETS
+from railsim.model.statics import _pressed
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
 BAR, BAR_DAMPING, DAMPER = 8e5, 1.5e4, 2e4
@@ -118,6 +121,26 @@ def test_a_damper_takes_its_force_times_its_rate(shaken):
     np.testing.assert_allclose(force[:, 0], DAMPER * rate, atol=0.01 * np.ptp(force[:, 0]))
     np.testing.assert_allclose(power, DAMPER * rate**2, atol=0.02 * power.max())
     assert power.min() >= 0.0
+
+
+@pytest.mark.parametrize("height", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("force", [-3e4, 0.0, 3e4])
+def test_a_spring_is_as_much_pressed_whichever_body_is_named_first(height, force):
+    """With its bodies exchanged travel and force are reversed; z points down.
+
+    Between points of equal height neither is the lower one: what acts is taken as pressure.
+    """
+    named = SimpleNamespace(point1=(0.0, 1.0, height), point2=(0.0, 1.0, 0.0))
+    exchanged = SimpleNamespace(point1=named.point2, point2=named.point1)
+    travel, acting = np.array([0.0, 0.0, 0.01]), np.array([0.0, 0.0, force])
+    shorter, pressed = _pressed(named, travel, acting, is_link=False)
+    other = _pressed(exchanged, -travel, -acting, is_link=False)
+    if force or height:
+        assert other == (shorter, pressed)
+    if not height:
+        assert str(pressed) == str(abs(force))  # no minus zero
+    else:
+        assert pressed == np.sign(height) * force
 
 
 def test_a_spring_between_two_points_stands_as_its_free_length_says():
