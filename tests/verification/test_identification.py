@@ -14,7 +14,7 @@ import railsim
 from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
-from railsim.identification.fit import _at_best_shares
+from railsim.identification.fit import _at_best_shares, _covariance
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import model_of, prepared
@@ -29,6 +29,16 @@ WAVES = (
     '{type="sweep",amplitude=3e-4,wavelengths=[1.8,25.0],begin=5.0,end=190.0}'
 )
 TRACK = railsim.load_track("straight", [f"irregularities=[{WAVES}]", "plan.0.length=200.0"])
+
+
+@pytest.mark.parametrize("noise", [1e-8, 1e-4, 1.0, 1e4])
+def test_what_the_data_do_not_show_is_unknown_at_any_noise(noise):
+    """A parameter that acts 1e-13 as much as the other, which is known as well as the channels."""
+    derivatives = np.array([[1.0, 0.0], [0.0, 1e-13], [0.0, 0.0], [0.0, 0.0]]) / noise
+    problem = SimpleNamespace(size=2, vector=lambda x: np.zeros(4), before=lambda x: [])
+    covariance, inflation = _covariance(problem, np.zeros(2), derivatives, "linear")
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), [noise, 1e6], rtol=1e-6)
+    assert inflation == 1.0
 
 
 def quarter(**elements):
