@@ -174,6 +174,19 @@ def test_every_table_along_a_rising_rail_lies_higher_by_its_way():
     assert height[1] - height[own][0] == pytest.approx(2e-3 * along[own][0], abs=2e-6)
 
 
+@pytest.mark.parametrize("beyond", [0.0, 0.02, 0.04, 0.058])
+@pytest.mark.parametrize("end", [-1.0, 1.0])
+def test_a_wheel_beyond_the_end_of_a_rail_stands_on_its_edge(beyond, end):
+    """Its axle is lower there than on the rail by r - sqrt(r^2 - x^2), x from the edge to the axle."""
+    y = np.linspace(-0.035, 0.035, 40)
+    s = np.linspace(-0.5, 0.5, 11)
+    (part,) = rail_parts(SectionList(s, tuple(np.array([y, 1.3e4 * y**4]) for _ in s)))
+    there = rolled_curve(part, end * (0.5 + beyond), RADIUS)
+    lower = RADIUS - np.sqrt(RADIUS**2 - beyond**2)
+    assert there.z.min() == pytest.approx(lower, abs=2e-6)
+    assert rolled_curve(part, 0.0, RADIUS).z.min() == pytest.approx(0.0, abs=2e-6)
+
+
 @pytest.mark.further
 def test_impact_has_the_size_of_the_formula():
     """Contact force below 90 Hz on the nose: 0.7 to 1.1 times the P2 formula, dip 18.15 mrad.

@@ -52,6 +52,13 @@ def test_wrong_sections_are_refused(tmp_path, sections, said):
         loaded(tmp_path, sections)
 
 
+def test_a_section_that_only_grows_wider_is_no_jump(tmp_path):
+    """One edge moves by 30 mm, the other stays within 1 mm or moves to the other side."""
+    for moved in ([1e-3, 30e-3], [-30e-3, -1e-3], [-30e-3, 30e-3]):
+        wider = np.interp(Y, [Y[0], Y[-1]], np.add([Y[0], Y[-1]], moved))
+        assert loaded(tmp_path, rows(y=wider)).sections
+
+
 def test_gap_is_remarked(tmp_path):
     (remark,) = loaded(tmp_path, rows()[:7] + rows()[13:]).unusual()
     assert "no section from 50.6 to 51.3 m: the rail between is blended" in str(remark)
