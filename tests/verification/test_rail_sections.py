@@ -177,7 +177,7 @@ def test_every_table_along_a_rising_rail_lies_higher_by_its_way():
 @pytest.mark.parametrize("beyond", [0.0, 0.02, 0.04, 0.058])
 @pytest.mark.parametrize("end", [-1.0, 1.0])
 def test_a_wheel_beyond_the_end_of_a_rail_stands_on_its_edge(beyond, end):
-    """Its axle is lower there than on the rail by r - sqrt(r^2 - x^2), x from the edge to the axle."""
+    """By r - sqrt(r^2 - x^2) lower than on the rail, the axle x from the edge."""
     y = np.linspace(-0.035, 0.035, 40)
     s = np.linspace(-0.5, 0.5, 11)
     (part,) = rail_parts(SectionList(s, tuple(np.array([y, 1.3e4 * y**4]) for _ in s)))

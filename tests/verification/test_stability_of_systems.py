@@ -4,7 +4,7 @@ import cooperrider
 import numpy as np
 import pytest
 
-from railsim.linear.eigenmodes import followed, loss_of_stability
+from railsim.linear.eigenmodes import eigenmodes, followed, loss_of_stability, oscillations
 from railsim.linear.system import Linearisation, jacobian
 from railsim.stability.periodic import Shooting
 
@@ -171,3 +171,14 @@ def test_an_oscillation_that_becomes_overdamped_leaves_its_row_empty():
     assert np.isnan(values[2:, 0]).all()
     assert np.isnan(values[:3, 1]).all()
     assert values[3, 1] == pytest.approx(complex(-0.9, np.sqrt(0.19)))
+
+
+def test_the_largest_frequency_asked_for_belongs_to_the_range():
+    """Two oscillators with damping; undamped frequencies 1 and 2 Hz to the last bit."""
+    damped = np.array([[-0.6, 0.8], [-0.8, -0.6]]) * 2.0 * np.pi
+    matrix = np.kron(np.diag([1.0, 2.0]), damped)
+    modes = eigenmodes(Linearisation(("a", "b", "c", "d"), matrix, np.zeros(4), 0.0))
+    for most in modes.natural_frequencies:
+        count = 1 if most < 1.5 else 2
+        assert len(oscillations(modes, most).eigenvalues) == count
+        assert len(oscillations(modes, np.nextafter(most, 0.0)).eigenvalues) == count - 1
