@@ -54,6 +54,20 @@ def test_steady_start_is_the_end_of_a_long_run_in(name, support, radius, monkeyp
         assert one == pytest.approx(other, abs=1e-4)
 
 
+@pytest.mark.parametrize("remark", [None, print])
+@pytest.mark.parametrize(("radius", "cant"), [(1000.0, 0.0), (-1000.0, 0.0), (np.inf, 0.06)])
+def test_rails_guide_by_what_curve_or_cant_alone_asks_for(radius, cant, remark, monkeypatch):
+    """Sum of Y over that of Q: h/1.5 m - v^2/(R g), radii positive to the right; 10 % after 2 s."""
+    monkeypatch.setattr(run_in, "TIMES", (2.0, 2.0))
+    kind = {"type": "STR"} if np.isinf(radius) else {"type": "CIR", "radius": radius}
+    track = railsim.load_track("straight").replace(
+        plan=[{**kind, "length": 400.0}], cant=[{"type": "CST", "length": 400.0, "cant": cant}]
+    )
+    Q, Y = started(load_vehicle("coach_manchester"), track, remark)[0].sum(axis=(0, 1))
+    quotient = Y / Q
+    assert quotient == pytest.approx(cant / 1.5 - SPEED**2 / radius / 9.81, rel=0.1)
+
+
 def test_nothing_moves_in_a_run_from_the_steady_state():
     """1 s on elastic rails; 1e-5 of the static wheel load is what Newton's method leaves."""
     result = railsim.simulate(
