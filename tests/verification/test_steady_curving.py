@@ -46,6 +46,19 @@ def test_free_conical_wheelset_rolls_where_its_radii_fit_the_curve(radius):
     assert abs(found[5]) < 2e-6
 
 
+def test_quantities_of_curving_follow_from_the_wheel_forces():
+    """Y/Q outwards positive, (Q - Q0)/Q0 of the load on straight track, sum of Y of an axle."""
+    coach = load_vehicle("coach_manchester")
+    found = railsim.curving(coach, radius=[600.0, -400.0])
+    Q0 = railsim.static_loads(coach).Q0
+    assert found.converged.all()
+    for side, outwards in ((0, -1.0), (1, 1.0)):
+        quotient = outwards * found.Y[..., side] / found.Q[..., side]
+        np.testing.assert_allclose(found.Y_over_Q[..., side], quotient)
+    np.testing.assert_allclose((1.0 + found.dQ_over_Q0) * Q0, found.Q, rtol=1e-9)
+    np.testing.assert_allclose(found.sum_Y, found.Y[..., 0] + found.Y[..., 1])
+
+
 @pytest.mark.parametrize("name", ["coach_manchester", "coach_flexicoil"])
 @pytest.mark.parametrize("radius", [250.0, -600.0])
 def test_newton_finds_the_end_of_a_long_run(name, radius):
