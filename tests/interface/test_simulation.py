@@ -113,6 +113,18 @@ def test_a_state_restored_has_the_same_bits(coach, track):
     assert np.array_equal(onwards().motion, first.motion)
 
 
+def test_a_longer_run_goes_on_from_the_end_of_a_shorter_one(coach, track):
+    way = {"speed": 20.0, "settings": DISTURBED, "record": False}
+    short = railsim.Simulation(coach, track, duration=0.05, **way)
+    while short.step(0.04):
+        pass
+    assert short.time == pytest.approx(0.05, abs=STEP)
+    longer = railsim.Simulation(coach, track, duration=1.0, **way)
+    longer.state = short.state
+    assert longer.step(0.05)
+    assert longer.time == pytest.approx(short.time + 0.05, abs=1e-9)
+
+
 def test_lag_and_delay_of_an_actuator(coach, track):
     """F = F_0 (1 - exp(-(t - t_0 - delay)/lag)), exactly: the command is constant."""
     vehicle = commanded(coach, delay=0.035)
