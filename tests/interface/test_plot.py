@@ -156,6 +156,28 @@ def test_a_long_title_is_on_lines_within_the_picture(result):
     assert figure.get_suptitle().replace("\n", " ").startswith((2 * words).strip())
 
 
+def test_curves_are_named_above_the_first_row_alone_and_where_all_have_them(result):
+    def named(axes):
+        return [text.get_text() for text in axes.texts if text.get_text() in ("CLO", "R 250")]
+
+    upper, lower = histories(result, ["Y:1:left", "Q:1:left"]).axes
+    assert named(upper) == ["CLO", "R 250", "CLO"]
+    assert named(lower) == []
+    assert shades(upper) == shades(lower) != []
+    other = example_result()
+    wider = other.attributes["track_toml"].replace("radius = 250.0", "radius = 260.0")
+    other = Result(
+        {name: other[name] for name in other},
+        other.quantities,
+        other.coordinates,
+        {**other.attributes, "track_toml": wider},
+    )
+    for results, words in (((result, result), 3), ((result, other), 0)):
+        axes = overlay(dict(zip("ab", results, strict=True)), ["Y:1:left"]).axes[0]
+        assert len(named(axes)) == words
+        assert len(shades(axes)) == 3
+
+
 def test_over_time_the_shades_are_where_the_reference_body_was(result):
     (axes,) = histories(result, ["Y"], over="time").axes
     ranges = [(low, high) for low, high, _ in shades(axes)]

@@ -14,13 +14,14 @@ from railsim.linear.eigenmodes import LossOfStability
 from railsim.linear.modes import modes
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
+from railsim.plot.stability import bifurcation_figure
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import OF_CONICITY, _by_ramp, _speeds, critical_speed
 from railsim.stability.diagram import diagram
 from railsim.stability.motion import Stretch
 from railsim.stability.ramp import ramp, sustained
-from railsim.stability.result import CriticalSpeed
+from railsim.stability.result import Conicity, CriticalSpeed
 from railsim.stability.vehicle_flow import VehicleFlow
 
 RIGID = load_track("straight").replace(support={"preset": "rigid"})
@@ -66,6 +67,16 @@ def test_amplitudes_of_the_conicity_are_there_once_each_with_that_of_the_standar
     """EN 15302 states the conicity at 3 mm; a second equal amplitude would be a step."""
     assert np.all(np.diff(OF_CONICITY) > 0.05e-3)
     assert np.any(np.isclose(OF_CONICITY, 3e-3, rtol=1e-12))
+
+
+def test_conicities_of_all_amplitudes_in_the_picture_are_in_it():
+    """Without a branch amplitudes reach to 6 mm."""
+    over = Conicity("front", [3e-3, 6e-3, 7e-3], [0.1, 0.2, 0.9])
+    where = {"rails": "rigid", "friction": "0.4", "law": "fastsim"}
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, conicity_over_amplitude=over)
+    axes = bifurcation_figure(found).axes[1]
+    assert axes.get_ylim() == (0.0, 6.0)
+    assert axes.get_xlim() == pytest.approx((0.0, 1.1 * 0.2))
 
 
 def test_diagram_follows_what_hunts_below_its_lowest_speed():
