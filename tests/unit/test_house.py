@@ -87,3 +87,26 @@ def test_every_kernel_module_is_in_the_table_of_the_manual():
     text = page.read_text().partition("## Kernels")[2]
     names = {path.stem for path in (PACKAGE / "kernels").glob("*.py")} - {"__init__"}
     assert [name for name in sorted(names) if f"`{name}`" not in text] == []
+
+
+# steel; standard gauge with wheels 1360 mm apart and rails at 1:40; runs begin at 0
+USUAL = {
+    "G": 82e9, "nu": 0.28, "load": 60e3, "radius": 0.46, "start": 0.0, "gauge": 1.435,
+    "back_to_back": 1.36, "inclination": 1.0 / 40.0, "tape_circle_distance": 1.5,
+}  # fmt: skip
+
+
+def test_defaults_that_are_repeated_are_the_same_everywhere():
+    others, count = [], 0
+    for name, function in functions():
+        if not name.startswith(("contact/", "simulation/", "studies/")):
+            continue
+        arguments = function.args
+        last = arguments.args[len(arguments.args) - len(arguments.defaults) :]
+        names = [argument.arg for argument in (*last, *arguments.kwonlyargs)]
+        for key, value in zip(names, [*arguments.defaults, *arguments.kw_defaults], strict=True):
+            if key in USUAL and isinstance(value, ast.Constant) and value.value is not None:
+                count += 1
+                others += [(name, function.name, key)] * (value.value != USUAL[key])
+    assert others == []
+    assert count > 30
