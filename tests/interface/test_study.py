@@ -512,6 +512,16 @@ def test_script_without_a_guard_runs_once_and_nothing_of_the_folder_it_is_starte
     assert not list(here.glob("*.loaded"))
 
 
+@pytest.mark.parametrize(("batches", "workers", "begun"), [(5, 2, 2), (2, 5, 2), (1, 4, 1)])
+def test_no_more_processes_begin_than_are_asked_for_or_have_work(
+    monkeypatch, batches, workers, begun
+):
+    counts = []
+    monkeypatch.setattr(execute, "WorkerPool", lambda count, *_: counts.append(count))
+    execute._Pool([()] * batches, range(batches), workers)
+    assert counts == [begun]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False], ids=["compiled before", "first run"])
 def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
