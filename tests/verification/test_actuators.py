@@ -22,10 +22,10 @@ LOADED = MASS + 2.0 * WHEELSET["mass"]  # kg, the whole bogie
 ROTATING = LOADED + 2.0 * WHEELSET["inertia"][1] / RADIUS**2
 
 
-def limited(command, deflection, rate, **limits):
+def limited(value, deflection, rate, **limits):
     """Force of an actuator along x that is given a command."""
     rig = Rig(kind="actuator", acts="x", **limits)
-    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = command
+    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = value
     return rig.force(0, deflection, rate)
 
 
@@ -61,6 +61,14 @@ def test_power_limits_the_force(command, rate, force):
 def test_the_force_outwards_ends_with_the_stroke(command, deflection, force):
     found = limited(command, deflection, 0.0, stroke=0.1)
     assert found == pytest.approx(force, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("rate", [-0.2, 0.3])
+@pytest.mark.parametrize(("command", "constant"), [(5e3, 5e3), (0.0, 0.0), (-5e3, 0.0)])
+def test_a_commanded_damper_takes_energy_and_never_gives_it(command, constant, rate):
+    """F = c v, nothing at all without a constant above zero."""
+    force = limited(command, 0.01, rate, command="damper")
+    assert force == pytest.approx(constant * rate, rel=1e-9, abs=0.0)
 
 
 def test_an_actuator_along_a_line_pulls_along_it_where_it_is_now():
