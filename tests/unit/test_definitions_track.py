@@ -3,6 +3,8 @@
 import math
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from railsim.definitions.loading import load_track, load_track_text
@@ -139,6 +141,58 @@ def test_circle_of_infinite_radius_is_straight_to_the_rules():
     assert track_remarks(track(straight, speed=20.0)) == []
 
 
+def into_curve(radius, cant, length, speed):
+    """Straight track, a transition with a ramp of cant, and a curve."""
+    return track(
+        [
+            {"type": "STR", "length": 50.0},
+            {"type": "CLO", "length": length},
+            {"type": "CIR", "length": 90.0, "radius": radius},
+        ],
+        [{"type": "CST", "length": 50.0, "cant": 0.0}, {"type": "LIR", "length": length},
+         {"type": "CST", "length": 90.0, "cant": cant}],
+        speed=speed,
+    )  # fmt: skip
+
+
+@given(
+    st.floats(120.0, 4000.0), st.integers(0, 200), st.floats(31.0, 250.0), st.integers(20, 300),
+    st.sampled_from([-1.0, 1.0]),
+)  # fmt: skip
+@example(4000.0, 160, 200.0, 229, 1.0)
+@example(4000.0, 161, 200.0, 229, 1.0)
+@example(4000.0, 180, 240.0, 230, 1.0)
+@example(4000.0, 181, 240.0, 230, 1.0)
+@example(420.0, 160, 200.0, 60, 1.0)
+@example(418.0, 160, 200.0, 60, -1.0)
+@example(1000.0, 120, 60.0, 90, 1.0)
+@example(1000.0, 121, 60.0, 90, 1.0)
+@example(1000.0, 144, 60.0, 90, 1.0)
+@example(1000.0, 145, 60.0, 90, 1.0)
+def test_rules_of_alignment_are_those_of_the_instructions(radius, d, length, V, hand):
+    """Printed rules, worked out with V in km/h, d and I in mm, on either hand."""
+    v = V / 3.6
+    deficiency = 1500.0 * v**2 / (9.81 * radius) - d
+    most, change = (180 if V >= 230 else 160), abs(deficiency) * v / length
+    rules = {
+        f"mm is more than {most} mm": (d, most),
+        "(R - 100 m)/2": (d, (radius - 100.0) / 2.0),
+        "180/V": (d / length, 180.0 / V),
+        "216/V": (d / length, 216.0 / V),
+        "a cant deficiency of": (deficiency, 160.0),
+        "a cant excess of": (-deficiency, 110.0),
+        "the cant deficiency changes": (change, 75.0),
+        "and than 90": (change, 90.0),
+        "is shorter than": (max(d * V / 180.0, abs(deficiency) * V / 270.0, 60.0), length),
+    }
+    close = {k for k, (x, limit) in rules.items() if 0.0 < abs(x - limit) < 1e-4 * limit}
+    curve = into_curve(hand * radius, hand * 1e-3 * d, length, v)
+    said = [str(remark) for remark in track_remarks(curve)]
+    found = {words for words in rules if any(words in one for one in said)}
+    broken = {words for words, (x, limit) in rules.items() if x > limit * (1.0 + 1e-9)}
+    assert found - close == broken - close
+
+
 # R 300 m at 20 m/s: I + d = 1500 * 400/(9.81 * 300) = 203.9 mm
 @pytest.mark.parametrize(
     ("cant", "length", "speed", "expected"),
@@ -155,18 +209,7 @@ def test_circle_of_infinite_radius_is_straight_to_the_rules():
     ],
 )
 def test_rules_of_alignment_at_the_permitted_speed(cant, length, speed, expected):
-    ramp = {"type": "LIR", "length": length}
-    curve = track(
-        [
-            {"type": "STR", "length": 50.0},
-            {"type": "CLO", "length": length},
-            {"type": "CIR", "length": 90.0, "radius": 300.0},
-        ],
-        [{"type": "CST", "length": 50.0, "cant": 0.0}, ramp,
-         {"type": "CST", "length": 90.0, "cant": cant}],
-        speed=speed,
-    )  # fmt: skip
-    remarks = [str(remark) for remark in track_remarks(curve)]
+    remarks = [str(remark) for remark in track_remarks(into_curve(300.0, cant, length, speed))]
     if expected is None:
         assert remarks == []
     else:
