@@ -1,5 +1,7 @@
 """Limits of a mechanism: both senses of a force, friction, loops that cannot close, dead points."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -317,3 +319,31 @@ def test_an_exact_parallelogram_stretched_out_is_a_dead_point(tmp_path):
     path.write_text(FOUR_BAR.format(rocker=0.4, end=0.2))
     fault = refused(load_mechanism(path))
     assert "a dead point" in fault.found  # was: joints hold the same freedom twice
+
+
+TINY = 5e-324  # the smallest number above 0
+LOW = "parameters.zone_low=0.6"
+WORK, HIGH = "parameters.zone_work", "parameters.zone_high"
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "taken", "refused"),
+    [
+        ("tilting_two_springs", "tolerances.front_F1={}", 0.0, -TINY),
+        ("atr95_lift_2", "optimise.min_transmission_angle={}", TINY, 0.0),
+        ("atr95_lift_2", "optimise.min_transmission_angle={}", 1.57, 0.5 * math.pi),
+        ("atr95_lift_2", "actuators.lift.rod={}", math.nextafter(0.16, 0.0), 0.16),
+        ("atr95_lift_5", "parameters.m_head={}", 0.0, -TINY),
+        ("atr95_lift_5", "parameters.lift_speed={}", TINY, 0.0),
+        ("tilting_one_spring", "parameters.temperature={}", -273.14, -273.15),
+        ("tilting_one_spring", "parameters.front_progression={}", 1.0, math.nextafter(1.0, 0.0)),
+        ("atr95_lift_5", f"{LOW} {WORK}={{}} {HIGH}=0.9", 0.6, 0.59),
+        ("atr95_lift_5", f"{LOW} {WORK}={{}} {HIGH}=0.9", 0.9, 0.91),
+        ("atr95_lift_5", f"{LOW} {WORK}=0.6 {HIGH}={{}}", 0.61, 0.6),
+        ("atr95_lift_5", "optimise.bounds.a1=[0.1,{}]", math.nextafter(0.1, 1.0), 0.1),
+    ],
+)
+def test_the_last_value_is_taken_and_the_next_refused(name, change, taken, refused):
+    load_mechanism(name, change.format(taken).split())
+    with pytest.raises(InputError):
+        load_mechanism(name, change.format(refused).split())
