@@ -53,7 +53,8 @@ def assert_same(run, alone):
         np.testing.assert_allclose(run[name], alone[name], rtol=0.0, atol=bound, err_msg=name)
     end, expected = (result.groups["state"]["end"] for result in (run, alone))
     np.testing.assert_allclose(end, expected, rtol=0.0, atol=share)
-    for fact in ("step", "patches_evaluated", "patches_out_of_range", "vehicle_toml", "duration"):
+    counts = "patches_evaluated", "patches_out_of_range", "contacts_evaluated_again"
+    for fact in ("step", *counts, "vehicle_toml", "duration"):
         assert run.attributes[fact] == alone.attributes[fact], fact
 
 

@@ -1,5 +1,7 @@
 """Strength of the springs: EN 13906-1 relations by hand, Goodman-Smith, limits that must hold."""
 
+from fnmatch import fnmatch
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,9 @@ from hypothesis import strategies as st
 
 from railsim.definitions.loading import load_spring
 from railsim.springs import checks
+from railsim.springs.design import design
+from railsim.springs.summary import design_data, fatigue_data, ride_height_data, verification_data
+from railsim.springs.tolerance import ride_heights
 from railsim.springs.verification import dynamic_loads, fatigue, verify
 
 GOODMAN = [(0.0, 430e6), (390e6, 690e6), (690e6, 690e6)]
@@ -102,3 +107,80 @@ def test_mass_of_a_spring_is_that_of_its_bar():
     assert checks.mass(0.02, 0.2, 5.0, 7850.0) == pytest.approx(
         7850.0 * np.pi / 4 * 0.02**2 * np.pi * 0.2 * 5.0, rel=1e-14
     )
+
+
+# all lengths twice as large, all forces and masses eight times: powers of two leave the digits
+LENGTH, FORCE = 2.0, 8.0
+UNITS = {
+    "m": LENGTH, "N": FORCE, "kg": FORCE, "N/m": FORCE / LENGTH, "Nm": FORCE * LENGTH,
+    "Pa": FORCE / LENGTH**2, "kg/m3": FORCE / LENGTH**3, "Hz": LENGTH**-0.5,
+}  # fmt: skip
+GIVEN = {
+    "m": "length seat_height mean_diameter free_height wire_diameter engagement deflection "
+    "radial_clearance",
+    "N": "loads.* load max_load min_load", "Nm": "bush_torsional_stiffness",
+    "Pa": "material.G E tau_allowable goodman", "kg/m3": "density",
+}  # fmt: skip
+FOUND = {
+    "m": "d D D_outer D_inner H0 L_solid height height_outer height_inner deflection lateral_outer "
+    "lateral_inner mounting_deflection lowest highest random single.*",
+    "N": "load force force_outer force_inner target_load_range max_load min_load",
+    "N/m": "K_V.* springs.*.K_V K_V_outer K_V_inner K_L K_L_outer K_L_inner K_sys K_tot rate "
+    "lateral.*",
+    "Nm": "K_C K_C_outer K_C_inner", "Pa": "tau tau_k tau_solid tau_max tau_min fatigue.*.limit",
+    "kg": "mass", "Hz": "surge_frequency",
+}  # fmt: skip
+
+
+def scaled(node, words, path=""):
+    """Data with every number times the scale of its unit, by the last key and those around it."""
+    if isinstance(node, dict):
+        if "unit" in node:  # a check says its own
+            words = {node["unit"]: "value limit"}
+        return {key: scaled(value, words, f"{path}.{key}") for key, value in node.items()}
+    if isinstance(node, list | tuple):
+        if path.endswith("tau_allowable") and isinstance(node[0], float):  # wire diameter, stress
+            return [node[0] * UNITS["m"], node[1] * UNITS["Pa"]]
+        return [scaled(value, words, path) for value in node]
+    if isinstance(node, bool | str) or node is None:
+        return node
+    for unit, keys in words.items():
+        if any(fnmatch(path, f"*.{key}") for key in keys.split()):
+            return node * UNITS.get(unit, 1.0)
+    return node
+
+
+def everything(suspension):
+    found = verification_data(suspension, verify(suspension))
+    found["ride_height"] = ride_height_data(ride_heights(suspension))
+    loads = dynamic_loads(suspension)
+    found["fatigue"] = fatigue_data(suspension, fatigue(suspension), loads)
+    found["design"] = design_data(suspension, design(suspension))
+    del found["design"]["coils"]  # for the wires of EN 10060
+    return found
+
+
+@pytest.mark.parametrize("form", ["grossi", "energy"])
+def test_every_result_has_its_unit(suspension, form):
+    """A nest of other lengths and forces has the same numbers, each in its own scale."""
+    given = suspension.with_values({"arm.equilibrium": form}).model_dump(exclude_none=True)
+    for table in ("search", "vehicle"):
+        given.pop(table, None)
+    large = scaled(given, GIVEN)
+    one, other = (everything(type(suspension).model_validate(data)) for data in (given, large))
+    assert one["springs"]["outer"]["tau_solid"] != other["springs"]["outer"]["tau_solid"]
+    assert_alike(scaled(one, FOUND), other)
+
+
+def assert_alike(expected, found, path=""):
+    if isinstance(expected, dict):
+        assert list(expected) == list(found)
+        for key, value in expected.items():
+            assert_alike(value, found[key], f"{path}.{key}")
+    elif isinstance(expected, list | tuple):
+        for k, (one, other) in enumerate(zip(expected, found, strict=True)):
+            assert_alike(one, other, f"{path}.{k}")
+    elif isinstance(expected, float):
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-15), path
+    elif path.rpartition(".")[2] != "note":
+        assert found == expected, path
