@@ -150,7 +150,7 @@ def into_curve(radius, cant, length, speed):
             {"type": "CIR", "length": 90.0, "radius": radius},
         ],
         [{"type": "CST", "length": 50.0, "cant": 0.0}, {"type": "LIR", "length": length},
-         {"type": "CST", "length": 90.0, "cant": cant}],
+         {"type": "CST", "length": 90.0, "cant": cant}] if cant else [],
         speed=speed,
     )  # fmt: skip
 
@@ -165,6 +165,8 @@ def into_curve(radius, cant, length, speed):
 @example(4000.0, 181, 240.0, 230, 1.0)
 @example(420.0, 160, 200.0, 60, 1.0)
 @example(418.0, 160, 200.0, 60, -1.0)
+@example(400.0, 0, 100.0, 40, 1.0)
+@example(1000.0, 60, 38.6, 120, 1.0)
 @example(1000.0, 120, 60.0, 90, 1.0)
 @example(1000.0, 121, 60.0, 90, 1.0)
 @example(1000.0, 144, 60.0, 90, 1.0)
