@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from railsim import cli
-from railsim.contact.gauges import gauge_table
-from railsim.profiles import load_profile
+from railsim.contact.gauges import gauge_table, wheel_gauge
+from railsim.profiles import Profile, load_profile
 
 NAMES = (
     "lateral",
@@ -108,6 +108,19 @@ def test_least_flange_height_of_small_wheels(diameter, least):
     assert first["name"] == "Sh"
     assert first["least"] == pytest.approx(1e-3 * least)
     assert first["verdict"] == ("pass" if diameter > 0.76 else "fail")
+
+
+@pytest.mark.parametrize("z", [0.0, 2e-3, -0.46])
+@pytest.mark.parametrize(("high", "slope", "thick"), [(0.028, 2.75, 0.032), (0.033, 1.5, 0.022)])
+def test_gauge_of_a_flange_with_a_straight_flank(high, slope, thick, z):
+    """qR = (Sh - 2 mm - 10 mm)/slope, wherever the profile's heights count from.
+
+    Sd is taken 10 mm beyond the nominal rolling circle, from the back of the flange 70 mm off it.
+    """
+    at_10_mm = thick - 0.070
+    y = [-0.070, -0.065, at_10_mm - (high - 0.010) / slope, at_10_mm + 0.010 / slope, 0.0, 0.06]
+    wheel = Profile("made", "wheel", y, np.add([0.0, 0.9 * high, high, 0.0, 0.0, 0.0], z), "made")
+    assert wheel_gauge(wheel) == pytest.approx((high, thick, (high - 0.012) / slope), abs=1e-9)
 
 
 @pytest.mark.parametrize(("gauge", "verdict"), [(1.445, "fail"), (1.000, ""), (1.668, "")])

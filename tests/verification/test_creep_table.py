@@ -1,5 +1,7 @@
 """Table of the full theory: interpolation, limits, smoothness, the solver behind it."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,7 @@ from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.patches import CreepScratch, Patches
 
 SIZE, N, MU, G = 5e-3, 70e3, 0.35, 82e9
+MODULE = "railsim.contact.creep_table"
 SCRATCH = CreepScratch(fastsim_workspace(1, 1, 1), np.zeros(16, dtype=np.int64))
 
 
@@ -124,6 +127,20 @@ def test_shipped_nodes_are_what_the_generator_makes(i_ratio, i_theta):
     assert failures == 0
     # stored with five digits
     np.testing.assert_allclose(shipped_nodes().force[i_ratio, i_theta], row, atol=6e-6)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_build_makes_the_missing_rows_and_counts_them(tmp_path, monkeypatch, workers):
+    made = []
+    monkeypatch.setattr(f"{MODULE}._stored_row", lambda _, i, j: made.append((i, j)))
+    monkeypatch.setattr(f"{MODULE}.WorkerPool", ThreadPoolExecutor)
+    missing = [(0, 0), (1, N_THETA), (N_RATIO, 2)]
+    rows = [(i, j) for i in range(N_RATIO + 1) for j in range(N_THETA + 1)]
+    for i, j in set(rows) - set(missing):
+        (tmp_path / f"row_{i:02d}_{j:02d}.npz").touch()
+    counted = list(build_nodes(tmp_path, workers))
+    assert counted == [(len(rows) - k, len(rows)) for k in (3, 2, 1, 0)]
+    assert sorted(made) == missing
 
 
 def test_build_goes_on_from_finished_rows(tmp_path):
