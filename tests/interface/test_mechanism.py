@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image, ImageSequence
 
 from railsim import cli
 from railsim.definitions.loading import load_mechanism
@@ -15,6 +16,7 @@ from railsim.files.sources import find_file, shipped_names
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.optimised_file import optimised_text
 from railsim.plot.mechanisms import angles_figure
+from railsim.report.mechanisms import GIF_FRAMES
 
 FEW = ["--set", "sampling.points=51"]
 FOUR_BAR = """
@@ -173,6 +175,11 @@ def test_out_writes_a_self_contained_page_pictures_and_positions(tmp_path, capsy
     pictures = "drawing kinematics path angles cam ratio_force pressure contact carpet time"
     assert {f"{name}.png" for name in pictures.split()} <= names
     assert {"report.html", "animation.gif", "positions.csv"} <= names
+    with Image.open(folder / "animation.gif") as film:  # forth and back
+        pictures = [np.asarray(one.convert("L")) for one in ImageSequence.Iterator(film)]
+    assert len(pictures) == 2 * GIF_FRAMES - 2
+    assert np.array_equal(pictures[1], pictures[-1])
+    assert not np.array_equal(pictures[0], pictures[1])
     page = Text()
     html = (folder / "report.html").read_text()
     page.feed(html)

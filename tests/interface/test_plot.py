@@ -375,6 +375,14 @@ def test_overlay_names_the_wheelset_of_each_vehicle(result):
     assert one.get_title(loc="left") == "Guiding force"
 
 
+@pytest.mark.parametrize(
+    ("words", "count", "columns"), [("a", 3, 3), ("a", 8, 6), ("long " * 30, 3, 1)]
+)
+def test_legend_of_an_overlay_has_as_many_columns_as_fit(result, words, count, columns):
+    figure = overlay({f"{words}{k}": result for k in range(count)}, ["curvature"])
+    assert figure.legends[0]._ncols == columns
+
+
 def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(tmp_path, capsys):
     """Offsets at a chord, of rails of ERRI B176: what acts has that spectrum again.
 

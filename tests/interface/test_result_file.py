@@ -137,6 +137,17 @@ def test_arrays_cannot_be_written_to(written):
             result.Q[0] = 0.0
 
 
+def test_instants_count_from_both_ends(written):
+    result = open_result(written)
+    last = len(result.time) - 1
+    for instant, same in ((-1, last), (-1 - last, 0)):
+        expected = result["Q"][same]
+        np.testing.assert_array_equal(result.series("Q", time=instant), expected)
+    for beyond in (-2 - last, last + 1):
+        with pytest.raises(KeyError, match=f"no instant {beyond}; 0 to {last}"):
+            result.series("Q", time=beyond)
+
+
 def test_unknown_names_are_answered_with_the_nearest(written):
     result = open_result(written)
     with pytest.raises(AttributeError, match="did you mean 'wheelset_yaw'"):

@@ -34,6 +34,7 @@ from railsim.definitions.vehicle.out_of_round import Sections as WheelSections
 from railsim.definitions.vehicle.tables import Service
 from railsim.definitions.wear_law import ArchardMap, FrictionWork, WearLawFile
 from railsim.errors import InputError
+from railsim.studies.stationary import StationaryValue
 
 TINY = 5e-324  # the smallest number above 0
 PAIR = {"bodies": ["a", "b"]}
@@ -364,6 +365,9 @@ AT_THE_BORDER = {
          (3.5, "uncomfortable"), (below(4.5), "uncomfortable"), (4.5, "very uncomfortable")],
     ),
     "a value at its limit does not exceed it": (exceeded, [(1.0, False), (above(1.0), True)]),
+    "nor in a stationary test": (
+        lambda x: StationaryValue("", "", x, 1.0, "").exceeded, [(1.0, False), (above(1.0), True)]
+    ),
     "of a model too, in the mean": (
         lambda x: compared(x, 1.0), [(0.5, "pass"), (below(0.5), "fail")]
     ),

@@ -8,7 +8,7 @@ import pytest
 import railsim
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
-from railsim.simulation.remarks import creep_range, unsettled_rails, vibration
+from railsim.simulation.remarks import creep_range, stability, unsettled_rails, vibration
 
 
 def test_nothing_counted_is_nothing_said():
@@ -39,6 +39,15 @@ def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(hunts, 
     assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
     assert "above" not in remark
     assert cause in remark
+
+
+@pytest.mark.parametrize("moved", [2e-3, -2e-3])
+def test_one_wheelset_that_is_displaced_is_a_disturbance(moved):
+    still = {"wheelset_lateral": np.zeros((2, 4))}
+    once = {"wheelset_lateral": np.zeros((2, 4))}
+    once["wheelset_lateral"][int(moved < 0.0), 2] = moved
+    assert "proves nothing about its stability" in stability(None, still, 60.0)
+    assert stability(None, once, 60.0) == stability(None, still, 0.1) == ""
 
 
 def test_each_remark_is_logged_once_and_what_was_asked_for_is_not(caplog):

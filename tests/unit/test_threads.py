@@ -78,3 +78,10 @@ def test_exception_in_the_block_of_a_pool_kills_its_workers():
         raise KeyError
     # the server of the workers may end before it has said by which signal: 255
     assert {process.exitcode for process in pool.begun} <= {-signal.SIGKILL, 255}
+
+
+def test_workers_that_end_by_themselves_in_time_are_not_killed():
+    pool = WorkerPool(1)
+    pool.submit(time.sleep, 0.2)
+    pool.end(60.0)
+    assert [process.exitcode for process in pool.begun] == [0]

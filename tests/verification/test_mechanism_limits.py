@@ -347,3 +347,14 @@ def test_the_last_value_is_taken_and_the_next_refused(name, change, taken, refus
     load_mechanism(name, change.format(taken).split())
     with pytest.raises(InputError):
         load_mechanism(name, change.format(refused).split())
+
+
+@pytest.mark.parametrize(
+    ("temperature", "end"), [(-40.0, -30.0), (24.9, -30.0), (25.1, 80.0), (90.0, 80.0)]
+)
+def test_temperature_of_a_gas_spring_is_held_against_the_nearer_end(temperature, end):
+    """In service from -30 to 80 C."""
+    changed = [f"parameters.temperature={temperature}"]
+    check = by_name(analyse(load_mechanism("tilting_one_spring", changed)))["front_temperature"]
+    assert check.limit == end
+    assert check.ok == (-30.0 <= temperature <= 80.0)

@@ -6,7 +6,7 @@ from dynamics import Settings, changed, load_track, load_vehicle, undamped
 
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
-from railsim.linear.modes import modes
+from railsim.linear.modes import Mode, modes
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import level_track
@@ -152,3 +152,8 @@ def test_a_car_between_held_bogies_bounces_on_its_springs():
     bogies = modes(load_vehicle("benchmark_vehicle1"), speed=20.0, hold=["carbody"])
     assert not any("carbody" in name for mode in bogies for name in mode.participation)
     assert any("hunting" in mode.name for mode in bogies)
+
+
+def test_a_mode_that_neither_swings_nor_decays_has_no_damping_ratio():
+    assert Mode("", 0j, {}, {}).damping_ratio == 0.0
+    assert Mode("", -3.0 + 4.0j, {}, {}).damping_ratio == pytest.approx(3.0 / 5.0)

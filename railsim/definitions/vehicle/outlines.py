@@ -32,8 +32,8 @@ def body_boxes(flat: FlatVehicle) -> dict[str, Box]:
     >>> from railsim.definitions.loading import load_vehicle
     >>> from railsim.definitions.vehicle.flatten import flatten
     >>> boxes = body_boxes(flatten(load_vehicle("coach_manchester")))
-    >>> list(boxes), boxes["carbody"].high[0]
-    (['carbody', 'front.frame', 'rear.frame'], 13.98)
+    >>> list(boxes), boxes["carbody"].low, boxes["carbody"].high
+    (['carbody', 'front.frame', 'rear.frame'], (-13.98, -1.4, -3.9), (13.98, 1.4, -1.1))
     """
     points: dict[str, list[Vector]] = {body.name: [body.position] for body in flat.bodies}
     for element in flat.elements:
