@@ -65,7 +65,7 @@ def test_study_survives_the_death_of_a_worker_and_is_that_of_one_process(tmp_pat
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         pids = [worker.pid for worker in cluster.workers.values()]
-        killed = []
+        killed, shares = [], []
 
         def kill(record):
             if not killed:
@@ -74,9 +74,12 @@ def test_study_survives_the_death_of_a_worker_and_is_that_of_one_process(tmp_pat
 
         outcome = railsim.study(
             speeds=20.0, out=tmp_path / "many", scheduler=cluster.scheduler_address,
-            on_record=kill, **STUDY
+            on_record=kill, progress=shares.append, **STUDY
         )  # fmt: skip
     assert killed
+    assert shares == sorted(shares)
+    assert min(shares) < 0.5
+    assert shares[-1] == pytest.approx(1.0)
     assert not outcome.failed
     assert [r["name"] for r in outcome.records] == [r["name"] for r in alone.records]
     one, many = arrays(tmp_path / "alone"), arrays(tmp_path / "many")
