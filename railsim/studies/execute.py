@@ -13,7 +13,7 @@ import secrets
 import signal
 import tempfile
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -43,6 +43,7 @@ from railsim.studies.summary import failed_record, finished_record, waiting_reco
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
+AHEAD = 8  # batches for each process that wait in its pool: each end takes a look at all of them
 ALWAYS_KEPT = ("time", "distance", "Q0")
 
 Progress = Callable[[float], None]
@@ -218,30 +219,29 @@ class _Pool:
         self._running: dict[Future[list[Record]], int] = {}
         shared = self._fractions, self._holders, self._stop
         begun = (*shared, bool(logging.getLogger("railsim").handlers))
+        self._most = AHEAD * workers
         self._pool = WorkerPool(min(workers, len(indices)), _begin, begun)
         self.lost: set[int] = set()
 
-    def _submit(self, indices: Sequence[int]) -> None:
-        for index in indices:
-            self._running[self._pool.submit(_work, index, self._batches[index])] = index
+    def _submit(self, index: int) -> None:
+        self._running[self._pool.submit(_work, index, self._batches[index])] = index
 
     def outcomes(self, progress: Progress) -> Iterator[tuple[int, list[Record]]]:
         """Yield index and records of every batch that ends."""
-        first, rest = self._indices[0], list(self._indices[1:])
-        shares = _shares(self._batches)
+        first, rest = self._indices[0], deque(self._indices[1:])
+        shares, done = _shares(self._batches), 0.0
         broken = False
         try:
-            self._submit([first])
+            self._submit(first)
             compiled = is_compiled()
             if not compiled and rest:
                 self._pool.submit(compile_time_loop)  # while the first one builds contact tables
             while (rest or self._running) and not broken:
-                if rest and compiled:
-                    self._submit(rest)
-                    rest = []
+                while rest and compiled and len(self._running) < self._most:
+                    self._submit(rest.popleft())
                 ended, _ = wait(self._running, timeout=POLL, return_when=FIRST_COMPLETED)
-                progress(sum(self._fractions[i] * shares[i] for i in self._indices))
-                compiled = bool(ended) or self._fractions[first] > 0.0
+                progress(done + sum(self._fractions[i] * shares[i] for i in self._running.values()))
+                compiled = compiled or bool(ended) or self._fractions[first] > 0.0
                 for future in ended:
                     index = self._running[future]
                     try:
@@ -250,6 +250,7 @@ class _Pool:
                         broken = True
                         continue
                     del self._running[future]
+                    done += shares[index]
                     yield index, records
         except BrokenProcessPool:  # nothing more can be submitted
             broken = True

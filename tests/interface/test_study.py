@@ -547,6 +547,27 @@ def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
 
 
 @pytest.mark.slow
+def test_cost_of_a_run_does_not_grow_with_their_number(tmp_path, monkeypatch):
+    """All that wait in the pool are looked at when one ends: a hundred thousand are too many."""
+    waiting = []
+
+    def wait(futures, **how):
+        waiting.append(len(futures))
+        return futures_wait(futures, **how)
+
+    futures_wait = execute.wait
+    monkeypatch.setattr(execute, "wait", wait)
+    speeds = [float(v) for v in range(10, 10 + 3 * execute.AHEAD)]
+    shown = []
+    outcome = railsim.study(
+        COACH, STRAIGHT, speeds, duration=0.01, out=tmp_path, workers=2, progress=shown.append
+    )
+    assert [record["status"] for record in outcome.records] == ["complete"] * len(speeds)
+    assert max(waiting) == 2 * execute.AHEAD
+    assert np.diff([0.0, *shown, 1.0]).min() > -1e-9
+
+
+@pytest.mark.slow
 def test_compiled_code_is_seen(tmp_path):
     """An empty cache folder and a full one, each in a process of its own."""
     look = "from railsim.simulation.first_start import is_compiled; print(is_compiled())"
