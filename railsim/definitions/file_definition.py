@@ -1,7 +1,8 @@
 """Definitions that fill a whole file: checked with all faults at once, changed, written."""
 
+import pickle
 from collections.abc import Iterable, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, get_args
 
@@ -18,6 +19,7 @@ from railsim.table import Table
 from railsim.text import printable, shortened
 
 LONGEST_VALUE = 60  # characters of a value in the table of a notebook
+MOST_RESTORED = 100  # definitions that a worker process keeps
 D = TypeVar("D", bound="FileDefinition")
 
 
@@ -121,6 +123,15 @@ class FileDefinition(Definition):
         kind.note_assigned(source.data, values, self)
         return validated(kind, with_values(source, values, kind.OPEN_TABLES, _defaults(kind)))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return restored, (type(self), self._pickled)
+
+    @cached_property
+    def _pickled(self) -> bytes:
+        # its values alone, without what was worked out
+        values = {name: self.__dict__[name] for name in type(self).model_fields}
+        return pickle.dumps((self.model_fields_set, values))
+
     def __repr__(self) -> str:
         kind, name = type(self).__name__, getattr(self, "name", None)
         if name:
@@ -151,6 +162,16 @@ class FileDefinition(Definition):
         table = self._table()
         table.caption = str(getattr(self, "name", type(self).__name__))
         return table.html()
+
+
+@lru_cache(MOST_RESTORED)
+def restored(kind: type[D], pickled: bytes) -> D:
+    """Return a pickled definition: the same one each time, which keeps what was worked out.
+
+    A process of a study gets a vehicle with each of its runs.
+    """
+    given, values = pickle.loads(pickled)
+    return kind.model_construct(given, **values)
 
 
 def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:

@@ -13,6 +13,7 @@ import pytest
 
 import railsim
 from railsim.cli import main
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.linear.modes import Mode, Modes
 from railsim.linear.vehicle import Contact
@@ -264,8 +265,21 @@ def test_definitions_and_results_cannot_be_changed(coach, result):
     with pytest.raises(TypeError, match="does not change"):
         coach.assemblies.clear()
     assert pickle.loads(pickle.dumps(coach)) == coach == copy.deepcopy(coach)
+    assert pickle.loads(pickle.dumps(coach)).bodies.keys() == coach.bodies.keys()
+    with pytest.raises(TypeError, match="does not change"):
+        pickle.loads(pickle.dumps(coach)).bodies.clear()
     with pytest.raises(ValueError, match="WRITEABLE"):
         result.Q.setflags(write=True)
+
+
+def test_what_follows_from_a_vehicle_is_worked_out_once_in_a_process(coach):
+    """A worker gets the vehicle with each run of a study: the same one, not another copy."""
+    first, second = (pickle.loads(pickle.dumps(coach)) for _ in range(2))
+    assert first is second
+    assert flatten(first) is flatten(second)
+    other = pickle.loads(pickle.dumps(coach.with_values({"bodies.carbody.mass": 30e3})))
+    assert (other.bodies["carbody"].mass, first.bodies) == (30e3, coach.bodies)
+    assert first.model_fields_set == coach.model_fields_set
 
 
 def test_name_that_is_not_there_says_which_are():
