@@ -41,6 +41,7 @@ from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
+from railsim.kernels.track_frame import FRAME_SIZE
 from railsim.linear.circle import POSITION, circle, placed
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
@@ -137,12 +138,12 @@ def _arrived(
         if progress is not None:
             progress(before + done, before + whole)
 
+    frames = _frames(model, s)
     state = None if remark is None else _steady(model, balance, track, s, remark)
     if state is None:
         state = settled(model, balance, track, s, step, settling)
     if state is None:
-        work = _located(model, s)
-        state = initial_state(model, _standing(model, balance, track, s), s, work.frames)
+        state = initial_state(model, _standing(model, balance, track, s), s, frames)
     state[ARC_LENGTH] = s
     if steps:
         follow_rails(model, state)
@@ -200,6 +201,8 @@ def _approach(model: Model, track: Track, start: float, speed: float, step: floa
 
 def _displaced(model: Model, start: float) -> bool:
     """Whether an irregularity moves the rails under the wheelsets."""
+    if not model.system.track.has_irregularity:
+        return False
     work = _located(model, start)
     moved = [MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, SINE, ROLL_SLOPE]
     return bool(work.plane[:, moved].any() or work.rail[:, :, ASIDE : ASIDE_SLOPE + 1].any())
@@ -229,19 +232,21 @@ def _way_from_constant(
 
 
 def _located(model: Model, s: float) -> Work:
-    """Work arrays with the track frames and rails of a vehicle at `s`."""
-    system = model.system
-    work = work_arrays(system)
-    reference = system.bodies.frame[system.bodies.references[0]]
-    if (
-        locate_frames(
-            system.track, system.frame_offset, reference, s, work.frames, work.cell, work.cell_u
-        )
-        != RUNNING
-    ):
-        raise ModelError("the vehicle is longer than the track's table allows")
-    locate_rails(system, work, s)
+    """Work arrays with the rails under a vehicle at `s`."""
+    work = work_arrays(model.system)
+    locate_rails(model.system, work, s)
     return work
+
+
+def _frames(model: Model, s: float) -> Floats:
+    """Track frames of a vehicle at `s`."""
+    system, count = model.system, len(model.system.frame_offset)
+    reference = system.bodies.frame[system.bodies.references[0]]
+    frames, cell = np.zeros((count, FRAME_SIZE)), np.zeros(count, dtype=np.int64)
+    track = system.track, system.frame_offset, reference
+    if locate_frames(*track, s, frames, cell, np.zeros(count)) != RUNNING:
+        raise ModelError("the vehicle is longer than the track's table allows")
+    return frames
 
 
 def follow_rails(model: Model, state: Floats) -> None:
