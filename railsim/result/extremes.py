@@ -99,22 +99,21 @@ def evaluated(result: Result) -> slice:
 
 def _extreme(array: Floats, kind: str) -> tuple[Any, ...]:
     """Index of the extreme value of an array; values that are not a number are left out."""
-    key = {"abs": np.abs(array), "max": array, "min": -array}[kind]
-    return np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
+    key = np.abs(array) if kind == "abs" else array if kind == "max" else -array
+    at = np.argmax(key)  # of what is not a number, where there is such
+    if np.isnan(key.flat[at]):
+        at = np.argmax(np.where(np.isnan(key), -np.inf, key))
+    return np.unravel_index(at, key.shape)
 
 
-def _low_pass_of(result: Result, name: str, known: dict[str, Floats]) -> Floats | None:
+def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats]) -> Floats | None:
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
     Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
-    has lifted does not spoil the rest.  None where outputs are too seldom or not at equal times.
+    has lifted does not spoil the rest.  None where there are gaps.
 
-    `known` keeps what has been filtered of this result, and is filled.
+    `rate`: outputs per second; `known` keeps what has been filtered of this result, and is filled.
     """
-    step = even_step(result["time"])
-    if step is None or step * LOW_PASS * LEAST_RATE > 1.0:
-        return None
-    rate = 1.0 / step
 
     def passed(part: str) -> Floats:
         if part not in known:
@@ -140,8 +139,11 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
         return ()
     known: dict[str, Floats] = {}
     found: list[Peak] = []
+    step = even_step(result["time"]) or math.inf
+    often = step * LOW_PASS * LEAST_RATE <= 1.0
     for name in _wanted(result, names):
-        smooth = _low_pass_of(result, name, known) if name in FORCES else None
+        filtered = often and name in FORCES
+        smooth = _low_pass_of(result, name, 1.0 / step, known) if filtered else None
         for kind in ("max", "min") if name in BY_SIGN else ("abs",):
             one = peak(result, name, kind)
             if smooth is not None and not np.isnan(smooth).all():
@@ -255,7 +257,7 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
             percentile = np.nanpercentile if np.isnan(over).any() else np.percentile
             bounds = percentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
         medians[name], scatter[name] = bounds[1], 0.5 * (bounds[2] - bounds[0])
-        settling.append(_settling(over))
+        settling.append(_settling(over, bounds[1]))
     changes = np.concatenate(settling) if settling else np.zeros(0)
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
     found = values, tuple(largest), medians, scatter, steady, (begin, end)
@@ -263,7 +265,7 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
     return MidCurve(radius, middle, time, *found, unsettled)
 
 
-def _settling(values: Floats) -> Floats:
+def _settling(values: Floats, medians: Floats) -> Floats:
     """Which columns are in their way to steady values; not those that do not change or have gaps.
 
     On smooth rails a vehicle in a full curve has a steady state: what changes so slowly that it
@@ -272,11 +274,12 @@ def _settling(values: Floats) -> Floats:
     an even drift: 0.14).
     """
     columns = values.reshape(len(values), -1)
-    columns = columns[:, np.ptp(columns, axis=0) > 0.0]
+    varies = np.ptp(columns, axis=0) > 0.0
+    columns = columns[:, varies]
     half, last = len(columns) // 2, columns[-max(1, len(columns) // 10) :].mean(axis=0)
     square = (columns - last) ** 2
     before, after = np.mean(square[:half], axis=0), np.mean(square[half:], axis=0)
-    above = columns > np.median(columns, axis=0)
+    above = columns > medians.ravel()[varies]
     crossings = np.count_nonzero(above[1:] != above[:-1], axis=0)
     return np.asarray((after < SETTLES * before) | (crossings < CROSSINGS))
 
