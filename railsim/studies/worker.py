@@ -8,6 +8,7 @@ from types import TracebackType
 
 from railsim.simulation.first_start import is_compiled
 from railsim.studies.execute import run_briefly
+from railsim.threads import keep_freed_memory
 
 # what a worker meets whose study has ended while it began: no semaphores, no inputs
 STUDY_HAS_ENDED = (FileNotFoundError, EOFError, ConnectionError)
@@ -28,4 +29,5 @@ def load_compiled_code() -> None:
 
 
 sys.excepthook = report_unless_ended  # inherited by the copies of the server
+keep_freed_memory()  # likewise
 load_compiled_code()

@@ -1,6 +1,7 @@
 """Processes that share the cores: no threads of linear algebra, no code but railsim's own."""
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -39,6 +40,20 @@ def test_what_a_user_has_set_stands(monkeypatch):
     with one_thread_each():
         assert seen_by_a_process() == ["1", "4", "1"]
     assert [name for name in VARIABLES if name in os.environ] == [VARIABLES[1]]
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")
+def test_freed_arrays_leave_their_memory_to_the_next_ones():
+    program = (
+        "import resource, numpy; from railsim.threads import keep_freed_memory;"
+        "keep_freed_memory(); pages = [];\n"
+        "for _ in range(3):\n"
+        "    arrays = [numpy.ones(100_000) for _ in range(20)]; del arrays\n"
+        "    pages.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)\n"
+        "print(pages[2] - pages[1])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert int(done.stdout) < 100  # 16 MB are 3900 pages
 
 
 def test_workers_import_no_modules_of_the_folder_they_begin_in(tmp_path, monkeypatch):
