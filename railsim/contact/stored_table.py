@@ -24,6 +24,7 @@ MOST_OPEN = 16  # stored tables that a process keeps open, mapped and checked
 MOST_BYTES, IN_USE = 8e9, 3600.0
 
 
+@lru_cache(1)
 def generator_hash() -> str:
     """Hash of the sources that decide what a table holds."""
     digest = hashlib.sha256()

@@ -17,7 +17,7 @@ from railsim.definitions.excitations.base import Displacement
 from railsim.errors import input_error
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.irregularity import displacement, shortest_length
 
 # Usual length of a cell, and the largest number of them that is worth its memory.
@@ -40,7 +40,7 @@ def track_tables(track: Track, cell_length: float | None = None) -> TrackTables:
     Returns: see `railsim.kernels.track_frame`. Raises InputError: elements that do not fit
     together; a track too long for its details.
     """
-    alignment = Alignment(track)
+    alignment = alignment_of(track)
     ds = cell_length or usual_cell_length(track)
     if (track.length + BEFORE + AFTER) / ds > 10 * MOST_CELLS:
         found = f"{track.length:g} m of track with details of {ds:g} m"
