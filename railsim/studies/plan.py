@@ -94,7 +94,8 @@ class Plan:
                 run = RunSpec(vehicle, track, given, *shared, assignments)
                 permitted = isinstance(wanted, str)
                 first = self._permitted(run) if permitted else self._loader.first_speed(run)
-                self.points.append(self._point(replace(run, speed=first), row))
+                run = run if first is given else replace(run, speed=first)
+                self.points.append(self._point(run, row))
 
     def _point(self, run: RunSpec, row: Row) -> Point:
         overrides = self._loader.overrides(run.assignments)

@@ -65,3 +65,11 @@ def json_bytes(data: Any) -> bytes:
         return json.dumps(data, allow_nan=False).encode()
     except ValueError:
         return json.dumps(finite(data)).encode()
+
+
+def compact_json(data: Any) -> bytes:
+    """Return data as JSON without spaces, faster than `json_bytes`; its numbers are the same."""
+    try:
+        return orjson.dumps(data)
+    except TypeError:  # names of files that are no UTF-8
+        return json.dumps(finite(data), separators=(",", ":")).encode()

@@ -5,13 +5,12 @@ values; ``summary.csv`` holds one line per run for spreadsheets.  All numbers ar
 written from the journal (`railsim.studies.journal`) when the study ends or is interrupted.
 """
 
-import csv
-import io
 import json
 import re
 import tempfile
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, Literal
 
@@ -27,16 +26,18 @@ from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, NOT_DONE, Records
 from railsim.studies.plan import MOST_RUNS
-from railsim.studies.records import Record
+from railsim.studies.records import Record, compact_json, parsed
 from railsim.studies.spec import StudySpec, checked
 from railsim.studies.user_function import user_quantities
 from railsim.text import spreadsheet_cell
 
 Row = dict[str, Any]  # cells by the names of their columns, without units
 INDEX_BYTES = 500_000_000
+BUFFER = 1 << 20  # bytes
 MOST_VALUES = 30_000_000  # of an index: 150 for each run of the largest study
 MOST_INPUTS = 10 * MOST_RUNS
 UNITS = {"speed": "m/s", "step": "s", "wall_time": "s", "cpu_time": "s"}
+_NO_NUMBER = re.compile(rb'("[^"\\]*(?:\\.[^"\\]*)*"|null)')  # in a list of JSON
 _COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*|median\d*)(?:_(time|distance|20hz))?")
 FORMAT = "railsim-study-result/1"
 
@@ -75,8 +76,8 @@ def write_index(folder: Path, inputs: Mapping[str, Any], status: str, records: R
     with (
         whole_file(folder / "summary.csv") as partial_summary,
         whole_file(folder / "study.json") as partial_index,
-        open(partial_index, "wb") as index,
-        open(partial_summary, "wb") as summary,
+        open(partial_index, "wb", BUFFER) as index,
+        open(partial_summary, "wb", BUFFER) as summary,
     ):
 
         def rows() -> Iterator[Row]:  # each record is read once
@@ -165,29 +166,38 @@ def _write_rows(rows: Iterable[Row], stream: BinaryIO) -> None:
     ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at the middle of the first
     curve (``Q_mid2`` of the second).  The column ``remarks`` holds all remarks on the run.
     """
-    columns: dict[str, None] = {}
+    columns: list[str] = []
     sizes: list[tuple[int, int]] = []  # bytes and cells of each line
-    with tempfile.TemporaryFile() as lines:  # all columns are known at the end only
+    with tempfile.TemporaryFile(buffering=BUFFER) as lines:  # all columns are known at the end only
         for row in rows:
-            if row.keys() != columns.keys():
-                columns.update(dict.fromkeys(row))
-            cells = [row.get(name, "") for name in columns]
-            line = _csv_line([spreadsheet_cell(c) if isinstance(c, str) else c for c in cells])
+            if [*row] != columns:
+                columns = list(dict.fromkeys((*columns, *row)))
+                row = {name: row.get(name, "") for name in columns}
+            line = _csv_line([*row.values()])
             lines.write(line)
             sizes.append((len(line), len(columns)))
         units = {name: unit_of(name) for name in columns}
-        header = (f"{name} ({unit})" if unit else name for name, unit in units.items())
-        stream.write(_csv_line(header))
+        stream.write(_csv_line([f"{name} ({u})" if u else name for name, u in units.items()]))
         lines.seek(0)
         for length, width in sizes:
-            stream.write(lines.read(length).removesuffix(b"\n"))
-            stream.write(b"," * (len(columns) - width) + b"\n")
+            line, missing = lines.read(length), len(columns) - width
+            stream.write(line[:-1] + b"," * missing + b"\n" if missing else line)
 
 
-def _csv_line(cells: Iterable[Any]) -> bytes:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(cells)
-    return text.getvalue().encode()
+def _csv_line(cells: list[Any]) -> bytes:
+    """A line of CSV from JSON, which has numbers as texts in a tenth of the time of Python's."""
+    parts = _NO_NUMBER.split(compact_json(cells)[1:-1])
+    parts[1::2] = map(_csv_cell, parts[1::2])
+    return b"".join(parts) + b"\n"
+
+
+@lru_cache(10_000)  # names of wheelsets and the like
+def _csv_cell(text: bytes) -> bytes:
+    """A cell of CSV from a text of JSON, or from null."""
+    value = str(spreadsheet_cell(parsed(text) or ""))
+    if re.search('[,"\r\n]', value):
+        value = '"' + value.replace('"', '""') + '"'
+    return value.encode("utf-8", "surrogateescape")
 
 
 def _checked_row(record: Record) -> dict[str, Any]:
@@ -216,24 +226,26 @@ def unit_of(column: str) -> str:
     return "" if unit == "1" else unit
 
 
+@cache
+def _columns_of_peak(quantity: str, kind: str) -> tuple[str, dict[str, str]]:
+    """Column of the value of a peak, and columns of further keys of its record."""
+    column = quantity + {"abs": "_peak", "max": "_max", "min": "_min"}[kind]
+    facts = ("wheelset", "side", "time", "distance")
+    return column, {"low_pass_20_hz": f"{column}_20hz"} | {f: f"{column}_{f}" for f in facts}
+
+
 def summary_row(record: Record) -> dict[str, Any]:
     """Return the cells of the line of a run by the names of their columns, without units."""
     row = {"name": record["name"], **record["labels"], "file": record["file"]}
     row |= {name: record.get(name, "") for name in FACTS}
     row["remarks"] = " ".join(record.get("remarks", ()))
-    endings = {"abs": "peak", "max": "max", "min": "min"}
     for peak in record.get("peaks", ()):
-        column = f"{peak['quantity']}_{endings[peak['kind']]}"
+        column, further = _columns_of_peak(peak["quantity"], peak["kind"])
         row[column] = peak["value"]
-        if "low_pass_20_hz" in peak:
-            row[f"{column}_20hz"] = peak["low_pass_20_hz"]
-        for fact in ("wheelset", "side", "time", "distance"):
-            if fact in peak:
-                row[f"{column}_{fact}"] = peak[fact]
+        row |= {name: peak[fact] for fact, name in further.items() if fact in peak}
     for number, curve in enumerate(record.get("mid_curves", ()), start=1):
-        ending = "mid" if number == 1 else f"mid{number}"
-        for name, value in curve["largest"].items():
-            row[f"{name}_{ending}"] = value
-        for name, value in curve.get("largest_medians", {}).items():
-            row[f"{name}_{ending.replace('mid', 'median')}"] = value
+        which = "" if number == 1 else number
+        row |= {f"{name}_mid{which}": value for name, value in curve["largest"].items()}
+        medians = curve.get("largest_medians", {})
+        row |= {f"{name}_median{which}": value for name, value in medians.items()}
     return {**row, **record.get("quantities", {})}

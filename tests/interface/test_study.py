@@ -184,6 +184,15 @@ def test_failed_run_is_recorded_and_the_others_go_on(tmp_path, simulated, capsys
     assert "1 of 3 runs computed" in printed.out
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are UTF-8 there")
+def test_name_of_a_file_need_not_be_utf_8(tmp_path, simulated):
+    vehicle = os.fsdecode(os.fsencode(tmp_path) + b"/coach\xff.toml")
+    Path(vehicle).write_text('format = "railsim-vehicle/1"\nextends = "coach_manchester"\n')
+    how = {"out": tmp_path / "s", "workers": 1, "keep": "summary", "resume": True}
+    assert [railsim.study(vehicle, STRAIGHT, 20.0, **how).computed for _ in range(2)] == [1, 0]
+    assert b"\ncoach\xff_straight_20,coach\xff," in (tmp_path / "s" / "summary.csv").read_bytes()
+
+
 def test_failed_runs_are_tried_again(tmp_path, simulated):
     assert main(arguments(tmp_path, 13)) == 1
     assert main(arguments(tmp_path, 13)) == 1

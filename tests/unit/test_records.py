@@ -1,11 +1,14 @@
 """Records kept by studies: only what is as it was written is believed."""
 
+import csv
+import io
 import json
 
 import pytest
 
 from railsim.errors import InputError
 from railsim.studies.records import read_record, write_record
+from railsim.studies.summary import _write_rows
 
 RECORD = {"speed": 61.7, "modes": [1.0, None, "hunting"], "nested": {"b": 2, "a": 1e-300}}
 
@@ -50,3 +53,31 @@ def test_any_changed_byte_is_noticed_or_means_the_same(kept):
             assert read_record(kept) == RECORD
         except InputError:
             continue
+
+
+def test_summary_reads_back_as_what_was_written_whatever_it_holds():
+    """Python's csv and float say what the cells mean."""
+    texts = [
+        "",
+        "a,b",
+        'say "now"',
+        "two\nlines",
+        "a\rb",
+        "Übergang",
+        "back\\slash",
+        "null",
+        "-0.3",
+    ]
+    numbers = [1.0, -0.0, 5e-324, 1.234e-5, 0.1 + 0.2, 1e16, 1.7976931348623157e308, 7]
+    rows = [
+        {"name": "one", **{f"t{i}": text for i, text in enumerate(texts)}},
+        {"name": "=2+3", "t3": None, **{f"n{i}": number for i, number in enumerate(numbers)}},
+    ]
+    stream = io.BytesIO()
+    _write_rows(rows, stream)
+    text = io.StringIO(stream.getvalue().decode(), newline="")
+    one, two = csv.DictReader(text)
+    assert [one[f"t{i}"] for i in range(len(texts))] == texts
+    assert {one[f"n{i}"] for i in range(len(numbers))} == {""}
+    assert [float(two[f"n{i}"]) for i in range(len(numbers))] == numbers
+    assert (two["name"], two["t3"]) == ("'=2+3", "")
