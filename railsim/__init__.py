@@ -74,7 +74,7 @@ _HOMES = {
     "optimise": "railsim.studies.optimise", "peaks": "railsim.result",
     "root_locus": "railsim.linear.modes", "sensitivity": "railsim.identification",
     "simulate": "railsim.simulation", "simulate_together": "railsim.simulation",
-    "static_loads": "railsim.model.statics", "study": "railsim.studies",
+    "static_loads": "railsim.model.statics", "study": "railsim.studies.study",
     "validate_model": "railsim.assessment.model_validation",
 }  # fmt: skip
 

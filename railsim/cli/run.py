@@ -8,6 +8,7 @@ import click
 from railsim.cli import common as cli
 from railsim.cli.terminal import show
 from railsim.errors import Fault, Faults
+from railsim.threads import keep_freed_memory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -56,6 +57,7 @@ def command(
     from railsim.simulation.assumptions import assumptions
     from railsim.studies.run import run_case
 
+    keep_freed_memory()
     resume = _opened(before, {"--speed": speed, "--start": extent["start"]}) if before else None
     if resume:
         *_, start, speed = map(float, resume.groups["state"]["end"])
@@ -67,10 +69,14 @@ def command(
         show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
     with output.progress(case.name) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
-    record = {"file": str(path), **run_facts(result)}
-    of_track = [f"{given.track}: {remark}" for remark in track_remarks(case.track)]
-    remarks = () if quiet else (*of_track, *result.remarks)
-    parts = [*result_parts(result, remarks), "", str(path)]
+    record: dict[str, Any] = {"file": str(path)}
+    parts: list[Any] = []
+    if output.as_json:
+        record |= run_facts(result)
+    else:
+        of_track = [f"{given.track}: {remark}" for remark in track_remarks(case.track)]
+        remarks = () if quiet else (*of_track, *result.remarks)
+        parts = [*result_parts(result, remarks), "", str(path)]
     if plots and len(result["time"]):
         from railsim.plot.histories import histories
         from railsim.plot.style import save

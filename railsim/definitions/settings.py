@@ -174,12 +174,12 @@ class Settings(FileDefinition):
     """Shear modulus of wheels and rails [Pa]"""
     poisson: NonNegative = 0.28
     """Poisson's ratio of wheels and rails [1]"""
-    drive: Drive = Drive()
+    drive: Drive = Drive.model_construct()
     """Speed profile along the track"""
     start_state: Literal["run-in", "steady"] = "run-in"
     """Of a run that begins in a curve: the end of some 10 s over an auxiliary track, or the steady
     state by Newton's method"""
-    outputs: Outputs = Outputs()
+    outputs: Outputs = Outputs.model_construct()
     """Further quantities in the result"""
     initial: dict[str, InitialState] = EMPTY_TABLE
     """Disturbance at the start by the body's full name"""

@@ -78,8 +78,10 @@ def s1002_height(y: Floats) -> Floats:
     standard's polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
     """
     ends, heights = zip(*S1002_SECTIONS.values(), strict=True)
-    index = np.searchsorted(ends[:-1], y, side="right")
-    return np.piecewise(y, [index == k for k in range(len(heights))], heights)
+    index, z = np.searchsorted(ends[:-1], y, side="right"), np.empty(np.shape(y))
+    for k, height in enumerate(heights):
+        z[index == k] = height(y[index == k])
+    return z
 
 
 def even_points(y: Floats, z: Floats, spacing: float) -> Floats:

@@ -31,9 +31,3 @@
 
 Begin reading in `study.py`.
 """
-
-from railsim.studies.case import Case
-from railsim.studies.outcome import Outcome
-from railsim.studies.study import study
-
-__all__ = ["Case", "Outcome", "study"]

@@ -95,7 +95,7 @@ class StudySpec(BaseModel):
     Single values, ranges and numbers are taken too, and held as lists of texts.
     """
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore", frozen=True, defer_build=True)
 
     railsim_version: str = __version__
     name: str | None = None  # in a study file or scenario; no number depends on it

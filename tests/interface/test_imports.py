@@ -30,7 +30,8 @@ NOTHING_COMPILED = f"{PICTURES} {SCIPY} numba scipy"
         ),
         (f"{SCIPY} numba scipy pandas railsim.model railsim.studies", ["plot", "result.h5"]),
         (
-            f"{PICTURES} {SCIPY} railsim.report railsim.assessment railsim.stability",
+            f"{PICTURES} {SCIPY} railsim.report railsim.assessment railsim.stability"
+            " railsim.studies.execute railsim.studies.summary",
             ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "5"],
         ),
     ],

@@ -125,7 +125,7 @@ class Track(FileDefinition, Plottable):
     """Ranges in which the section of a rail changes, such as crossings"""
     check_rail: tuple[CheckRail, ...] = Field(default=(), max_length=MOST_CHECK_RAILS)
     """Check rails and guard rails"""
-    support: Support = Support()
+    support: Support = Support.model_construct()
     """What carries the rails: rigid, or elastic as a moving track model"""
 
     @property
