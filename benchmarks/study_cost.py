@@ -22,7 +22,7 @@ use_one_thread()  # before numpy is imported, as the command does: idle threads 
 
 import numpy as np  # noqa: E402
 
-from railsim.studies import study  # noqa: E402
+from railsim.studies.study import study  # noqa: E402
 
 
 def main() -> None:
