@@ -24,7 +24,7 @@ from railsim.errors import RailsimError
 from railsim.kernels.compiler import entry
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
-from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP, SPEED, TIME
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import AGAIN, N_PARTS
 from railsim.kernels.time_loop import Chunk, time_loop
@@ -232,7 +232,7 @@ def advance(
 
 
 def _matching(runs: Sequence[Run], settings: Settings) -> list[list[Run]]:
-    """Runs that can be one system: with one speed and one grid of contact tables."""
+    """Runs that can be one system: with one speed, last step and grid of contact tables."""
     if settings.drive.mode == "free":
         return [[run] for run in runs]
     groups: dict[tuple[float | int, ...], list[Run]] = {}
@@ -240,7 +240,9 @@ def _matching(runs: Sequence[Run], settings: Settings) -> list[list[Run]]:
         model = run.prepared.model
         # what follows commands or laws of one's own runs alone
         alone = number if len(model.system.own.memory) > 1 else -1
-        groups.setdefault((alone, *contact_grid(model)), []).append(run)
+        # a strike on the way to the start divides the last step there
+        key = alone, float(run.state[LAST_STEP]), *contact_grid(model)
+        groups.setdefault(key, []).append(run)
     return list(groups.values())
 
 

@@ -162,6 +162,17 @@ def test_vehicles_on_irregular_elastic_rails_are_together_as_alone():
         assert result.attributes["contacts_evaluated_again"] > 100
 
 
+def test_vehicles_whose_last_steps_on_the_way_to_the_start_differ_run_as_alone():
+    """A strike divided that of one of them; the step is part of what its rails are to do next."""
+    coaches = [load_vehicle("coach_manchester"), load_vehicle("coach_manchester", [HEAVIER])]
+    track = load_any_track("straight").replace(irregularities=[{**IRREGULAR[0], "scale": 4.0}])
+    how = {"speed": 60.0, "duration": 0.01, "settings": Settings(step=0.5e-3)}
+    for vehicle, result in zip(coaches, simulate_together(coaches, track, **how), strict=True):
+        alone = simulate(vehicle, track, **how)
+        np.testing.assert_array_equal(result.groups["state"]["end"], alone.groups["state"]["end"])
+        np.testing.assert_array_equal(result.Q, alone.Q)
+
+
 def test_vehicle_that_lifts_a_wheel_goes_on_as_alone():
     track = load_track("straight").replace(irregularities=[{**AT, "rail": "left"}])
     coaches = [load_vehicle("coach_manchester"), load_vehicle("coach_flexicoil")]
