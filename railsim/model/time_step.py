@@ -50,11 +50,11 @@ PART = {FAST: 1e-4, RK4: 2.5e-4}
 PART_ELASTIC = 1.25e-3 / 3.0
 # share of the static wheel load by which a contact force may change in a step that is not divided,
 # on rigid and on elastic rails, where no vibration follows: on smooth curves no step is
-FORCE_CHANGE, FORCE_CHANGE_ELASTIC = 0.1, 0.2
+FORCE_CHANGE, FORCE_CHANGE_ELASTIC = 0.15, 0.2
 # the same of a part of a divided step, which is no shorter than `PART` for it
-PART_CHANGE, PART_CHANGE_ELASTIC = 0.05, 0.2
+PART_CHANGE, PART_CHANGE_ELASTIC = 0.08, 0.2
 # what a change of the lateral force counts: flanges strike sideways
-SIDEWAYS_RIGID, SIDEWAYS_ELASTIC = 6.0, 4.0
+SIDEWAYS_RIGID, SIDEWAYS_ELASTIC = 10.0, 4.0
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve
 GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
