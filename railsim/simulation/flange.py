@@ -124,11 +124,7 @@ def _brought(
     rail = system.track.rail
     friction = float(np.max(rail[:, MU_LEFT, 0])), float(np.max(rail[:, MU_RIGHT, 0]))
     auxiliary = curve_to_settle_in(model, track, speed, *curve, friction, times, *lengths)
-    smooth = without_loads(system)._replace(
-        track=track_tables(auxiliary),
-        drive=CONSTANT_SPEED,
-        support=system.support._replace(variation=system.support.variation[:0]),
-    )
+    smooth = without_loads(system)._replace(track=track_tables(auxiliary), drive=CONSTANT_SPEED)
     contact = smooth.contact
     damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))
     state = rolling.copy()

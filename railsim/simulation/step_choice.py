@@ -24,7 +24,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
-from railsim.linear.steady import NotConverged
+from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
 from railsim.model.solutions import solution
@@ -209,6 +209,13 @@ class StepChoice:
         self, model: Model, speed: float, state: Floats | None, *, of_class: bool = False
     ) -> Stability:
         rolling = equilibrium(model, speed, self._inputs).state if state is None else state
+        level = level_track_with_friction(model.system)
+        if len(rows := model.system.support.variation):  # judged on the stiffest rails
+            support = model.system.support._replace(variation=rows.max(axis=0, keepdims=True))
+            model = replace(model, system=model.system._replace(support=support))
+            level = level._replace(support=support)
+            with suppress(NotConverged):  # then where the vehicle stands on those without factor
+                rolling = SteadyRolling(model, level).solve(rolling, speed)
 
         def curving(step: float) -> list[Situation]:
             at = in_flange_contact(model, self._track, rolling, step, self._progress)
@@ -221,7 +228,6 @@ class StepChoice:
                     found.append(at_rest_beside(model, at, *other))
             return found
 
-        level = level_track_with_friction(model.system)
         return Stability(model, level, rolling, self._settings.scheme, curving)
 
 

@@ -22,8 +22,8 @@ from railsim.kernels.support import (
     support_begin,
 )
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.model.time_step import SCHEMES, empty_recorder
-from railsim.model.work import work_arrays
+from railsim.model.time_step import SCHEMES, _step_growth, empty_recorder
+from railsim.model.work import level_track_with_friction, work_arrays
 from railsim.simulation import simulate
 from railsim.simulation.outputs import rail_deflection
 
@@ -218,6 +218,49 @@ def test_support_that_varies_along_the_track():
     before = deflection[(s > 30.0) & (s < 40.0)].mean()
     behind = deflection[(s > 90.0) & (s < 100.0)].mean()
     assert behind == pytest.approx(0.5 * before, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "speed", "support", "transient"),
+    [
+        ("wagon_uic_link", 20.0, {"preset": "p2"}, False),
+        ("metro_b_trailer", 15.0, {"preset": "p2"}, False),
+        ("metro_b_trailer", 15.0, {"preset": "p2"}, True),
+        ("metro_b_trailer", 15.0, {"preset": "slab", "variation": [[0.0, 2.5]]}, False),
+        ("coach_manchester", 30.0, {"preset": "ballasted", "variation": [[0.0, 10.0]]}, False),
+    ],
+)
+def test_nothing_moves_on_smooth_straight_rails(vehicle, speed, support, transient):
+    """Below the critical speed what round-off leaves dies away: the step is a stable one."""
+    track = load_track("straight").replace(support=support)
+    settings = Settings(transient_creep=transient)
+    result = simulate(load_vehicle(vehicle), track, speed=speed, duration=1.0, settings=settings)
+    assert np.abs(result.sum_Y).max() < 1e-3
+    assert np.abs(result.Q - result.Q[0]).max() < 1e-3
+
+
+@pytest.mark.parametrize("step", [2.5e-3, 5e-3 / 3.0])
+def test_growth_that_is_judged_is_that_of_a_run(step):
+    """A small disturbance grows in the time loop with the largest eigenvalue of the map judged."""
+    balance = steady(load_vehicle("wagon_uic_link"), on("p2"), Settings(), 20.0)
+    model, state = balance.model, balance.state
+    system = level_track_with_friction(model.system)
+    judged = _step_growth(model, system, state, "fast", step)
+    state, n = state.copy(), model.index.n_bodies
+    wheelset = 6 * n + model.index.coordinate(model.index.wheelsets[0], 0)
+    state[wheelset + 1 : wheelset + 4] += 1e-9  # across, down, roll
+    recorder, rest = empty_recorder(model, 1), (np.zeros_like(state), np.zeros((3, len(state))))
+    work, sizes = work_arrays(system), []
+    for number in range(400):
+        chunk = Chunk(number, 1, 1 << 40, fresh=int(number == 0))
+        time_loop(system, work, state, *rest, recorder, SCHEMES["fast"], step, chunk)
+        sizes.append(np.abs(state[6 * n : 12 * n].reshape(n, 6)[:, 1:4]).max())
+        if sizes[-1] > 1e-6:
+            break
+    part = len(sizes) // 2
+    grown = np.log(sizes[-1] / sizes[-1 - part]) / (part * step)
+    assert judged == pytest.approx(grown, rel=0.1)
+    assert judged > 50.0  # 1/s
 
 
 def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_moved():
