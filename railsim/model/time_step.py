@@ -41,8 +41,9 @@ LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 2.5e-3}
 LONGEST_TRAVEL, LONGEST_TRAVEL_ELASTIC, LONGEST_TRAVEL_STABLE = 0.06, 0.067, 0.1
 SHORTEST_STEP = 1e-6  # s
 # a step is taken if one longer by this factor is stable too: a wheel load of twice the static one
-# raises the frequency of the contact, which goes with the sixth root of the load, by as much
-MARGIN = 2.0 ** (1.0 / 6.0)
+# raises the frequency of the contact, which goes with the sixth root of the load, by as much; by at
+# most half of it where the contact is in series with rails that are no stiffer than it is
+MARGIN, MARGIN_ELASTIC = math.pow(2.0, 1.0 / 6.0), math.pow(2.0, 1.0 / 12.0)
 # Where a wheel lifts or strikes a step is divided into parts, down to this length (s): a fiftieth
 # of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
 PART = {FAST: 1e-4, RK4: 2.5e-4}
@@ -153,6 +154,11 @@ class Stability:
             usual = stable if growth < NEUTRAL else usual
         return min(most, usual)
 
+    @property
+    def margin(self) -> float:
+        """Factor by which a step that is stable too is longer than one that is taken."""
+        return MARGIN_ELASTIC if self._straight[0].support.elastic else MARGIN
+
     def choose(self, interval: float, holds: Callable[[float], bool] | None = None) -> float:
         """Longest stable step that divides the output interval, with the margin; or ModelError.
 
@@ -160,7 +166,7 @@ class Stability:
         """
         n = max(1, int(np.ceil(interval / self.longest * (1.0 - 1e-9))))
         while interval / n >= SHORTEST_STEP:
-            if holds(interval / n) if holds else self.holds(interval / n, MARGIN):
+            if holds(interval / n) if holds else self.holds(interval / n, self.margin):
                 return interval / n
             n = max(n + 1, int(n * 1.1))
         cause = "an element is too stiff for the masses it connects"

@@ -28,7 +28,7 @@ from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
 from railsim.model.solutions import solution
-from railsim.model.time_step import MARGIN, Situation, Stability
+from railsim.model.time_step import Situation, Stability
 from railsim.model.work import level_track_with_friction
 from railsim.simulation.auxiliary_track import Progress
 from railsim.simulation.flange import at_rest_beside, in_flange_contact
@@ -153,7 +153,7 @@ class StepChoice:
             if self._fails_in_class(speed, step):
                 return False
             by_class = False  # its ends do not tell, for shorter steps neither
-            return own.holds(step, MARGIN)
+            return own.holds(step, own.margin)
 
         return own.choose(interval, holds)
 
@@ -194,7 +194,8 @@ class StepChoice:
             try:
                 if end not in self._classes:
                     self._classes[end] = self._stability(model, speed, None, of_class=True)
-                return {"holds": judge(self._classes[end], step, MARGIN)}
+                judged = self._classes[end]
+                return {"holds": judge(judged, step, judged.margin)}
             except ModelError:  # no steady rolling there: the run's own speed is judged
                 return {"holds": False}
 
