@@ -22,7 +22,9 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.rhs import STANDSTILL_SPEED
+from railsim.kernels.system import BRAKES, RADIUS, System
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
@@ -37,6 +39,7 @@ CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
 WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
+HELD = 1.6  # z in `braked_step`
 MOST_JUDGED = 10_000
 # whether steps hold in classes that this process has judged or read, by a hash of all inputs
 _JUDGED: dict[str, bool] = {}
@@ -81,6 +84,7 @@ class StepChoice:
         self._known: dict[float, float] = {}
         self._classes: dict[str, Stability] = {}
         self._states = states
+        self._braked = braked_step(model.system)
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
 
@@ -93,7 +97,7 @@ class StepChoice:
         longest = self._known.get(key) or self._choose(key, interval)
         self._known[key] = longest
         if self._settings.step is None:
-            longest = min(longest, self._model.wheels.longest_step(speed))
+            longest = min(longest, self._model.wheels.longest_step(speed), self._braked)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         for finer in range(every, 2 * every + 1) if self._periods else ():
@@ -253,6 +257,22 @@ def with_class_friction(model: Model, *, least: bool = False) -> Model:
     number = np.ceil(friction / FRICTION_CLASS - 1e-9) - float(least)
     rail[:, MU_LEFT : MU_RIGHT + 1, 0] = FRICTION_CLASS * number
     return replace(model, system=model.system._replace(track=track._replace(rail=rail)))
+
+
+def braked_step(system: System) -> float:
+    """Longest step with which brakes hold a locked wheelset still [s].
+
+    Below `BRAKES_FULLY` they are dampers of its spin, which alternates from z = h c/I = 1.7 on.
+    """
+    drives, bodies = system.drives, system.bodies
+    torque = np.zeros(len(bodies.kind))
+    for e in np.flatnonzero(drives.row[:, BRAKES] > 0.0):
+        first, demand, end = drives.start[2 * e : 2 * e + 3]
+        factors = np.abs(drives.table[demand:end, 1])
+        most = np.abs(drives.table[first:demand, 1]).max()
+        torque[drives.body[e, 1]] += most * (factors.max() if end > demand else 1.0)
+    rate = torque * bodies.row[:, RADIUS] / (BRAKES_FULLY * bodies.inertia[:, 1])
+    return HELD / fastest if (fastest := float(rate.max())) else math.inf
 
 
 def inputs_hash(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> str:

@@ -186,6 +186,18 @@ def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back():
     assert result["axle_torque"][-1] == pytest.approx(on_wheels(result)[-1] * RADIUS, rel=0.01)
 
 
+def test_locked_wheelsets_of_a_coach_stand_still():
+    """The torque that the rails give does not alternate, whatever step straight track allows."""
+    coach = railsim.load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    brake = traction(kind="brake", torque_table=[[0.0, 25e3]])
+    coach["assemblies"]["bogie"]["assemblies"]["axle"]["elements"]["brake"] = brake
+    result = run(Vehicle.model_validate(coach), friction=0.1, duration=2.5)
+    late = result["time"] > 2.0
+    torque = result["axle_torque"][late]
+    assert torque[-1] == pytest.approx(on_wheels(result)[-1] * RADIUS, rel=0.01)
+    assert np.ptp(torque, axis=0).max() < 0.01 * np.abs(torque).max()
+
+
 def test_nose_suspended_motor_carries_its_reaction():
     """A motor on the axle and a nose on the frame: the nose's force changes by T over its lever.
 
