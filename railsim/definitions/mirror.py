@@ -10,12 +10,14 @@ from railsim.definitions.base import OTHER_SIDE, Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.definitions.vehicle.tables import Assembly, Axlebox, Body, Placement, Wheelset
+from railsim.definitions.vehicle.loads import LoadCase, LoadGroup
+from railsim.definitions.vehicle.tables import Assembly, Axlebox, Body, Placement, Point, Wheelset
 
 SIGNS = (1.0, -1.0, 1.0)
 
 Group = TypeVar("Group", Vehicle, Assembly)
-Part = TypeVar("Part", Body, Wheelset, Axlebox, Placement)
+Load = TypeVar("Load", LoadCase, LoadGroup)
+Part = TypeVar("Part", Body, Wheelset, Axlebox, Placement, Point)
 Row = tuple[float, float, float]
 
 
@@ -46,8 +48,27 @@ def _sides_exchanged(rows: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
 
 
 def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:
-    """Return the mirror image of a vehicle; parts on both sides keep their names."""
-    return _mirrored_group(vehicle)
+    """Return the mirror image of a vehicle; parts on both sides keep their names.
+
+    Its load cases and sensors are mirrored too; signals and what controllers do with them are not.
+    """
+    return _mirrored_group(vehicle).model_copy(
+        update={
+            "loads": {name: _mirrored_load(load) for name, load in vehicle.loads.items()},
+            "sensors": {name: _moved(point) for name, point in vehicle.sensors.items()},
+        }
+    )
+
+
+def _mirrored_load(load: Load) -> Load:
+    bodies = {
+        name: body.model_copy(
+            update={"position": None if body.position is None else _across(body.position)}
+        )
+        for name, body in load.bodies.items()
+    }
+    groups = {name: _mirrored_load(group) for name, group in load.assemblies.items()}
+    return load.model_copy(update={"bodies": bodies, "assemblies": groups})
 
 
 def _mirrored_group(group: Group) -> Group:

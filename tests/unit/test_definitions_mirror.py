@@ -7,6 +7,7 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.model.statics import static_loads
 from railsim.track.tables import track_tables
 
 RICH = {
@@ -108,3 +109,12 @@ def test_lopsided_vehicle_changes_sides():
     assert flat.elements[0].point1[1] == -0.7
     assert flat.elements[0].definition.preload == (0.0, -5.0, -100.0)
     assert flat.elements[1].point2[1] == -0.8
+
+
+def test_lopsided_load_changes_sides():
+    """Of a wagon whose load lies to one side: the static wheel loads of the other."""
+    wagon = load_vehicle("wagon_y25", ["load=uneven"])
+    here, there = static_loads(wagon), static_loads(mirrored_vehicle(wagon))
+    left, right = np.array(here.Q0).T
+    assert right.sum() != pytest.approx(left.sum(), rel=0.01)
+    np.testing.assert_allclose(np.array(there.Q0)[:, ::-1], here.Q0, rtol=1e-6)
