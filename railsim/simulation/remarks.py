@@ -66,6 +66,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
     found = [
         *run.remarks,
         *run.prepared.remarks,
+        evaluated_whole(run.prepared.evaluation - float(run.prepared.state[TIME]), duration),
         *beyond_experience(extremes, Q0, wheelsets),
         lifted_wheels(extremes, run.unloaded, wheelsets),
         stability(swings, extremes, duration) if hunts or not uneven else "",
@@ -85,6 +86,16 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         uneven_wheels_on(support) if uneven else "",
     ]
     return tuple(dict.fromkeys(filter(None, found)))
+
+
+def evaluated_whole(left_out: float, duration: float) -> str:
+    """Remark on a run that is over before its peaks were to be evaluated [s]."""
+    if duration > left_out or not left_out:
+        return ""
+    return (
+        f"The run ended within the {left_out:.3g} s after the start that tables of peaks leave out "
+        "(settings.outputs.evaluate_after): they hold the peaks of all of it."
+    )
 
 
 def beyond_experience(

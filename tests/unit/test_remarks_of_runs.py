@@ -28,6 +28,17 @@ def test_patches_outside_the_creep_law_are_a_share_of_all():
     assert remark.startswith("5 of 1000 contact patches in the time loop (5.0e-03)")
 
 
+def test_peaks_of_a_run_that_ends_before_they_are_to_count_are_told():
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    settings = railsim.Settings().with_values({"outputs.evaluate_after": 3.0})
+    short, long = (
+        railsim.simulate(vehicle, track, speed=20.0, duration=t, settings=settings)
+        for t in (0.2, 3.2)
+    )
+    assert any("within the 3 s" in remark for remark in short.remarks)
+    assert not any("evaluate_after" in remark for remark in long.remarks)
+
+
 @pytest.mark.parametrize(("hunts", "cause"), [(False, "sliding friction"), (True, "hunts")])
 def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(hunts, cause):
     """35 Hz pass a high pass at 40 Hz in part; a hunting vehicle strikes its flanges."""
