@@ -16,23 +16,24 @@ from railsim.plot.selection import STUDY, Panel, panels
 from railsim.result import Result
 from railsim.text import unformatted
 
-LEADING = tuple(f"{name}:1" for name in STUDY)
-"""Default quantities of comparisons: those of the leading wheelset."""
+WHEELS = {"time", "wheelset", "side"}
 
 
 @style.styled()
 def overlay(
-    results: Mapping[str, Result], selections: Sequence[str] = LEADING, *, over: str = "distance"
+    results: Mapping[str, Result], selections: Sequence[str] = (), *, over: str = "distance"
 ) -> Figure:
     """Draw the same quantities of several results into the same axes, a colour for each result.
 
     `results`: By what they are called in the picture. `selections`: Quantities and labels, see
-    `railsim.plot.selection`; all results must have them. `over` ({"distance", "time"}): Horizontal
+    `railsim.plot.selection`; all results must have them; by default those of the leading wheelset
+    that they have. `over` ({"distance", "time"}): Horizontal
     axis; the distance is that of the reference body.
     """
     for label, result in results.items():
         check_not_empty(result, label)
-    drawn = {label: panels(result, tuple(selections)) for label, result in results.items()}
+    chosen = tuple(selections or _leading(list(results.values())))
+    drawn = {label: panels(result, chosen) for label, result in results.items()}
     first = next(iter(results.values()))
     plans = [curvature_sections(result.track()) for result in results.values()]
     ends = [[(section.type, section.begin, section.end) for section in plan] for plan in plans]
@@ -83,6 +84,19 @@ def _legend(figure: Figure, labels: Sequence[str], sides: set[str | None], first
     fitting = int(figure.get_figwidth() / (0.5 + 0.075 * longest))
     columns = max(1, min(6, len(handles), fitting))
     figure.legend(handles=handles, loc="outside lower left", ncols=columns)
+
+
+def _leading(results: Sequence[Result]) -> list[str]:
+    """Quantities of `STUDY` of the leading wheelset; where some lack all, others that all have."""
+    common = [
+        f"{name}:1" if "wheelset" in quantity.dims else name
+        for name, quantity in results[0].quantities.items()
+        if quantity.dims[0] == "time"
+        and WHEELS.issuperset(quantity.dims)
+        and all(name in result for result in results)
+    ]
+    study = [name for name in (f"{one}:1" for one in STUDY) if name in common]
+    return study or [name for name in common if name not in ("time", "distance")]
 
 
 @style.styled()

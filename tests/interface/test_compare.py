@@ -6,6 +6,7 @@ import json
 import pytest
 from example_result import example_result
 
+import railsim
 from railsim.cli import main
 from railsim.compare import compare
 
@@ -74,6 +75,17 @@ def test_folder_holds_table_record_and_picture(files, tmp_path):
     assert float(rows[0]["difference"]) == 0.0
     assert {row["result"] for row in rows} == {"base", "lower"}
     assert json.loads((folder / "compare.json").read_text())["results"] == ["base", "lower"]
+
+
+def test_results_that_keep_few_quantities_are_drawn_by_what_all_have(tmp_path):
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    paths = []
+    for name, kept in (("wheels", ["Q", "sum_Y"]), ("loads", ["Q"])):
+        settings = railsim.Settings().with_values({"outputs.quantities": kept})
+        run = railsim.simulate(vehicle, track, speed=20.0, duration=0.1, settings=settings)
+        paths.append(str(run.to_hdf5(tmp_path / f"{name}.h5")))
+    assert main(["compare", *paths, "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "compare.png").stat().st_size > 0
 
 
 def test_existing_comparison_is_kept_without_overwrite(files, tmp_path, capsys):
