@@ -18,6 +18,7 @@ from railsim.text import shortened
 from railsim.units import speed_in_si
 
 SPEED_RANGE = (0.5, 150.0)  # m/s
+AS_IN_TABLE = 1e-3  # share by which a speed at the start may differ from that of a speed table
 STATES = ("end", "memory")
 """Of a result's group `state`, what a run goes on from."""
 # settings that a continued run may have of its own; it has no start and no initial disturbance
@@ -89,7 +90,11 @@ def initial_speed(settings: Settings, speed: float | None, start: float) -> floa
     """Speed at the start: as given, or from the settings' speed table [m/s]."""
     if settings.drive.speed_table is not None:
         distance, value = np.array(settings.drive.speed_table).T
-        return float(np.interp(start, distance, value))
+        first = float(np.interp(start, distance, value))
+        if speed is not None and not math.isclose(speed, first, rel_tol=AS_IN_TABLE):
+            allowed = f"none, or {first:g} m/s, that of settings.drive.speed_table at the start"
+            raise InputError([argument_fault("speed", "", f"found {speed:g} m/s", allowed)])
+        return first
     if speed is None:
         raise InputError(
             [argument_fault("speed", "", "no speed is given", "a speed in m/s, e.g. 20")]

@@ -33,6 +33,15 @@ def straight():
     return load_track("straight")
 
 
+def test_speed_beside_a_table_is_that_of_the_table(bogie, straight):
+    """Another one would have no effect."""
+    settings = in_table()
+    first = RAMP[0][1]
+    assert simulate(bogie, straight, speed=first, settings=settings, until=1.0).speed == first
+    with pytest.raises(InputError, match=f"found {first + 5:g} m/s; none, or {first:g} m/s"):
+        simulate(bogie, straight, speed=first + 5.0, settings=settings, until=1.0)
+
+
 def test_speed_table_is_met(bogie, straight):
     """V(s) of the table at every output, by the state's own speed: round-off of the table."""
     result = simulate(bogie, straight, settings=in_table(), until=200.0)
