@@ -225,33 +225,36 @@ def _obstacle(
         found = f"{under} lifts the arm off its springs (below {lowest * 1e-3:.3f} kN)"
         return "lifted", found, "raise this load, or reduce mounting.load against it"
 
-    def load_at(coil: Coil, deflection: float) -> str:
-        """Load at which a spring reaches a deflection, nan beyond the arm's reach."""
-        turned = trailing_arm.rotation_of_rise(frame.length, coil.seat, deflection - coil.start)
-        return f"{float(trailing_arm.load(frame, turned)) * 1e-3:.1f} kN"
+    def met_at(coil: Coil, deflection: float) -> tuple[float, str]:
+        """Rotation and load at which a spring reaches a deflection, nan beyond the arm's reach."""
+        at = trailing_arm.rotation_of_rise(frame.length, coil.seat, deflection - coil.start)
+        load = f"{float(trailing_arm.load(frame, at)) * 1e-3:.1f} kN"
+        return float(np.nan_to_num(at, nan=np.inf)), load
 
     met: list[tuple[float, tuple[str, str, str]]] = []
     solid = solid_heights(suspension)
     for name, coil in zip(suspension.springs, frame.coils, strict=True):
         turned = highest_phi if np.isnan(phi) else phi
         rise, _ = trailing_arm.displacement(frame.length, coil.seat, turned)
-        H0, seating = float(coil.H0), suspension.checks.seating
+        seating = suspension.checks.seating
         buckling = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, seating))
         if coil.start + rise >= buckling:
-            end = f"{buckling * 1e3:.1f} mm, under {load_at(coil, buckling)}"
+            at, there = met_at(coil, buckling)
+            end = f"{buckling * 1e3:.1f} mm, under {there}"
             found = f"{under} buckles the {name} spring: it buckles at {end}"
             remedy = (
                 f"reduce {name}.free_height, raise {name}.mean_diameter, or hold the seats against "
                 "sideways movement (checks.seating = 0.5)"
             )
-            met.append((buckling / H0, (f"{name} buckled", found, remedy)))
-        travel = H0 - solid[name]
+            met.append((at, (f"{name} buckled", found, remedy)))
+        travel = float(coil.H0) - solid[name]
         if coil.start + rise >= travel:
-            end = f"{solid[name] * 1e3:.1f} mm is reached under {load_at(coil, travel)}"
+            at, there = met_at(coil, travel)
+            end = f"{solid[name] * 1e3:.1f} mm is reached under {there}"
             found = f"{under} is beyond the solid height of the {name} spring: {end}"
             less = f"reduce this load, {name}.active_coils or {name}.wire_diameter"
             remedy = f"{less}, or raise {name}.free_height"
-            met.append((travel / H0, (f"{name} solid", found, remedy)))
+            met.append((at, (f"{name} solid", found, remedy)))
     if met:
         return min(met, key=lambda item: item[0])[1]
     if np.isnan(phi):
