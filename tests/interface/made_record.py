@@ -48,6 +48,7 @@ def made(
     Y=None,
     Q=None,
     lateral=None,
+    accelerations=None,
     without=(),
     status="complete",
     settings="{}",
@@ -63,6 +64,8 @@ def made(
         Time [time] and distance [time, wheelset] to forces [time, wheelset, side].
     lateral : callable, optional
         Time to the lateral acceleration of the car body.
+    accelerations : callable, optional
+        Time to the accelerations [time, body, 3] of all bodies.
     """  # fmt: skip
     time = np.arange(round((until or on.length) / speed * rate) + 1) / rate
     distance = speed * time
@@ -78,6 +81,8 @@ def made(
     acceleration[:, :, 2] -= 9.81
     if lateral is not None:
         acceleration[:, 0, 1] = lateral(time)
+    if accelerations is not None:
+        acceleration[:, :, :3] += accelerations(time)
     given = {
         "time": time, "distance": distance, "Q": loads, "Y": forces, "Y_over_Q": quotient,
         "wheelset_distance": at,
