@@ -300,6 +300,61 @@ def test_laws_of_wear_hold_for_each_patch():
     assert wheel.rail_damage == pytest.approx(7e-6)
 
 
+def by_hand(T, area, against, D):
+    """Pearce and Sherratt [mm2/km], USFD [ug/m] and WLRM [1e-6] of wear numbers, as printed."""
+    pearce = np.where(T < 100.0, 0.25 * T, np.where(T < 200.0, 25.0, 1.19 * T - 154.0)) / D
+    x = np.divide(T, area, out=np.zeros_like(T), where=area > 0.0)  # N/mm2
+    usfd = np.where(x < 10.4, 5.3 * x, np.where(x < 77.2, 55.0, 55.0 + 61.9 * (x - 77.2))) * area
+    damage = np.interp(T, [15.0, 65.0, 175.0, 11175.0], [0.0, 10.0, 0.0, -1000.0])
+    return pearce, usfd, np.where(against, damage, 0.0)
+
+
+@pytest.mark.parametrize("patched", [False, True])
+def test_wear_of_any_run_is_the_mean_over_the_distance_of_the_printed_laws(patched):
+    """Random wear numbers on a run whose speed changes; the first three seconds do not count."""
+    random = np.random.default_rng(8)
+    whole = made(track(STRAIGHT), FAST, until=160.0)
+    shape = whole.T_gamma.shape
+    way = FAST / 1000.0 * (1.0 + np.linspace(0.0, 0.5, shape[0]))
+    T = random.lognormal(4.0, 1.0, (*shape, 3)) * random.integers(0, 2, (*shape, 3))
+    T_x = random.normal(size=T.shape)
+    changed = {"distance": np.cumsum(way), "T_gamma": T.sum(axis=-1), "xi_x": T_x.sum(axis=-1)}
+    arrays = {name: whole[name] for name in whole} | changed
+    whole = Result(arrays, whole.quantities, whole.coordinates, whole.attributes, whole.profiles)
+    area = np.where(random.uniform(size=T.shape) < 0.7, 12.0 * np.pi, 0.0)  # mm2
+    if patched:
+        T = np.where(area > 0.0, T, 0.0)
+        whole = with_patches(whole, {
+            "patch_T_gamma": T, "patch_N": 1e4 * np.sign(area), "patch_a": 4e-3 + 0.0 * T,
+            "patch_b": 3e-3 + 0.0 * T, "patch_T_x": T_x, "patch_T_y": 0.0 * T,
+        })  # fmt: skip
+    else:
+        T, T_x, area = whole.T_gamma[..., None], whole.xi_x[..., None], 0.0
+    (found,) = assess(whole, "wear")
+    counted = slice(3000, len(way) - 1)  # the last step of a run may be shorter
+    ways = np.gradient(whole.distance)[counted, None, None, None]
+    pearce, usfd, damage = by_hand(T, area + 0.0 * T, T_x < 0.0, 920.0)
+    for k, wheel in enumerate(next(iter(found.wear.values()))):
+        own = counted, k // 2, k % 2
+
+        def mean(x, own=own, ways=ways[:, 0, 0]):
+            return np.sum(x[own] * ways, axis=0) / np.sum(ways)
+
+        number = whole.T_gamma[own]
+        assert wheel.place == f"wheelset {k // 2 + 1} {('left', 'right')[k % 2]}"
+        assert wheel.T_gamma == pytest.approx(np.sum(number * ways[:, 0, 0, 0]) / np.sum(ways))
+        assert list(wheel.percentiles) == ["50", "95", "99.85"]
+        for share, value in wheel.percentiles.items():
+            exact = np.percentile(number, float(share), method="higher")
+            assert value == pytest.approx(exact, abs=wheel.bound)
+        assert wheel.worn_area["pearce_sherratt"] == pytest.approx(1e-9 * mean(pearce).sum())
+        parts = mean(damage)
+        assert wheel.rail_damage == pytest.approx(1e-6 * parts[np.argmax(np.abs(parts))])
+        if patched:
+            expected = 1e-9 * mean(usfd).sum() / (7850.0 * np.pi * 0.92)
+            assert wheel.worn_area["usfd"] == pytest.approx(expected)
+
+
 def test_surface_fatigue_is_that_of_the_worst_patch():
     """FI = T/N - 2 pi a b k/(3 N) (Ekberg 2002), and where it lies in the shakedown map."""
     whole = made(track(STRAIGHT), FAST)
