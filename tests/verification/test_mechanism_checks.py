@@ -1,0 +1,108 @@
+"""Checks of the pantograph's lifts against lengths, energies and angles of many positions.
+
+Forces are those of the potential energy over the actuator's length, by differences; nothing of how
+the program finds least and largest values between positions is used.
+"""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.loading import load_mechanism
+from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.checks import checks
+from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.selection import selection
+from railsim.mechanisms.summary import analysis_data
+
+MASSES = {"boom": 22.68, "trapezoid": 16.17, "head": 14.58}
+CHANGES = [
+    "optimise.min_length=0.43", "optimise.max_stroke=0.11",
+    "parameters.cylinders=2", "parameters.bore=0.12",
+    "optimise.envelope=[{points=['boom.tip','slide.pin'],x=[0.3,1.8],y=[0.1,1.3]}]",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result():
+    return analyse(load_mechanism("atr95_lift_4", CHANGES))
+
+
+@pytest.fixture(scope="module")
+def seen(result):
+    """Lengths, heights, forces and angles at even positions of the travel."""
+    model = result.model
+    motion = solve(model, np.linspace(model.start, model.end, 4001))
+    places = {name: motion.point(name)[0] for name in model.points}
+    head = places[result.definition.output.point]
+    tip, hinge, pin = (places[f"boom.{name}"] for name in ("tip", "hinge", "pin"))
+    slide, foot = places["slide.pin"], places["ground.foot"]
+    centre = 0.5 * (hinge + tip)[:, 1], 0.5 * (tip + head)[:, 1], head[:, 1]
+    energy = 9.81 * sum(m * y for m, y in zip(MASSES.values(), centre, strict=True))
+    length = np.hypot(*(foot - slide).T)
+    force = np.gradient(energy, motion.s, edge_order=2) / np.gradient(
+        length, motion.s, edge_order=2
+    )
+    d = {"rod": pin - slide, "crank": pin - hinge}
+    lines = [np.arctan2(*d[name].T[::-1]) for name in ("rod", "crank")]
+    return {
+        "length": length, "height": head[:, 1] - head[0, 1], "force": force, "tip": tip,
+        "slide": slide, "mu": lines[0] - lines[1], "mu_prime": lines[0] - 0.5 * np.pi,
+        "energy": energy, "s": motion.s,
+    }  # fmt: skip
+
+
+def test_checks_are_those_of_all_positions(result, seen):
+    length, force = seen["length"], seen["force"]
+    area = 2.0 * 0.25 * np.pi * 0.12**2
+    stroke = np.ptp(length)
+    made = min(s for s in (0.08, 0.1, 0.125, 0.16) if s >= stroke)
+    sharp = {name: np.min(np.arcsin(np.abs(np.sin(seen[name])))) for name in ("mu", "mu_prime")}
+    both = np.concatenate([seen["tip"], seen["slide"]])
+    height = [np.interp(y, seen["height"], seen["s"]) for y in (0.5955, 0.8955, 1.1955)]
+    needed = [np.interp(s, seen["s"], seen["force"]) for s in height]
+    rise = np.gradient(seen["height"], seen["s"]) / np.gradient(length, seen["s"])
+    per_length = [np.interp(s, seen["s"], rise) for s in height]
+    held = needed[1] + 100.0 * per_length[1]  # 100 N at work height
+    contact = [(held - F) / tau for F, tau in zip(needed, per_length, strict=True)]
+    wanted = [
+        ("available_force", np.max(force), 0.7e6 * area, "below"),
+        ("pulls", np.min(force), 0.0, "above"),
+        ("runs_ahead", np.min(force), 0.0, "above"),
+        ("mu", sharp["mu"], np.radians(40.0), "above"),
+        ("mu_prime", sharp["mu_prime"], np.radians(40.0), "above"),
+        ("min_length", np.min(length), 0.43, "above"),
+        ("max_stroke", stroke, 0.11, "below"),
+        ("pin_to_pin", np.min(length), 0.315 + made, "above"),
+        ("envelope.0", np.min(both[:, 0]), 0.3, "above"),
+        ("envelope.0", np.max(both[:, 0]), 1.8, "below"),
+        ("envelope.0", np.min(both[:, 1]), 0.1, "above"),
+        ("envelope.0", np.max(both[:, 1]), 1.3, "below"),
+        ("contact_force", np.min(contact), 0.0, "above"),
+    ]
+    found = checks(result)
+    assert [(one.name, one.sense) for one in found] == [(row[0], row[3]) for row in wanted]
+    for one, (name, value, limit, sense) in zip(found, wanted, strict=True):
+        assert (one.value, one.limit) == pytest.approx((value, limit), rel=2e-5), name
+        apart = (value - limit) * (1.0 if sense == "above" else -1.0)
+        assert one.ok == (apart >= -1e-5 * abs(limit)), name
+    assert result.contact.force == pytest.approx(
+        dict(zip(("low", "work", "high"), contact, strict=True)), rel=1e-4
+    )
+    assert result.contact.pressure == pytest.approx(held / area, rel=1e-5)
+    data = analysis_data(result, courses=False)
+    assert data["ok"] == all(one.ok for one in found)
+    assert data["max_force_at"] == pytest.approx(seen["s"][np.argmax(force)], abs=1e-3)
+    zone = [data["zone"]["force"][name] for name in ("low", "work", "high")]
+    assert zone == pytest.approx(needed, rel=1e-5)
+
+
+def test_a_bore_is_chosen_that_gives_the_largest_force_and_a_stroke_that_fits(result, seen):
+    """The least one: two cylinders of F/(2 p) each, one after the other of the made sizes."""
+    bore = np.sqrt(4.0 * np.max(seen["force"]) / (2.0 * 0.7e6 * np.pi))
+    stroke = np.ptp(seen["length"])
+    made = min(s for s in (0.08, 0.1, 0.125, 0.16) if s >= stroke)
+    short = np.min(seen["length"]) < 0.315 + made - 1e-9
+    for choice in selection(result):
+        size = 1e-3 * float(choice.name.split()[1])
+        assert choice.fits == (size >= bore and not short), choice
+        assert any("bore" in why for why in choice.reasons) == (size < bore)
