@@ -1,0 +1,208 @@
+"""Identification of models whose runs are known functions of the place: what least squares says.
+
+Two runs are sums of waves over the arc length, of amplitudes that are the parameters; both lie at
+places that are not known either.  Solution, covariance and levels are worked out a second time in
+the time domain: values less their mean, faded at both ends, projected on the waves of the band.
+"""
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import optimize, stats
+
+from railsim.identification.fit import _counting, _solved
+from railsim.identification.parameters import Parameter
+from railsim.identification.problem import Problem
+from railsim.identification.residuals import Form, whiteness
+from railsim.identification.runs import Prepared
+from railsim.identification.variants import Workers
+
+N, STEP, SPEED, BAND = 1200, 0.01, 20.0, (0.5, 8.0)
+FILE = SimpleNamespace(to_toml=lambda: "")
+WAVES = np.random.default_rng(3).uniform(3.0, 30.0, (3, 12))  # m
+PHASES = np.random.default_rng(4).uniform(0.0, 6.0, (3, 12))
+TRUE = {"a": 1.3, "b": 0.7}
+PLACES = [(0.8, 3e-4), (-1.1, -2e-4)]
+NOISE = np.array([0.6, 0.9])  # standard deviations of the channels, all frequencies
+
+
+def waves(k, s, slope=False):
+    """One of three signals over the arc length, or its slope."""
+    turns = 2.0 * np.pi * s[:, None] / WAVES[k] + PHASES[k]
+    return np.sum(2.0 * np.pi / WAVES[k] * np.cos(turns) if slope else np.sin(turns), axis=1)
+
+
+@dataclass(frozen=True)
+class Known:
+    """A run that is a formula."""
+
+    name: str
+    at: np.ndarray = field(repr=False)
+    scale: float = 1.0
+    speed: float = SPEED
+    until: float = 1e4
+    load: str | None = None
+    selections: tuple[str, ...] = ("one", "other")
+    track: SimpleNamespace = field(default_factory=lambda: FILE)
+    settings: SimpleNamespace = field(default_factory=lambda: FILE)
+
+    def simulated(self, model, parameters, x, slope):
+        a, b = (one.factor(value) for one, value in zip(parameters, x, strict=True))
+        rows = []
+        for k in (False, True) if slope else (False,):
+            u, v, w = (self.scale * waves(i, self.at, k) for i in range(3))
+            rows += [a * u + b * v, b * w]
+        return np.array(rows)
+
+
+def runs(random, noise):
+    """Two prepared runs of twelve seconds with noise of a standard deviation [1]."""
+    found = []
+    for number, (shift, stretch) in enumerate(PLACES):
+        at = 100.0 * number + SPEED * STEP * np.arange(N)
+        run = Known(f"run {number}", at, scale=1.0 + number)
+        there = replace(run, at=at + shift + stretch * (at - at[0]))
+        keys = [Parameter(name, (name,)) for name in TRUE]
+        values = there.simulated(None, keys, np.log(list(TRUE.values())), False)
+        values = values + noise * NOISE[:, None] * random.normal(size=(2, N))
+        in_band = NOISE * np.sqrt((BAND[1] - BAND[0]) / (0.5 / STEP))
+        measurement = SimpleNamespace(remarks=())
+        found.append(Prepared(run, values, ("one", "other"), in_band, STEP, measurement))
+    return found
+
+
+def identified(ready, parameters, place=True, loss="linear"):
+    model = SimpleNamespace(vehicle=FILE)
+    form = Form("history", BAND)
+    problem = Problem(model, parameters, ready, form, place, Workers(1), None, lambda n: None)
+    return _solved(problem, loss)
+
+
+def projection():
+    """Rows that take the mean off a record, fade one second of each end, and give the band."""
+    edge = round(1.0 / STEP)
+    fade = np.ones(N)
+    fade[:edge] = np.sin(0.5 * np.pi * (np.arange(edge) + 0.5) / edge) ** 2
+    fade[-edge:] = fade[:edge][::-1]
+    fade *= np.sqrt(N / np.sum(fade**2))
+    f = np.arange(N // 2) / (N * STEP)
+    turns = 2.0 * np.pi * f[(f >= BAND[0]) & (f <= BAND[1]), None] * STEP * np.arange(N)
+    rows = np.vstack([np.cos(turns), -np.sin(turns)]) * np.sqrt(2.0 / N)
+    return (rows * fade) @ (np.eye(N) - 1.0 / N)
+
+
+ROWS = projection()
+
+
+def vector(ready, z, place=True, spread=None):
+    """Weighted residuals at logarithms of the factors, shifts and stretches in 0.1 m/km."""
+    found = []
+    for number, one in enumerate(ready):
+        shift, stretch = z[2 + 2 * number : 4 + 2 * number] if place else (0.0, 0.0)
+        s = one.run.at
+        there = replace(one.run, at=s + shift + 1e-4 * stretch * (s - s[0]))
+        keys = [Parameter(name, (name,)) for name in TRUE]
+        values = there.simulated(None, keys, z[:2], False)
+        found += [
+            ROWS @ row / sigma for row, sigma in zip(one.measured - values, NOISE, strict=True)
+        ]
+    return np.concatenate([*found, [] if spread is None else [-z[1] / spread]])
+
+
+@pytest.mark.parametrize(("place", "spread", "noise"), [(True, None, 1.0), (True, 0.02, 2.0),
+                                                        (False, None, 1.0)])  # fmt: skip
+def test_solution_and_covariance_are_those_of_least_squares(place, spread, noise):
+    """Above the noise that is stated, what is left is noise too: a factor on the covariance."""
+    ready = runs(np.random.default_rng(7), noise)
+    if not place:
+        ready = [one.moved(*at) for one, at in zip(ready, PLACES, strict=True)]
+    parameters = [Parameter("a", ("a",)), Parameter("b", ("b",), spread=spread)]
+    one = identified(ready, parameters, place)
+    begin = [0.2, -0.3, *([0.8, 3.0, -1.1, -2.0] if place else [])]
+    best = optimize.least_squares(lambda z: vector(ready, z, place, spread), begin, x_scale="jac")
+    count = len(best.fun) - (spread is not None)
+    square = np.sum(best.fun[:count] ** 2) / (count - len(begin))
+    covariance = max(1.0, square) * np.linalg.inv(best.jac.T @ best.jac)
+    deviations = np.sqrt(np.diag(covariance))
+    assert np.abs(one.x - best.x[:2]) == pytest.approx(0.0, abs=0.05 * deviations[:2].min())
+    assert one.inflation == pytest.approx(max(1.0, square), rel=1e-3)
+    assert one.covariance == pytest.approx(covariance[:2, :2], rel=5e-3)
+    assert one.factors == pytest.approx(np.exp(one.x))
+    assert one.deviations == pytest.approx(deviations[:2], rel=3e-3)
+    normal = stats.norm.ppf(0.975)
+    ends = [np.exp(one.x - normal * one.deviations), np.exp(one.x + normal * one.deviations)]
+    assert one.intervals == pytest.approx(np.transpose(ends), rel=1e-6)
+    assert one.correlation[0, 1] == pytest.approx(
+        covariance[0, 1] / np.prod(deviations[:2]), abs=5e-3
+    )
+    # combinations: what the data alone say of the parameters, whatever the places
+    J = best.jac[:count]
+    own, places = J[:, :2], J[:, 2:]
+    if place:
+        own = own - places @ np.linalg.lstsq(places, own, rcond=None)[0]
+    assert one.singular_values == pytest.approx(np.linalg.svd(own)[1], rel=3e-3)
+    lines = best.fun[:count].reshape(4, -1)
+    for channel, row in zip(one.channels, lines, strict=True):
+        assert channel.level == pytest.approx(np.sqrt(np.mean(row**2)), rel=3e-3)
+    for number, at in enumerate(one.places):
+        d, e = best.x[2 + 2 * number], 1e-4 * best.x[3 + 2 * number]
+        assert abs(at.shift - d) < 0.05 * deviations[2 + 2 * number]
+        assert abs(at.stretch - e) < 0.05e-4 * deviations[3 + 2 * number]
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy"])
+def test_weights_of_a_loss_are_the_slopes_of_scipys(loss):
+    """rho'(z) at z = (r/5)^2, of the losses as scipy's page of `least_squares` prints them."""
+    r = np.linspace(-40.0, 40.0, 81)
+    rho = {
+        "linear": lambda z: z, "soft_l1": lambda z: 2.0 * ((1.0 + z) ** 0.5 - 1.0),
+        "huber": lambda z: np.where(z <= 1.0, z, 2.0 * np.sqrt(np.maximum(z, 0.0)) - 1.0),
+        "cauchy": np.log1p,
+    }[loss]  # fmt: skip
+    z, h = (r / 5.0) ** 2, 1e-6
+    slope = (rho(z + h) - rho(z - h)) / (2.0 * h)
+    smooth = np.abs(z - 1.0) > 1e-3
+    assert _counting(r, loss)[smooth] == pytest.approx(slope[smooth], rel=1e-6)
+
+
+def test_levels_in_bands_and_sections_are_those_of_the_signal():
+    """Of noise the power that is stated is added; a section of 50 m has its mean and deviation."""
+    (one, _) = runs(np.random.default_rng(9), 1.0)
+    whole = slice(0, int(N * STEP * SPEED / 50.0) * 250)
+    rows = Form("sections", BAND).features(one, one.measured)
+    for values, row in zip(one.measured[:, whole], rows, strict=True):
+        parts = values.reshape(-1, 250)
+        count = -(-N // 250)
+        assert row[: len(parts)] == pytest.approx(parts.mean(axis=1), abs=1e-12)
+        assert row[count : count + len(parts)] == pytest.approx(parts.std(axis=1), rel=1e-9)
+    low = 0.53  # Hz: no frequency lies on the border of a band
+    form, f = Form("spectra", (low, BAND[1])), np.arange(N // 2) / (N * STEP)
+    inside = f[(f >= BAND[0]) & (f <= BAND[1])]
+    stated = (BAND[1] - BAND[0]) / (BAND[1] - low)  # noise is that in the band
+    for measured in (True, False):
+        rows = form.features(one, one.measured, measured=measured)
+        for values, sigma, row in zip(one.measured, NOISE, rows, strict=True):
+            c = np.sum((ROWS @ values).reshape(2, -1) ** 2, axis=0)
+            edges = low * 2.0 ** (np.arange(12) / 3.0)
+            parts = [c[(inside >= a) & (inside < a * 2.0 ** (1.0 / 3.0))] for a in edges]
+            power = [
+                np.mean(p) + (0.0 if measured else 2.0 * stated * sigma**2)
+                for p in parts
+                if len(p) > 5
+            ]
+            assert row == pytest.approx(0.5 * np.log(power), rel=1e-6)
+    assert form.expected(one) == pytest.approx([np.nan] * 2, nan_ok=True)
+    assert Form("history", BAND).expected(one) == pytest.approx(NOISE)
+
+
+def test_whiteness_is_the_statistic_of_kolmogorov_and_smirnov():
+    r = np.random.default_rng(2).normal(size=600) * np.tile(np.linspace(0.8, 1.2, 300), 2)
+    power = r[:300] ** 2 + r[300:] ** 2
+    shares = np.cumsum(power) / power.sum()
+    distance = max(abs(share - (k + 1) / 300.0) for k, share in enumerate(shares))
+    statistic, chance = whiteness(r)
+    assert statistic == pytest.approx(distance * np.sqrt(300.0))
+    series = sum((-1) ** (j - 1) * np.exp(-2.0 * j**2 * statistic**2) for j in range(1, 50))
+    assert chance == pytest.approx(2.0 * series, rel=1e-6)
