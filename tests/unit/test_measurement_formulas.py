@@ -1,0 +1,162 @@
+"""Clock, place and likeness of measured channels, each against a signal that is known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from railsim.errors import InputError
+from railsim.measurement.alignment import shift_of
+from railsim.measurement.clock import bridged, clock_of, delayed
+from railsim.measurement.likeness import likeness
+from railsim.measurement.position import position
+
+
+def signal(s, shortest=4.0, seed=1, count=40):
+    """Waves over a place, or a time, of `shortest` and longer, rms 1."""
+    random = np.random.default_rng(seed)
+    rates = random.uniform(0.5, 2.0 * np.pi / shortest, count)
+    turns = np.multiply.outer(s, rates) + random.uniform(0.0, 6.3, count)
+    return np.cos(turns).sum(axis=-1) * np.sqrt(2.0 / count)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4), st.floats(-7.0, 7.0))
+def test_a_delayed_cubic_is_that_cubic_later(coefficients, steps):
+    """Values that would need others from beyond the ends are none."""
+    n = np.arange(20.0)
+
+    def cubic(n):
+        return np.polynomial.polynomial.polyval(n - 10.0, coefficients)
+
+    found, whole = delayed(cubic(n), steps), np.floor(steps)
+    first, last = (0, 0) if steps == whole else (-1, 2)
+    there = (n + whole + first >= 0) & (n + whole + last <= 19)
+    assert (np.isnan(found) == ~there).all()
+    assert found[there] == pytest.approx(cubic(n + steps)[there], abs=1e-8)
+
+
+@settings(max_examples=40)
+@given(st.lists(st.booleans(), min_size=3, max_size=25), st.integers(0, 6))
+def test_gaps_are_bridged_by_straight_lines_up_to_a_length(known, longest):
+    known = np.array(known)
+    values = np.random.default_rng(len(known)).normal(size=len(known))
+    found = bridged(np.where(known, values, np.nan), longest)
+    there = np.flatnonzero(known)
+    for k in range(len(known)):
+        before, after = there[there <= k], there[there >= k]
+        if known[k]:
+            assert found[k] == values[k]
+        elif len(before) and len(after) and after[0] - before[-1] - 1 <= longest:
+            assert found[k] == pytest.approx(np.interp(k, there, values[there]))
+        else:
+            assert np.isnan(found[k])
+
+
+@settings(max_examples=30)
+@given(
+    step=st.sampled_from([0.001, 0.0025, 0.01]), begin=st.floats(-5.0, 900.0),
+    lost=st.sets(st.integers(3, 296), max_size=8), whole=st.integers(0, 40),
+)  # fmt: skip
+def test_values_lie_at_their_multiples_of_the_step(step, begin, lost, whole):
+    """Lost lines and a gap of whole steps leave values without a number there, no others."""
+    k = np.array([n + whole * (n >= 150) for n in range(300) if n not in lost])
+    written = np.round(begin + step * k, 5)
+    clock = clock_of("made", written)
+    assert clock.rate == pytest.approx(1.0 / step, rel=1e-3)
+    found = clock.on_grid(k.astype(float))
+    assert len(found) == k[-1] + 1
+    assert np.flatnonzero(np.isfinite(found)).tolist() == k.tolist()
+    assert found[k] == pytest.approx(k)
+    assert clock.time == pytest.approx(begin + step * np.arange(k[-1] + 1), abs=0.3 * step)
+    with pytest.raises(InputError, match="rise"):
+        clock_of("made", np.concatenate([written, written[-1:]]))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("late", "drift"), [(0.0, 0.0), (0.23, 0.0), (-0.4, 0.0), (0.1, 0.15)])
+def test_likeness_is_the_lag_the_ratio_and_the_correlation(sign, late, drift):
+    step, n = 0.01, 6000
+    t = step * np.arange(n)
+    simulated = signal(t, 0.3)
+    measured = 1.7 * sign * signal(t - late - drift * (t - t.mean()) / t[-1], 0.3)
+    measured[1000:1050] = np.nan
+    found = likeness(measured, simulated, step)
+    assert found.lag == pytest.approx(late, abs=0.5 * step + 0.3 * drift)
+    # gaps count neither here nor there
+    assert found.ratio == pytest.approx(1.7, rel=0.02)
+    if sign < 0.0:
+        assert found.correlation == pytest.approx(-1.0, abs=0.15 if drift else 0.02)
+        return
+    assert found.drift == pytest.approx(drift, abs=1.5 * step)
+    if not drift:
+        assert found.correlation == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_channel_that_says_nothing_is_like_none():
+    some, none = signal(np.arange(200.0)), np.zeros(200)
+    few = np.where(np.arange(200) < 9, some, np.nan)
+    for measured, simulated in ((none, some), (some, none), (few, some)):
+        assert all(np.isnan(x) for x in vars(likeness(measured, simulated, 0.01)).values())
+
+
+@pytest.mark.parametrize(
+    ("begin", "length", "shift", "stretch"),
+    [(0.0, 60.0, 3.3, 0.0), (5000.0, 60.0, -4.2, 0.0), (5000.0, 900.0, 12.6, 1e-3),
+     (120.0, 1500.0, -18.3, -2e-3), (0.0, 800.0, 0.0, 5e-4)],
+)  # fmt: skip
+def test_a_place_is_shifted_and_stretched_as_the_record_was(begin, length, shift, stretch):
+    """Right is s + shift + stretch (s - s_0); of the reference more is known at both ends."""
+    s = begin + np.arange(0.0, length, 0.3)
+    right = s + shift + stretch * (s - s[0])
+    x = signal(right) + 5.0
+    x[100:110] = np.nan
+    reference = np.arange(begin - 40.0, begin + length + 40.0, 0.25)
+    found = shift_of(s, x, reference, signal(reference))
+    assert found.shift == pytest.approx(shift, abs=0.08)
+    assert found.correlation > 0.9
+    if length > 100.0:
+        assert found.stretch == pytest.approx(stretch, abs=1e-4)
+        assert found.windows > 2
+    assert shift_of(s, np.random.default_rng(3).normal(size=len(s)), reference,
+                    signal(reference)) is None  # fmt: skip
+
+
+TIME = 0.05 * np.arange(1201)
+V = 20.0 + 0.1 * TIME
+WAY = 20.0 * TIME + 0.05 * TIME**2
+
+
+@pytest.mark.parametrize(
+    ("axes", "mileage", "start", "expected"),
+    [
+        ({"speed": V}, None, 70.0, 70.0 + WAY),
+        ({"distance": WAY + 30.0}, None, 70.0, WAY + 30.0),
+        ({"distance": np.floor((WAY + 30.0) / 5.0) * 5.0}, None, 0.0, WAY + 30.0),
+        ({"mileage": 4000.0 + WAY, "speed": V}, None, 70.0, 70.0 + WAY),
+        ({"mileage": 4000.0 - WAY}, None, 70.0, 70.0 + WAY),
+        ({"mileage": 4000.0 - WAY}, (4100.0, True), 70.0, 100.0 + WAY),
+        ({"mileage": 4000.0 + WAY}, (3900.0, False), 70.0, 100.0 + WAY),
+    ],
+)
+def test_arc_length_by_distance_mileage_or_speed(axes, mileage, start, expected):
+    """A counter of 5 m is linear in between: right within its steps."""
+    how = SimpleNamespace(speed=None, start=start)
+    s, speed, remarks = position("made", how, TIME, axes, mileage)
+    coarse = "distance" in axes and axes["distance"][1] == axes["distance"][0]
+    assert s == pytest.approx(expected, abs=5.2 if coarse else 1e-9)
+    assert np.all(np.diff(s) > 0.0)
+    assert speed[5:-5] == pytest.approx(V[5:-5], rel=0.4 if coarse else 1e-7)
+    assert not remarks
+
+
+@pytest.mark.parametrize("share", [0.003, -0.01])
+def test_distance_and_speed_that_differ_are_said_with_their_difference(share):
+    how = SimpleNamespace(speed=None, start=0.0)
+    axes = {"distance": (1.0 + share) * WAY, "speed": V}
+    s, _, (remark,) = position("made", how, TIME, axes, None)
+    assert s == pytest.approx((1.0 + share) * WAY)
+    assert f"apart by {100.0 * share:+.2f} %" in remark
+    assert f"{WAY[-1]:.1f} m by speed" in remark
