@@ -18,6 +18,7 @@ from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 from railsim.simulation.run_in import settled
+from railsim.stability.curving import _Search
 from railsim.track.tables import track_tables
 
 GRAVITY = 9.81
@@ -46,17 +47,57 @@ def test_free_conical_wheelset_rolls_where_its_radii_fit_the_curve(radius):
     assert abs(found[5]) < 2e-6
 
 
-def test_quantities_of_curving_follow_from_the_wheel_forces():
-    """Y/Q outwards positive, (Q - Q0)/Q0 of the load on straight track, sum of Y of an axle."""
-    coach = load_vehicle("coach_manchester")
-    found = railsim.curving(coach, radius=[600.0, -400.0])
+def test_quantities_of_curving_follow_from_the_wheel_forces_and_turn_with_the_curve():
+    """Y/Q outwards positive, (Q - Q0)/Q0 of the load on straight track, sum of Y of an axle.
+
+    All axles together hold what the cant does not; to the left everything is mirrored.
+    """
+    coach, deficiency = load_vehicle("coach_manchester"), 0.05
+    found = railsim.curving(coach, radius=[600.0, -400.0, 400.0], cant_deficiency=deficiency)
     Q0 = railsim.static_loads(coach).Q0
     assert found.converged.all()
     for side, outwards in ((0, -1.0), (1, 1.0)):
         quotient = outwards * found.Y[..., side] / found.Q[..., side]
         np.testing.assert_allclose(found.Y_over_Q[..., side], quotient)
+        assert outwards * found.contact_y[..., side] == pytest.approx(0.7455, abs=0.04)
     np.testing.assert_allclose((1.0 + found.dQ_over_Q0) * Q0, found.Q, rtol=1e-9)
     np.testing.assert_allclose(found.sum_Y, found.Y[..., 0] + found.Y[..., 1])
+    radius = found.radius[:, None, None]
+    square = GRAVITY * np.abs(radius) * (0.15 + deficiency) / 1.5
+    np.testing.assert_allclose(found.speed[..., None], np.sqrt(square))
+    phi = np.arcsin(0.15 / 1.5)
+    beyond = square / np.abs(radius) * np.cos(phi) - GRAVITY * np.sin(phi)
+    held = -np.sign(radius) * beyond * Q0.sum() / GRAVITY
+    assert found.sum_Y.sum(axis=-1) == pytest.approx(held, rel=5e-3)
+    assert np.all(np.sign(radius) * found.car_roll < 0.0)  # outwards
+    left, right = found.radius.tolist().index(-400.0), found.radius.tolist().index(400.0)
+    for name in ("lateral", "attack", "sum_Y", "steering", "car_roll"):
+        values = getattr(found, name)
+        np.testing.assert_allclose(values[left], -values[right], rtol=1e-4, atol=1e-6)
+    for name, sign in (("Q", 1.0), ("Y", -1.0), ("contact_y", -1.0), ("T_gamma", 1.0)):
+        values = getattr(found, name)
+        np.testing.assert_allclose(values[left], sign * values[right][..., ::-1], rtol=1e-4)
+    assert found.wheelset_position == pytest.approx((10.78, 8.22, -8.22, -10.78))
+
+
+def test_positions_in_a_curve_are_those_of_the_steady_state():
+    track = load_track("straight")
+    search = _Search(load_vehicle("coach_manchester"), track, 0.15, Settings(), None)
+    point = search.point(500.0, 0.03, 0.3)
+    found = search.empty([500.0], [0.03], [0.3])
+    search.fill(found, (0, 0, 0), point)
+    _, state, how = point
+    index = search.model.index
+    assert how == found.converged[0, 0, 0] == 1
+
+    def of(names, component):
+        return state[[index.coordinate(name, component) for name in names]]
+
+    assert found.attack[0, 0, 0] == pytest.approx(of(found.wheelsets, 5))
+    assert found.lateral[0, 0, 0] == pytest.approx(of(found.wheelsets, 1), abs=1e-5)
+    assert found.bogies == ("front.frame", "rear.frame")
+    assert found.steering[0, 0, 0] == pytest.approx(of(found.bogies, 5))
+    assert found.car_roll[0, 0, 0] == pytest.approx(of(["carbody"], 3)[0])
 
 
 @pytest.mark.parametrize("name", ["coach_manchester", "coach_flexicoil"])
