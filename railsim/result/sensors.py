@@ -156,7 +156,7 @@ def _of_bodies(
     b = [bodies.index(sensor.body) for sensor in sensors]
     position, rates, absolute = (motion[f"body_{name}"][:, b] for name in MOTIONS)
     offset = np.array([sensor.offset for sensor in sensors])
-    s = motion["distance"][:, None] + offset + position[..., 0]
+    s = motion["distance"][:, None] + offset
     cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
     cant_rate, grade_rate = alignment.cant_angle_rate(s), alignment.grade_angle_rate(s)
     kappa, climb, level = alignment.curvature(s), np.sin(grade), np.cos(grade)

@@ -8,6 +8,8 @@ import pytest
 import railsim
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.result.sensors import MOTIONS, Sensor, readings
+from railsim.track.alignment import Alignment
 
 
 @cache
@@ -138,6 +140,21 @@ def test_an_accelerometer_feels_gravity_and_the_absolute_acceleration_does_not()
     assert difference[:, 0] == pytest.approx(9.81 * np.sin(pitch), abs=2e-4)
     assert difference[:, 1] == pytest.approx(-9.81 * np.sin(lean), abs=2e-3)
     assert difference[:, 2] == pytest.approx(9.81 * (1.0 - np.cos(lean)), abs=2e-3)
+
+
+def test_attitude_counts_from_the_track_frame_of_a_body_wherever_it_stands_in_it():
+    """Frames go with the reference body: a metre ahead in its own, a cant ramp leans it no more."""
+    alignment = Alignment(railsim.load_track("curve_r250"))
+    s = np.linspace(0.0, 480.0, 97)
+    ramp = np.argmax(np.abs(alignment.cant_angle_rate(s)))
+    motion = {"distance": s[ramp : ramp + 1]}
+    motion |= {f"body_{name}": np.zeros((1, 1, 6)) for name in MOTIONS}
+    motion["body_position"][0, 0, 0] = 1.0
+    seat = {"seat": Sensor("carbody", 3.0, (0.0, 0.0, 0.0))}
+    found, _ = readings(seat, motion, ("carbody",), alignment, np.zeros(1))
+    lean = alignment.cant_angle(s[ramp : ramp + 1] + 3.0)
+    assert abs(lean) > 1e-3
+    assert found[0, 0, 1] == pytest.approx(-9.81 * np.sin(lean).item(), rel=1e-9)
 
 
 def test_an_axlebox_does_not_spin():
