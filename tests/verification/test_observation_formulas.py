@@ -1,0 +1,212 @@
+"""Pieces of a run and what its channels say of each other, of signals that are known."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from railsim.errors import InputError
+from railsim.observation.contact import Noise, _smoothed
+from railsim.observation.estimate import BANDS, estimate_of
+from railsim.observation.innovations import Powers, Sizes, disagreeing, level_of, spectra_of
+from railsim.observation.pieces import Piece, on_grid, pieces_of
+
+N = 2000  # points of a piece
+STEP = 0.25  # m
+
+
+class Run:
+    """A measured run with one channel, which is a wave of 12 m with a gap, at a given speed."""
+
+    name, rate = "made", 500.0
+
+    def __init__(self, distance, speed):
+        self.distance, self.speed = distance, speed
+
+    def part(self, begin, end):
+        rows = (self.distance >= begin) & (self.distance <= end)
+        return Run(self.distance[rows], self.speed[rows])
+
+    def __getitem__(self, name):
+        wave = np.sin(2.0 * np.pi * self.distance / 12.0)
+        lost = (self.distance > 400.0) & (self.distance < 402.0)
+        return np.where(lost & (name == "a"), np.nan, np.nan if name == "none" else wave)
+
+
+@pytest.mark.parametrize(
+    ("length", "slow", "gain", "begin"),
+    [(500.0, 20.0, 0.0, 0.0), (4700.0, 30.0, 0.03, 5.0), (2600.0, 10.0, 1.5, 0.3),
+     (2000.0, 30.0, -0.4, 50.0), (800.0, 8.0, -0.5, 0.0)],
+)  # fmt: skip
+def test_pieces_cover_a_run_but_its_ends_and_keep_their_speed(length, slow, gain, begin):
+    """20 m at both ends are left out; up to 2000 m, speeds in a ratio of 1.06, 300 m at least."""
+    s = begin + np.arange(0.0, length, 0.1)
+    v = slow * (1.0 + gain * np.linspace(0.0, 1.0, len(s)))
+    run = Run(s, v)
+    if v.min() < 5.0:
+        with pytest.raises(InputError, match="speed"):
+            pieces_of(run, ["a"])
+        return
+    found = pieces_of(run, ["a", "none"])
+    assert found[0].grid[0] == pytest.approx(s[0] + 20.0)
+    assert found[-1].grid[-1] == pytest.approx(s[-1] - 20.0, abs=STEP)
+    for before, after in pairwise(found):
+        shared = before.grid[-1] - after.grid[0]
+        assert shared == pytest.approx(200.0, abs=STEP)
+    for one in found:
+        extent = one.grid[-1] - one.grid[0]
+        np.testing.assert_allclose(np.diff(one.grid), STEP)
+        np.testing.assert_allclose(one.speeds, np.interp(one.grid, s, v), rtol=1e-6)
+        assert one.speed == pytest.approx(one.speeds.mean(), rel=5e-3)
+        assert extent <= 2000.0 + 100.0 + STEP
+        ratio = one.speeds.max() / one.speeds.min()
+        assert ratio < 1.061 or extent < 300.0 + 100.0 + STEP
+        known = one.there[0]
+        beside = np.abs(one.grid - 401.0) < 1.0 + 8.0 * STEP - 0.1
+        assert not known[beside].any()
+        assert known[np.abs(one.grid - 401.0) > 1.0 + 10.0 * STEP].all()
+        wave = np.sin(2.0 * np.pi * one.grid / 12.0)
+        far = np.abs(one.grid - 401.0) > 12.0
+        np.testing.assert_allclose(one.signals[0][far], wave[far], atol=5e-3)
+        assert not one.signals[1].any()
+        assert not one.there[1].any()
+
+
+@pytest.mark.parametrize(("wave", "passed"), [(0.4, 0.0), (0.9, 1.0), (5.0, 1.0), (0.5, 0.5)])
+def test_a_grid_shows_waves_of_two_steps_and_more(wave, passed):
+    s = np.arange(0.0, 200.0, 0.02) + 1e-3 * np.sin(np.arange(10_000))
+    grid = np.arange(30.0, 170.0, STEP)
+    found = [on_grid(s, of(2.0 * np.pi * s / wave), grid) for of in (np.sin, np.cos)]
+    exact = [of(2.0 * np.pi * grid / wave) for of in (np.sin, np.cos)]
+    shares = np.mean(np.multiply(found, exact)) * 2.0
+    assert shares == pytest.approx(passed, abs=0.02)
+
+
+def test_spectra_have_the_power_of_the_signal_whatever_is_left_out():
+    """Of white noise its variance; the mean does not count."""
+    random = np.random.default_rng(1)
+    x = np.array([[0.5], [2.0], [1.0]]) * random.normal(size=(3, N)) + 30.0
+    there = np.ones((3, N), dtype=bool)
+    there[1, 500:900] = False
+    x[~there] = 1e6
+    spectra = spectra_of(x, there, 2400)
+    power = np.mean(np.abs(spectra) ** 2, axis=1) / 2400.0
+    assert power == pytest.approx([0.25, 4.0, 1.0], rel=0.08)
+    assert np.abs(spectra[:, 0]) ** 2 / 2400.0 == pytest.approx(0.0, abs=60.0)
+    assert not spectra_of(np.zeros((1, N)), there[:1], 2400).any()
+
+
+def powers(random):
+    """Two fields, seen by five channels with noise of 0.02."""
+    k = np.fft.rfftfreq(N, STEP)
+    track = np.zeros((len(k), 4))
+    track[1:, :2] = 1e-2 / (0.02 + k[1:, None] ** 2)
+    H = np.zeros((len(k), 5, 8), dtype=complex)
+    H[:, :, :2] = random.normal(size=(5, 2)) + 1j * k[:, None, None] * random.normal(size=(5, 2))
+    return Powers(N, track, np.zeros((len(k), 4)), H, np.full((len(k), 5), 4e-4))
+
+
+def channels(random, given):
+    fields = random.normal(size=(2, N))
+    spectra = np.fft.rfft(fields, axis=1) * np.sqrt(given.track[:, :2].T)
+    read = np.fft.irfft(np.einsum("kcq,qk->ck", given.response[:, :, :2], spectra), N, axis=1)
+    return read + 0.02 * random.normal(size=read.shape)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "change", "words"),
+    [
+        (None, lambda x: x, None), (2, lambda x: -x, "opposite sign"),
+        (0, lambda x: 9.81 * x, "9.8 times"), (4, lambda x: np.roll(x, 400), "does not agree"),
+    ],
+)  # fmt: skip
+def test_the_channel_that_the_others_contradict_is_named(wrong, change, words):
+    random = np.random.default_rng(5)
+    given = powers(random)
+    read = channels(random, given)
+    assert level_of(given, spectra_of(read, np.ones(read.shape, bool), N)) == pytest.approx(
+        1.0, rel=0.25
+    )
+    loud = spectra_of(7.0 * read, np.ones(read.shape, bool), N)
+    assert level_of(given, loud) == pytest.approx(7.0, rel=0.25)
+    if wrong is not None:
+        read[wrong] = change(read[wrong])
+    piece = SimpleNamespace(there=np.ones(read.shape, dtype=bool))
+    names = [f"channel {c}" for c in range(5)]
+    found, said = disagreeing(given, piece, read, names)
+    assert found == (set() if wrong is None else {wrong})
+    assert len(said) == len(found)
+    if wrong is not None:
+        assert said[0].startswith(names[wrong])
+        assert words in said[0]
+
+
+def test_powers_of_sizes_are_those_of_their_parts():
+    """Errors of the model are shares of what a channel reads; contacts in y and yaw, z and roll."""
+    random = np.random.default_rng(6)
+    given = powers(random)
+    unknown = random.uniform(1.0, 2.0, (len(given.track), 8))
+    given = Powers(N, given.track, unknown, given.response, given.white)
+    model = random.uniform(0.01, 0.1, 5)
+    fields = given.fields(Sizes(np.array([3.0, 7.0]), model))
+    assert fields.power[:, 4:] == pytest.approx(unknown * np.tile([3.0, 7.0, 7.0, 3.0], 2))
+    own = np.sum(np.abs(given.response[:, :, :4]) ** 2 * given.track[:, None], axis=2)
+    assert given.own == pytest.approx(own)
+    assert fields.errors == pytest.approx(given.white + model**2 * own)
+
+
+def test_smoothed_spectra_keep_their_mean_and_noise_its_power_at_any_step():
+    """Over 15 % of the wave number, and four bins at least; of halved steps half of the power."""
+    k = np.arange(400.0)
+    row = np.random.default_rng(7).uniform(size=400)
+    (found,) = _smoothed(k, row[None])
+    for i in (0, 3, 20, 100, 399):
+        half = max(4, int(0.15 * i))
+        assert found[i] == pytest.approx(np.mean(row[max(0, i - half) : i + half + 1]))
+    noise = Noise(k, np.tile(row[:, None], 4), 1e-3)
+    assert noise.at(k, 0.25) == pytest.approx(np.tile(row[:, None], 4), abs=2e-12)
+    assert noise.at(k, 0.5) == pytest.approx(np.tile(row[:, None] / 2.0, 4), abs=2e-12)
+
+
+def test_estimate_of_a_piece_adds_up_its_fields_and_leaves_out_what_is_not_seen():
+    """Fields with more than half of their power left are not shown; forces are H times the mean."""
+    random = np.random.default_rng(8)
+    points = 512
+    bins = points // 2 + 1
+    k = 2.0 * np.pi * np.fft.rfftfreq(points, STEP)
+    spectra = np.fft.rfft(random.normal(size=(5, points)), axis=1)
+    power = random.uniform(1.0, 2.0, (bins, 4))
+    left = np.where(np.arange(bins)[:, None] < 100, 0.05, 0.99) * power
+    covariance = np.zeros((bins, 5, 5), dtype=complex)
+    covariance[:, range(4), range(4)] = left
+    covariance[:, 4, 4] = 0.3
+    covariance[:, 0, 4] = 0.02j
+    covariance[:, 4, 0] = -0.02j
+    H = random.normal(size=(bins, 2, 5)) + 1j * random.normal(size=(bins, 2, 5))
+    H[[0, -1]] = H[[0, -1]].real
+    grid = STEP * np.arange(300)
+    piece = Piece(grid, np.zeros((1, 300)), np.ones((1, 300), bool), np.full(300, 21.0), 500.0)
+    base = random.normal(size=(2, 300))
+    found = estimate_of(piece, spectra, covariance, power, (("Q.1.left", "Y.1.left"), H, base))
+    shown = np.where(np.arange(bins) < 100, spectra[:4], 0.0)
+    assert found.values == pytest.approx(np.fft.irfft(shown, points, axis=1)[:, :300])
+    error = np.where(np.arange(bins)[:, None] < 100, left, power)
+    both = np.full(bins, 2.0)
+    both[[0, -1]] = 1.0
+    assert found.deviations == pytest.approx(np.sqrt(both @ error / points))
+    assert found.seen == pytest.approx(1.0 - (left / power).T)
+    outputs = np.einsum("kcq,qk->ck", H, spectra)
+    assert found.forces == pytest.approx(np.fft.irfft(outputs, points, axis=1)[:, :300] + base)
+    spread = [[(H[i, c] @ covariance[i] @ H[i, c].conj()).real for i in range(bins)]
+              for c in range(2)]  # fmt: skip
+    assert found.force_deviations == pytest.approx(np.sqrt(spread @ both / points))
+    for name, (shortest, longest) in BANDS.items():
+        # of order 4 at both ends
+        f = k[1:] / (2.0 * np.pi)
+        gain = 1.0 / np.sqrt(1.0 + (1.0 / longest / f) ** 8)
+        gain = np.append(0.0, gain / np.sqrt(1.0 + (f * shortest) ** 8))
+        inside = np.fft.irfft(gain * shown, points, axis=1)[:, :300]
+        assert found.bands[name] == pytest.approx(inside)
+        spread = np.sqrt((gain**2 * both) @ error / points)
+        assert found.band_deviations[name] == pytest.approx(spread)
