@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
+from example_result import OFFSETS
 from made_record import Q0, curve, made, track
+from test_section_values import FORCE, OUT, RIDE, Expected, Tones
 
 import railsim
+from railsim.assessment.sections import TestSection
 from railsim.definitions.measurement import MeasurementFile
 from railsim.measurement import Measurement
+from railsim.notation import REQUESTED
+from railsim.result import Result
 
 SPEED, RATE = 23.0, 200.0
 
@@ -52,3 +57,107 @@ def test_a_quotient_that_was_measured_is_not_formed_of_its_forces_again():
     assert len(found["Y_over_Q_qst"].pairs) == len(found["Y_qst"].pairs) > 3
     assert found["Y_over_Q_qst"].mean == pytest.approx(-2e3 / Q0)
     assert found["Y_qst"].mean == pytest.approx(-2e3)
+
+
+OTHER = np.array([0.27, 1.13, 2.6, 4.1, 7.3, 11.9, 19.1])  # Hz: not alike, so that no place moves
+B, M = Tones(11, (1, 3), 0.4, 0.3), Tones(12, (1, 3), 0.5, 0.3, OTHER)
+MEASURED = {
+    "Y": Tones(13, (4, 2), 2e3, 4e3, OTHER), "Q": Tones(14, (4, 2), Q0 + 1e3, 3e3, OTHER),
+}  # fmt: skip
+SIMULATED = {"Y": Tones(15, (4, 2), 3e3, 4e3), "Q": Tones(16, (4, 2), Q0, 3e3)}
+CHANNELS = [f"{f}:{w}:{side}" for f in "YQ" for w in (1, 4) for side in ("left", "right")]
+
+
+def values_of(tones, body, section, turn, t):
+    """By quantity and place, of tones of forces and of the floor's accelerations."""
+    found, names = {}, Expected(section, turn, SPEED).names
+
+    def there(offset):
+        s = SPEED * t + offset
+        return t[(s >= section.begin) & (s <= section.end)]
+
+    def top(x, sense=1):
+        return [np.percentile(x, 99.85)] if sense else [-np.percentile(x, 0.15),
+                                                        np.percentile(x, 99.85)]  # fmt: skip
+
+    for w in (0, 3):
+        at, label = there(OFFSETS[w]), f"wheelset {w + 1}"
+        means = Expected(section, turn, SPEED).windows
+        total = (-turn or 1) * tones["Y"](at, FORCE, w).sum(axis=1)
+        moved = means(lambda t, w=w: tones["Y"](t, FORCE, w).sum(axis=1), OFFSETS[w])
+        found["sum_Y_max", label] = top((-turn or 1) * moved, abs(turn))
+        if turn:
+            found["sum_Y_qst", label] = [np.median(total)]
+        for side in (0, 1):
+            place, own = f"{label} {names[side]}", (w, side)
+            q, y = tones["Q"](at, FORCE, own), OUT[side] * tones["Y"](at, FORCE, own)
+            found["Q_max", place] = top(q)
+            if turn:
+                found["Q_qst", place] = [np.median(q)]
+            if names[side] == "inner":
+                continue
+            found["Y_max", place] = top(y, abs(turn))
+            if turn:
+                found["Y_qst", place] = [np.median(y)]
+                found["Y_over_Q_qst", place] = [np.median(y / q)]
+
+                def over(t, own=own, side=side):
+                    return OUT[side] * tones["Y"](t, FORCE, own) / tones["Q"](t, FORCE, own)
+
+                found["Y_over_Q_max", place] = top(means(over, OFFSETS[w]))
+    at = there(9.5)
+    lateral, vertical = ((turn or 1) if k == 1 else 1 for k in (1, 2))
+    ride = [sign * body(at, RIDE, (0, k)) for k, sign in ((1, lateral), (2, vertical))]
+    for name, x in zip("yz", ride, strict=True):
+        found[f"body_{name}_max", "floor_front"] = top(x, 0)
+        found[f"body_{name}_rms", "floor_front"] = [np.sqrt(np.mean(x**2))]
+    if turn:
+        found["body_y_qst", "floor_front"] = [np.median(turn * body(at, FORCE, (0, 1)))]
+    return found
+
+
+@pytest.mark.parametrize("turn", [1, -1, 0])
+def test_every_value_measured_and_simulated_is_that_of_its_filtered_tones(turn):
+    plan = curve(300.0 * turn, 440.0, 60.0, 40.0) if turn else [{"type": "STR", "length": 700.0}]
+    on = track(*plan, cant=0.12 * turn)
+    whole = made(
+        on, SPEED, rate=500.0, Y=lambda t, s: SIMULATED["Y"](t), Q=lambda t, s: SIMULATED["Q"](t),
+        settings='{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 500.0}',
+    )  # fmt: skip
+    arrays = {name: whole[name] for name in whole} | {"sensor_acceleration": B(whole["time"])}
+    quantities = dict(whole.quantities)
+    quantities["sensor_acceleration"] = REQUESTED["sensor_acceleration"]
+    coordinates = dict(whole.coordinates) | {"sensor": ("floor_front",), "axis": tuple("xyz")}
+    result = Result(arrays, quantities, coordinates, whole.attributes, whole.profiles)
+    t = (0.4 + np.arange(round(on.length / SPEED * RATE) - 1)) / RATE
+    floor = [f"sensor_acceleration:floor_front:{axis}" for axis in "yz"]
+    names = {f"c{k}": {"quantity": q} for k, q in enumerate([*CHANNELS, *floor])}
+    how = MeasurementFile.model_validate({
+        "format": "railsim-measurement/1", "name": "m", "file": ["a.csv"], "rate": RATE,
+        "speed": SPEED, "channels": names,
+    })  # fmt: skip
+    read = [MEASURED[q[0]](t, None, (int(q[2]) - 1, int(q.endswith("right")))) for q in CHANNELS]
+    read += [M(t, None, (0, k)) for k in (1, 2)]
+    run = Measurement(
+        how, t, SPEED * t, np.full(len(t), SPEED), dict(zip(names, read, strict=True))
+    )
+    found = railsim.validate_model(run, result)
+    assert not any("moved" in remark for remark in found.remarks)
+    pairs = [pair for one in found.comparisons for pair in one.pairs]
+    begins = sorted({pair.begin for pair in pairs})
+    middle = begins[len(begins) // 2]  # far from the ends of the record
+    length = next(pair.end for pair in pairs if pair.begin == middle) - middle
+    section = TestSection("", middle, middle + length, 300.0 * turn or np.inf, 0.1, SPEED)
+    expected = [values_of(*own, section, turn, t) for own in ((MEASURED, M), (SIMULATED, B))]
+    seen = {}
+    for pair in pairs:
+        if pair.begin == middle:
+            both = seen.setdefault((pair.quantity, pair.place), ([], []))
+            for values, value in zip(both, (pair.measured, pair.simulated), strict=True):
+                values.append(value)
+    assert seen.keys() == expected[0].keys()
+    scale = {"Q": 1e4, "Y": 1e4, "s": 1e4, "b": 0.5}
+    for key, both in seen.items():
+        near = 3e-5 if key[0].startswith("Y_over_Q") else 3e-3 * scale[key[0][0]]
+        for values, wanted in zip(both, expected, strict=True):
+            assert values == pytest.approx(wanted[key], rel=4e-3, abs=near), key

@@ -30,8 +30,8 @@ SENSORS = {  # body, place before the middle and below the centre of gravity [m]
 class Tones:
     """Signals float64[..., tone] of an amplitude, a phase and a mean each."""
 
-    def __init__(self, seed, shape, mean, size):
-        random = np.random.default_rng(seed)
+    def __init__(self, seed, shape, mean, size, tones=TONES):
+        random, self.tones = np.random.default_rng(seed), tones
         self.mean = mean + 0.1 * size * random.normal(size=shape)
         self.size = size * random.uniform(0.3, 1.0, (*shape, len(TONES)))
         self.phase = random.uniform(0.0, 2.0 * np.pi, (*shape, len(TONES)))
@@ -40,7 +40,7 @@ class Tones:
         """At times float64[n], float64[n, ...]; `of`: of some of the signals."""
         size, phase, mean = self.size[of], self.phase[of], self.mean[of]
         waves = np.repeat(mean[None] * gain(np.zeros(1), band), len(t), axis=0)
-        for k, (f, passed) in enumerate(zip(TONES, gain(TONES, band), strict=True)):
+        for k, (f, passed) in enumerate(zip(self.tones, gain(self.tones, band), strict=True)):
             turns = 2.0 * np.pi * f * t.reshape(-1, *(1 for _ in mean.shape))
             waves += passed * size[..., k] * np.sin(turns + phase[..., k])
         return waves
