@@ -1,15 +1,19 @@
 """Clock, place and likeness of measured channels, each against a signal that is known."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import butter, freqs
 
 from railsim.errors import InputError
 from railsim.measurement.alignment import shift_of
 from railsim.measurement.clock import bridged, clock_of, delayed
+from railsim.measurement.columns import _length
+from railsim.measurement.counterpart import amplified
 from railsim.measurement.likeness import likeness
 from railsim.measurement.position import position
 
@@ -164,3 +168,36 @@ def test_distance_and_speed_that_differ_are_said_with_their_difference(share):
     assert s == pytest.approx((1.0 + share) * WAY)
     assert f"apart by {100.0 * share:+.2f} %" in remark
     assert f"{WAY[-1]:.1f} m by speed" in remark
+
+
+@pytest.mark.parametrize("filters", [{"low_pass": 9.0}, {"high_pass": 2.5},
+                                     {"low_pass": 9.0, "high_pass": 2.5}, {}])  # fmt: skip
+def test_an_amplifier_passes_tones_with_amplitude_and_phase_of_its_filters(filters):
+    """Butterworth of order 4, analogue, as scipy has it; a mean passes the low pass only."""
+    channel = SimpleNamespace(**{"low_pass": None, "high_pass": None} | filters)
+    t = np.arange(16_000) / 800.0
+    inner = slice(4000, -4000)
+    for f in (1.0, 2.5, 6.0, 9.0, 14.0):
+        H = 1.0 + 0.0j
+        for name, corner in filters.items():
+            b, a = butter(4, 2.0 * np.pi * corner, name.replace("_", ""), analog=True)
+            H *= freqs(b, a, [2.0 * np.pi * f])[1][0]
+        found = amplified(np.sin(2.0 * np.pi * f * t), 800.0, channel)
+        expected = np.imag(H * np.exp(2j * np.pi * f * t))
+        np.testing.assert_allclose(found[inner], expected[inner], atol=2e-3)
+    still = amplified(np.full(len(t), 3.0), 800.0, channel)
+    assert still[inner] == pytest.approx(0.0 if "high_pass" in filters else 3.0, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "index", "count"),
+    [((5,), (), 5), ((1, 5), (), 5), ((5, 1), (), 5), ((5, 3), (2,), 5), ((5, 3, 2), (2, 1), 5),
+     ((5, 2), (), None), ((5, 3), (3,), None), ((5,), (0,), None), ((), (), None)],
+)  # fmt: skip
+def test_a_series_is_a_row_or_a_column_or_along_the_first_axis(shape, index, count):
+    array = np.zeros(shape)
+    if count is not None:
+        assert _length(Path("made.mat"), array, "a", index) == count
+        return
+    with pytest.raises(InputError, match="index"):
+        _length(Path("made.mat"), array, "a", index)
