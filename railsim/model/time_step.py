@@ -18,6 +18,7 @@ from railsim.kernels.compiler import entry
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
+from railsim.kernels.internal import PAD
 from railsim.kernels.recording import Recorder
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import LAST_STEP, N_SCALARS, SPEED
@@ -35,6 +36,8 @@ SCHEMES = {"fast": FAST, "rk4": RK4}
 LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
 # the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
 LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 2.5e-3}
+# the same with dry friction: an empty wagon on link suspension sticks and slides within few steps
+LONGEST_STEP_FRICTION = 1.25e-3
 # m of track a step, on rigid and on elastic rails: the shortest waves of irregular track, 3 m, are
 # followed in some fifty steps; on elastic rails thirty are enough for a vehicle below its critical
 # speed, while one above it lets errors of phase grow
@@ -148,6 +151,8 @@ class Stability:
         if not system.support.elastic:
             return min(LONGEST_STEP[self._scheme], LONGEST_TRAVEL / speed)
         most = LONGEST_STEP_ELASTIC[self._scheme]
+        if (system.internal.kind == PAD).any():
+            most = min(most, LONGEST_STEP_FRICTION)
         usual, stable = LONGEST_TRAVEL_ELASTIC / speed, LONGEST_TRAVEL_STABLE / speed
         if usual < most:
             growth = _step_growth(self._model, system, state, self._scheme, usual)

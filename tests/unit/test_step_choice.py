@@ -41,6 +41,13 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(name, step, monkeypatch)
     assert len(judged) == 2
 
 
+def test_dry_friction_is_followed_in_short_steps():
+    """Stable at 2.5 ms, where sum_Y of R 250 m would be off by 3.8 % from RK4 at 0.125 ms; now 1 %."""
+    vehicle, track = load_vehicle("wagon_uic_link_empty"), load_track("straight")
+    steps = prepare(vehicle, track, Settings(), 15.0, duration=1.0).steps
+    assert steps.at(15.0)[0] == pytest.approx(1.25e-3)
+
+
 def test_outputs_as_dense_as_the_steps_take_one_step_each():
     vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
     settings = Settings(output_rate=2000.0)
