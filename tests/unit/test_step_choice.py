@@ -42,7 +42,7 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(name, step, monkeypatch)
 
 
 def test_dry_friction_is_followed_in_short_steps():
-    """Stable at 2.5 ms, where sum_Y of R 250 m would be off by 3.8 % from RK4 at 0.125 ms; now 1 %."""
+    """Stable at 2.5 ms, where sum_Y in R 250 m is off by 3.8 % from RK4; here 1 %."""
     vehicle, track = load_vehicle("wagon_uic_link_empty"), load_track("straight")
     steps = prepare(vehicle, track, Settings(), 15.0, duration=1.0).steps
     assert steps.at(15.0)[0] == pytest.approx(1.25e-3)
