@@ -1,5 +1,7 @@
 """Runs over the shipped crossing: impact against an independent wheel, resolution, leaving it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from railsim.profiles import load_profile
 from railsim.result.filters import low_passed
 from railsim.simulation import simulate
 
+pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")
 FURTHER = pytest.mark.further
 NOSE = 50.0  # m, the theoretical nose on the track
 DIP = 18.15e-3  # rad, both slopes of the path together
@@ -25,10 +28,11 @@ WHEEL, TRACK, PAD, PAD_DAMPING = 906.5, 245.0, 62e6, 55.4e3
 def crossing(**changes):
     """The transfer from wing to nose alone, whose tables take some seconds."""
     track = load_track("crossing_56e1_r245_1in9.25")
-    part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.45, "end": 50.5}
+    part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.6, "end": 50.5}
     return track.replace(**{"sections": [part], "check_rail": [], **changes})
 
 
+@cache
 def path_of_the_wheel():
     """Arc length from the nose, and height of a wheel S1002 that follows wing and nose [m]."""
     contours = load_track("crossing_56e1_r245_1in9.25").sections[0].contours

@@ -164,6 +164,7 @@ def test_uneven_load_gives_the_wheel_loads_of_its_moment():
     assert 0.075 + (1.90 - 0.85) * 0.012 / 0.85 < lever < 0.11
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
     empty, _, _ = standing("wagon_c62a_empty")
     laden, _, _ = standing("wagon_c62a")

@@ -37,6 +37,7 @@ def curving(vehicle, radius, cant, speed, friction=None):
     return found, solver, balance
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize("radius", [2000.0, -2000.0])
 def test_free_conical_wheelset_rolls_where_its_radii_fit_the_curve(radius):
     """Q1: y = -3.258 mm at R 2000 m, yaw 0 +- 2 urad; computed independently, 0.5 %."""
