@@ -1,15 +1,18 @@
 """`railsim plot` and `railsim compare` on the folders of studies."""
 
 import json
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
-from example_result import example_result
+from example_result import example_result, feed
 from selection import points
 from test_study import COACH, CURVE
 from test_study import simulated as simulated
 
 import railsim
+import railsim.studies.run
 from railsim.cli import main
 from railsim.cli.plot import _study_figure
 from railsim.compare import differences
@@ -18,11 +21,22 @@ from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
 SPEEDS = [10.0, 12.0]
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("made") / "s"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            railsim.studies.run, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
+        )
+        railsim.study([COACH, "coach_flexicoil"], CURVE, SPEEDS, out=out, workers=1,
+                      grid={"track.friction": [0.3, 0.4]})  # fmt: skip
+    return out
+
+
 @pytest.fixture
-def folder(tmp_path, simulated):
-    railsim.study([COACH, "coach_flexicoil"], CURVE, SPEEDS, grid={"track.friction": [0.3, 0.4]},
-                  out=tmp_path / "s", workers=1)  # fmt: skip
-    return tmp_path / "s"
+def folder(made, tmp_path):
+    """A copy of it, to write to."""
+    return Path(shutil.copytree(made, tmp_path / "s"))
 
 
 @points("chosen", [[], ["--kind", "map"], ["Y_over_Q_peak", "--kind", "ranking"]], always=(1, 2))
