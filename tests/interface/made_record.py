@@ -11,6 +11,10 @@ Q0 = 54.545e3
 KEPT = ("time", "distance", "Q", "Y", "Y_over_Q", "wheelset_distance", "T_gamma", "xi_x",
         "body_position", "body_velocity", "body_acceleration", "Q0")  # fmt: skip
 
+# as a run for an assessment may be stored, in a fifth of the instants; and instantaneous values
+FINE = {"rate": 1000.0, "settings": "{}"}
+FILTERED = '{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}'
+
 
 def track(*plan, cant=0.0, irregularities=()):
     """A track of plan elements; `cant` in its circles, ramps in its clothoids."""
@@ -43,7 +47,7 @@ def made(
     on,
     speed,
     *,
-    rate=1000.0,
+    rate=200.0,
     until=None,
     Y=None,
     Q=None,
@@ -51,7 +55,7 @@ def made(
     accelerations=None,
     without=(),
     status="complete",
-    settings="{}",
+    settings=FILTERED,
     T_gamma=None,
     vehicle=None,
     profiles=PROFILES,
