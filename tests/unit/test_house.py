@@ -22,11 +22,13 @@ def modules():
     }
 
 
+@cache
+def nodes():
+    return [(name, node) for name, tree in modules().items() for node in ast.walk(tree)]
+
+
 def functions():
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef):
-                yield name, node
+    return [(name, node) for name, node in nodes() if isinstance(node, ast.FunctionDef)]
 
 
 def is_command(function):
@@ -74,11 +76,10 @@ def test_only_two_modules_use_the_inside_of_numba():
     `record` has the types of records, `compiler` all else.
     """
     users = set()
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("numba.core"):
-                names = {alias.name for alias in node.names}
-                users |= {name} if names != {"cgutils"} else set()
+    for name, node in nodes():
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("numba.core"):
+            names = {alias.name for alias in node.names}
+            users |= {name} if names != {"cgutils"} else set()
     assert users == {"kernels/compiler.py", "kernels/record.py"}
 
 
