@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import contextlib
 import functools
 import os
 import sys
@@ -43,8 +44,12 @@ def stored_solutions(request, solutions_of_session):
 
     They are found anew in a test that replaces something: it may be what finds them.
     """
-    replaces = {"monkeypatch", "small_contact_tables_in_module"} & set(request.fixturenames)
-    folder = None if replaces else solutions_of_session
+    folder = solutions_of_session
+    if "monkeypatch" in request.fixturenames:
+        folder = None
+    elif any(name.startswith("small_contact_tables") for name in request.fixturenames):
+        folder = folder / "of_small_tables"  # which are no part of a solution's key
+        folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(railsim.model.solutions, "solutions_folder", lambda _: folder)
         patch.setattr(railsim.model.solutions, "MOST_NEW", sys.maxsize)
@@ -52,20 +57,28 @@ def stored_solutions(request, solutions_of_session):
         yield
 
 
-@pytest.fixture
-def small_contact_tables(monkeypatch):
+@contextlib.contextmanager
+def small_tables():
     """Contact tables of three nodes over the yaw, not seventeen, 0.2 mm apart: a tenth of the time.
 
     For tests that need another pair of profiles, another gauge or a new table, not fine values.
     """
-    monkeypatch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+        yield
+
+
+@pytest.fixture
+def small_contact_tables():
+    """See `small_tables`."""
+    with small_tables():
+        yield
 
 
 @pytest.fixture(scope="module")
 def small_contact_tables_in_module():
     """The same for all tests of a module and the fixtures that they share."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+    with small_tables():
         yield
 
 
