@@ -250,6 +250,6 @@ class _Pooled:
 
 
 def _larger(estimates: Sequence[Estimate]) -> Estimate:
-    """The largest estimate, which decides; nan where none has a value."""
+    """The largest estimate, which decides; where none has a value that of the largest mean."""
     known = [one for one in estimates if not math.isnan(one.value)]
-    return max(known, key=lambda one: one.value) if known else estimates[0]
+    return max(known or estimates, key=lambda one: one.value if known else one.mean)

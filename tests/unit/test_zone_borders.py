@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from railsim.assessment.sections import section_length, track_sections, zone_of
+from railsim.assessment.statistics import one_dimensional
+from railsim.assessment.zones import _larger
 from railsim.definitions.loading import load_running_limits
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Service
@@ -62,3 +65,10 @@ def test_sections_end_before_the_cant_changes():
     found = track_sections(track, limits, service, (0.0, 1000.0), lambda _: 20.0)
     # 100 m each, from 10 m, half of the rounding, behind a change to 10 m in front of the next
     assert [s.begin for s in found] == [10.0, 110.0, 210.0, 510.0, 610.0, 710.0, 810.0]
+
+
+def test_of_the_two_signs_of_one_section_the_larger_is_shown_whatever_the_hand():
+    """One value has no estimate: left and right exchanged, its mean is the same."""
+    signs = [one_dimensional(np.array([x]), 3.0) for x in (1.1, 1.7)]
+    assert all(np.isnan(one.value) for one in signs)
+    assert _larger(signs).mean == _larger(signs[::-1]).mean == 1.7
