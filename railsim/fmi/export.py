@@ -59,6 +59,12 @@ def fmu(
     wrapper = optional_package("pythonfmu3", "fmu", "'railsim[fmi]'")
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=(".fmu",))
+    settings = conditions.get("settings")
+    if settings is not None and settings.outputs.low_pass is not None:
+        found = "given, and outputs of a unit are values at an instant"
+        raise input_error(
+            "settings", found, "leave it out; filter in the program", "outputs.low_pass"
+        )
     name = _identifier(path.stem)
     with tempfile.TemporaryDirectory() as folder:
         stored, script = Path(folder) / INPUTS, Path(folder) / f"{name}.py"
