@@ -229,7 +229,7 @@ def test_wrong_variables_are_input_errors(active, track, tmp_path, change, words
 
 def test_low_pass_of_what_is_stored_does_not_pass_for_one_of_the_outputs(active, track, tmp_path):
     settings = railsim.Settings().with_values({"outputs.low_pass": {"frequency": 40.0}})
-    with pytest.raises(InputError, match="settings: outputs.low_pass: given"):
+    with pytest.raises(InputError, match=r"settings: outputs\.low_pass: given"):
         fmu(active, track, tmp_path / "coach.fmu", **{**WAY, "settings": settings})
     assert not list(tmp_path.iterdir())
 
