@@ -164,6 +164,8 @@ def command(
             write_report([str(outcome.folder)], output.written[0])
     if not output.as_json:
         lines.end()
+        for key in () if output.quiet else outcome.without_effect():
+            echo(f"remark: {key} changes no peak of any run")
         kept_runs = len(outcome.records) - outcome.computed
         present = f", {kept_runs} were there already" if kept_runs else ""
         computed = outcome.computed - len(outcome.failed)

@@ -1,5 +1,6 @@
 """`Outcome`: results of a study in its folder, and its summary as a table or an array."""
 
+import json
 import math
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from railsim.studies.summary import summary_row, unit_of
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+MOST_COMPARED = 2000  # runs
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,27 @@ class Outcome:
     def ended_early(self) -> tuple[Record, ...]:
         """Runs that ended early for a physical reason."""
         return self.records.where(lambda status: status not in ("complete", "failed"))
+
+    def without_effect(self) -> list[str]:
+        """Return varied keys of files that change no peak of any run, such as what others replace.
+
+        Looked for where no more than `MOST_COMPARED` runs are there.
+        """
+        names, found = self._labels(), list[str]()
+        if len(self.records) > MOST_COMPARED:
+            return []
+        for name in names:
+            alike: dict[str, set[str]] = {}
+            several = set[str]()
+            for record in self.records:
+                if "." in name and record.get("peaks"):
+                    others = json.dumps({k: v for k, v in record["labels"].items() if k != name})
+                    several |= {others} & alike.keys()
+                    values = json.dumps([record["peaks"], record.get("mid_curves")])
+                    alike.setdefault(others, set()).add(values)
+            if several and all(len(alike[others]) == 1 for others in several):
+                found.append(name)
+        return found
 
     def results(self) -> dict[str, Result]:
         """Return the results by the names of their runs; arrays are read on access."""

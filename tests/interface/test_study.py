@@ -769,3 +769,14 @@ def test_workers_that_are_no_number_of_processes_are_refused(tmp_path, workers):
     with pytest.raises(InputError, match=r"workers: found .*; a whole number above 0"):
         railsim.study(COACH, CURVE, 20.0, out=tmp_path / "s", workers=workers)
     assert not (tmp_path / "s").exists()
+
+
+def test_a_key_that_changes_nothing_is_told(tmp_path, capsys):
+    """Friction beside a table of it; cells of FASTSIM do change something."""
+    table = "track.friction_table=[[0.0, 0.4], [50.0, 0.1]]"
+    grid = ["--grid", "track.friction=0.2,0.3", "settings.fastsim_grid=[5,5],[10,10]"]
+    runs = ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", *grid, "--set", table]
+    how = ["--duration", "0.2", "--workers", "1", "--out", str(tmp_path / "study")]
+    assert main(["study", *runs, *how]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "changes no peak" in line]
+    assert said == ["remark: track.friction changes no peak of any run"]
