@@ -28,7 +28,7 @@ def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float
         f"{vehicle.name} on {track.name} at {speed:g} m/s ({3.6 * speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
         f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
-        f"{track.gauge * 1e3:g} mm, friction {_friction(track)}",
+        f"{track.gauge * 1e3:g} mm, friction {_friction(track, settings)}",
         f"  forces    {_creep_law(settings)}, G {settings.shear_modulus / 1e9:g} GPa, "
         f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
         f"  track     transitions rounded over {track.rounding:g} m, cant about the "
@@ -56,16 +56,22 @@ def _irregularity_lines(track: Track) -> list[str]:
     return [f"  rails     {'; '.join(words)}"] if words else []
 
 
-def _friction(track: Track) -> str:
+def _friction(track: Track, settings: Settings) -> str:
     """Coefficients of friction, how they fall with slip, and the third body, where it is given."""
     text = _listed(f"{mu:g}" for mu in track.friction)
     if track.friction_table is not None:
         text = "by table"
-    if track.friction_falling is not None:
-        falling = track.friction_falling
+    falling = track.friction_falling
+    if settings.own_friction is not None:
+        text += f" (times law {settings.own_friction.law} of the slip)"
+    elif falling is not None:
         text += f" (with slip down to {falling.rest:g} of it, {falling.decay:g} s/m)"
     if track.third_body != (1.0, 1.0):
-        text += f", third body {_listed(f'{k:g}' for k in track.third_body)}"
+        factors = [f"{factor:g}" for factor in track.third_body]
+        alone = settings.creep_law == "polach" and settings.own_creep_law is None
+        text += f", third body {_listed(factors if alone else factors[:1])}"
+        if not alone and factors[1] != factors[0]:
+            text += f" (not {factors[1]} in the slip area: of Polach's law alone)"
     return text
 
 
@@ -73,6 +79,8 @@ def _creep_law(settings: Settings) -> str:
     law = CREEP_LAWS[settings.creep_law]
     nx, ny = settings.fastsim_grid
     text = f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
+    if settings.own_creep_law is not None:
+        text = f"creep law {settings.own_creep_law.law}"
     return text + ", transient" * settings.transient_creep
 
 

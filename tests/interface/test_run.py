@@ -145,6 +145,24 @@ def test_support_is_told_and_whether_its_values_are_the_presets():
         assert f"  support   {words}" in lines
 
 
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({}, "(with slip down to 0.4 of it, 0.6 s/m), third body 0.5 (not 0.2 in the slip area"),
+        ({"creep_law": "polach"}, "0.6 s/m), third body 0.5 / 0.2"),
+        ({"own_friction": {"law": "mine"}}, "(times law mine of the slip), third body 0.5 (not"),
+        ({"own_creep_law": {"law": "mine"}}, "  forces    creep law mine, G"),
+    ],
+)
+def test_laws_that_are_told_are_those_in_force(settings, words):
+    """One's own replace others, and the second factor of a layer is of Polach's law alone."""
+    coach = railsim.load_vehicle("coach_manchester")
+    layer = {"third_body": [0.5, 0.2], "friction_falling": {"rest": 0.4, "decay": 0.6}}
+    track = railsim.load_track("straight").replace(**layer)
+    given = railsim.Settings.model_validate(settings)
+    assert words in "\n".join(assumptions(coach, track, given, 20.0))
+
+
 def test_run_may_start_anywhere(tmp_path):
     path = tmp_path / "run.h5"
     given = [*COACH, "--speed", "20", "--start", "100", "--until", "110", "--out", str(path)]
