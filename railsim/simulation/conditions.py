@@ -192,6 +192,9 @@ def state_before(
         for key in here
         if key not in OUTPUT_SETTINGS and here[key] != there[key]
     ]
+    if settings.initial and here["initial"] != there["initial"]:
+        found, allowed = "given, and the run has no start", "none, or that of the result"
+        faults.append(argument_fault("resume", "settings.initial", found, allowed, "--continue"))
     if faults:
         raise InputError(faults)
     return state_before(vehicle, track, settings, resume.groups["state"])

@@ -108,6 +108,16 @@ def test_jump_at_low_speed_is_off_by_the_square_of_the_step(straight):
     assert np.max(np.abs(quarter.Y - half.Y)[late]) < error / 3.0
 
 
+def test_a_disturbance_of_its_own_is_refused_where_a_run_goes_on(bogie, straight):
+    """It would have no effect; that of the first run, or none, is no other."""
+    pushed, more = (Settings(initial={"front.outer.wheelset": {"y": y}}) for y in (1e-3, 2e-3))
+    first = simulate(bogie, straight, speed=10.0, duration=0.2, settings=pushed)
+    for settings in (pushed, Settings()):
+        assert simulate(bogie, straight, resume=first, duration=0.1, settings=settings).status
+    with pytest.raises(InputError, match=r"settings\.initial: given, and the run has no start"):
+        simulate(bogie, straight, resume=first, duration=0.1, settings=more)
+
+
 @pytest.mark.parametrize("start", [123.4, 390.0, 700.0])
 def test_start_anywhere(start):
     """On the straight nothing happens, in the curve the vehicle has settled."""
