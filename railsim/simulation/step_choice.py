@@ -22,6 +22,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.actuators import BY_BRAKE, LIMIT, MODE
 from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.system import BRAKES, RADIUS, System
@@ -39,7 +40,7 @@ CLASS = 1.2  # ratio of the speeds of a class
 # part of the output interval by which a given step may miss an integer fraction: six digits
 WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
-HELD = 1.6  # z in `braked_step`
+HELD, DRY = 1.6, 0.5  # z in `braked_step`; friction of dry rails
 MOST_JUDGED = 10_000
 # whether steps hold in classes that this process has judged or read, by a hash of all inputs
 _JUDGED: dict[str, bool] = {}
@@ -262,7 +263,8 @@ def with_class_friction(model: Model, *, least: bool = False) -> Model:
 def braked_step(system: System) -> float:
     """Longest step with which brakes hold a locked wheelset still [s].
 
-    Below `BRAKES_FULLY` they are dampers of its spin, which alternates from z = h c/I = 1.7 on.
+    Below `BRAKES_FULLY` they are dampers of its spin, which alternates from z = h c/I = 1.7 on. A
+    commanded brake is taken at its limit, and not above what slides on dry rails.
     """
     drives, bodies = system.drives, system.bodies
     torque = np.zeros(len(bodies.kind))
@@ -271,6 +273,11 @@ def braked_step(system: System) -> float:
         factors = np.abs(drives.table[demand:end, 1])
         most = np.abs(drives.table[first:demand, 1]).max()
         torque[drives.body[e, 1]] += most * (factors.max() if end > demand else 1.0)
+    acts, contact = system.actuators, system.contact
+    for i in np.flatnonzero(acts.which[:, MODE] == BY_BRAKE):
+        w = acts.body[i, 1]
+        dry = DRY * 2.0 * contact.load[contact.body == w].sum() * bodies.row[w, RADIUS]
+        torque[w] += min(acts.row[i, LIMIT], dry)
     rate = torque * bodies.row[:, RADIUS] / (BRAKES_FULLY * bodies.inertia[:, 1])
     return HELD / fastest if (fastest := float(rate.max())) else math.inf
 
