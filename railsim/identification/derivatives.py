@@ -38,6 +38,7 @@ MOST_TIMES = 2  # that the step is shortened
 TOLERANCE = 1e-2  # r
 KINK = 0.7  # of r at the longer step: r has not fallen
 STATUS = 0.1  # share of one instant's derivative: sides differ there
+LEAST = 1e-3  # share of either side that a derivative is taken for at least, to compare with
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,8 +269,8 @@ def _forward(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[De
     found = []
     for k, y in enumerate(base):
         values = [(one[k] - y) / step for one in moved]
-        linear = -step * np.sum(values, axis=0)
-        error = _size(together[k] - y - linear) / max(_size(linear), 1e-300)
+        linear, whole = -step * np.sum(values, axis=0), together[k] - y
+        error = _size(whole - linear) / max(_size(linear), LEAST * _size(whole), 1e-300)
         found.append([Derivative(value, error, step) for value in values])
     return found, count + 2
 
@@ -307,10 +308,11 @@ def _one(
 ) -> tuple[Derivative, float]:
     """Return a central derivative and the difference of its sides as a share of it."""
     up, down = (above - y) / step, (y - below) / step
-    value = 0.5 * (up + down)
-    size = max(_size(value), 1e-300)
+    value, sides = 0.5 * (up + down), max(_size(up), _size(down))
+    size = max(_size(value), LEAST * sides, 1e-300)
     ratio = 0.5 * _size(up - down) / size
-    rounding = 1e-13 * _size(y) / (step * size)
+    # of an output that does not depend on the parameter there is nothing to round
+    rounding = 1e-13 * _size(y) / (step * size) if sides else 0.0
     error = ratio**2 if before is None else _size(value - before.value) / size
     error = max(error, rounding)
     if ratio > STATUS:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
+from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
 from railsim.identification.fit import _counting, _solved
 from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem
@@ -206,3 +207,68 @@ def test_whiteness_is_the_statistic_of_kolmogorov_and_smirnov():
     assert statistic == pytest.approx(distance * np.sqrt(300.0))
     series = sum((-1) ** (j - 1) * np.exp(-2.0 * j**2 * statistic**2) for j in range(1, 50))
     assert chance == pytest.approx(2.0 * series, rel=1e-6)
+
+
+def outputs_of(x):
+    """Three smooth values, a constant, and three with a kink at the parameters themselves."""
+    a, b = x
+    smooth = np.array([np.exp(2.0 * a + b), np.sin(0.3 + 4.0 * a - 5.0 * b), 2.0 + 3.0 * b])
+    kinks = [1.0 + max(a, 0.0)], [2.0 + 4.0 * a, 1.0 + abs(b)], [5.0 + 2.0 * min(b, 0.0)]
+    return [smooth, np.array([7.0]), *map(np.array, kinks)]
+
+
+SLOPES = [
+    [[2.0, 4.0 * np.cos(0.3), 0.0], [1.0, -5.0 * np.cos(0.3), 3.0]], [[0.0], [0.0]],
+    [[0.5], [0.0]], [[4.0, 0.0], [0.0, 0.0]], [[0.0], [1.0]],
+]  # fmt: skip
+KINKS = {(2, 0): 1.0, (3, 1): 0.5, (4, 1): 1.0}
+"""Share of the values with a kink, by output and parameter."""
+
+
+def test_derivatives_by_differences_are_those_of_the_functions():
+    """Central ones within their error; where sides differ, their mean, and that there is none."""
+    asked = []
+
+    def variants(points, pool):
+        asked.extend(points)
+        return [outputs_of(x) for x in points]
+
+    job = SimpleNamespace(parameters=("a", "b"), variants=variants)
+    base = outputs_of(np.zeros(2))
+    found, runs = _central(job, base, None)
+    assert runs == len(asked) + 1
+    for k, row in enumerate(SLOPES):
+        for j, slope in enumerate(row):
+            one = found[k][j]
+            assert one.value == pytest.approx(slope, rel=5e-4, abs=1e-9), (k, j)
+            assert one.is_smooth != ((k, j) in KINKS), (k, j)
+            assert one.kinked == KINKS.get((k, j), 0.0)
+            if one.is_smooth and np.any(slope):
+                exact = np.linalg.norm(one.value - slope) / np.linalg.norm(slope)
+                assert exact <= 10.0 * one.error + 1e-9  # it is an estimate
+            assert one.error < 2e3  # it is told in per cent
+    asked.clear()
+    found, runs = _forward(job, base, None)
+    assert runs == len(asked) + 1 == 4
+    step = found[0][0].step
+    for j, slope in enumerate(SLOPES[0]):
+        assert found[0][j].value == pytest.approx(slope, abs=20.0 * step)
+        assert found[0][j].error < 30.0 * step
+    # the last variant moves all parameters back: a kink shows
+    assert [one.is_smooth for one in (found[1][0], found[2][0], found[4][1])] == [
+        True,
+        False,
+        False,
+    ]
+    assert all(one.error < 2e3 for row in found for one in row)
+
+
+def test_table_of_derivatives_shows_root_mean_squares():
+    values = np.array([3.0, -4.0, 12.0]), np.array([1.0, 2.0, -2.0])
+    one = Derivative(values[1], 0.02, 1e-2, 0.0)
+    found = Sensitivity((), ("Q",), None, {"Q": values[0]}, {("Q", "a"): one}, 3)
+    (row,) = found.table().records()
+    assert row["rms"] == pytest.approx(np.sqrt(169.0 / 3.0))
+    assert row["derivative"] == pytest.approx(np.sqrt(9.0 / 3.0))
+    assert (row["error"], row["step"], row["smooth"]) == (0.02, 1e-2, "yes")
+    assert found["Q", "a"] is one.value
