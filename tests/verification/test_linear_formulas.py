@@ -12,7 +12,7 @@ from railsim.linear.coordinates import Coordinates
 from railsim.linear.eigenmodes import Eigenmodes, eigenmodes, oscillations, pairing
 from railsim.linear.naming import Parts, mode_name
 from railsim.linear.system import Linearisation, jacobian, without_forceless
-from railsim.linear.track_response import TrackResponse
+from railsim.linear.track_response import RAILS, TrackResponse, _forces_of, _of_wheelsets, _power
 from railsim.stability.branches import Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.motion import Stretch
 
@@ -119,6 +119,48 @@ def test_response_of_a_state_space_is_that_of_its_equations(seed):
             rate = A @ x + drive
             y = C @ x + np.einsum("mwqj,wqj->m", D, u) + R @ rate + np.einsum("mwc,wc->m", own, d)
             assert H[:, quantity] == pytest.approx(y, rel=1e-9)
+
+
+def test_irregularities_displace_both_rails_as_they_are_measured():
+    """Alignment and level are means of both, cross level and gauge their differences."""
+    for k, (y_left, z_left, y_right, z_right) in enumerate(RAILS):
+        read = (
+            (y_left + y_right) / 2.0,
+            (z_left + z_right) / 2.0,
+            z_right - z_left,
+            y_right - y_left,
+        )
+        assert read == pytest.approx(np.eye(4)[k])
+    for order in range(3):
+        v, u = np.array([-0.3, 0.2, 1.1]), 0.4
+        exact = (v - u) ** order / [1.0, 1.0, 2.0][order]
+        assert np.polynomial.polynomial.polyval(v, _power(order, u)) == pytest.approx(exact)
+
+
+def test_forces_on_the_rails_of_unknown_accelerations_balance_two_wheelsets():
+    """Newton and Euler about the axle: the lateral force acts at the radius below it."""
+    random = np.random.default_rng(4)
+    mass, roll, radius = random.uniform(1.0, 2.0, (3, 6))
+    bodies = SimpleNamespace(mass=mass, inertia=np.column_stack([roll] * 3), radius=radius)
+    contact, track = SimpleNamespace(body=np.array([5, 2])), SimpleNamespace(rail_base=1.5)
+    own = _forces_of(SimpleNamespace(bodies=bodies, contact=contact, track=track), 3)
+    names = dict(zip(_of_wheelsets(2), range(3, 15), strict=True))
+    assert own.shape == (15, 2, 4)
+    assert not own[:3].any()
+    for w, b in enumerate(contact.body):
+        d = random.normal(size=4)  # y, z, roll, yaw
+        there = dict(zip(names, own[list(names.values()), w] @ d, strict=True))
+        own_names = [n for n in names if n.split(".")[1] == str(w + 1)]
+        assert {n for n, force in there.items() if force} == {n for n in own_names if n[0] != "l"}
+        Y = there[f"Y.{w + 1}.left"], there[f"Y.{w + 1}.right"]
+        Q = there[f"Q.{w + 1}.left"], there[f"Q.{w + 1}.right"]
+        assert sum(Y) == pytest.approx(-mass[b] * d[0])
+        assert there[f"sum_Y.{w + 1}"] == pytest.approx(sum(Y))
+        assert Y[0] == pytest.approx(Y[1])
+        assert sum(Q) == pytest.approx(-mass[b] * d[1])
+        # of the rails on the wheelset: y sum(Y) below the axle, z at half the base on either side
+        moment = 0.75 * (Q[0] - Q[1]) + radius[b] * sum(Y)
+        assert moment == pytest.approx(roll[b] * d[2])
 
 
 # names ------------------------------------------------------------------------------------------
