@@ -225,7 +225,7 @@ def sensitivity(
     }
     remarks = [
         f"{output} has no derivative to {name}: its two sides differ by {100 * one.error:.0f} %"
-        + (f" ({100 * one.kinked:.2g} % of the values)" if np.isfinite(one.kinked) else "")
+        + (f" ({100 * one.kinked:.3g} % of the values)" if np.isfinite(one.kinked) else "")
         + "; flange, stop, lifted wheel or sticking friction."
         for (output, name), one in derivatives.items()
         if not one.is_smooth

@@ -89,7 +89,7 @@ def clock_of(file: str, written: Floats) -> Clock:
         f"The time steps are unequal ({steps.min():.3g} to {steps.max():.3g} s); the channels "
         f"are interpolated to {1.0 / median:.6g} values per second."
     )
-    time = written[0] + median * np.arange(round(span / median) + 1)
+    time = written[0] + median * np.arange(int(span / median + 1e-6) + 1)
     return Clock(time, 1.0 / median, None, written, tuple(remarks))
 
 

@@ -70,7 +70,7 @@ def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) ->
     if known.sum() < 2:
         raise input_error(file, "no values", "a channel with values", key=name)
     if not known.all():
-        remarks.append(f"The {name} has gaps ({100 * np.mean(~known):.2g} %): linear over them.")
+        remarks.append(f"The {name} has gaps ({100 * np.mean(~known):.3g} %): linear over them.")
         x = np.interp(time, time[known], x[known])
     if name == "speed" and x.min() < -0.1:
         raise input_error(file, f"{x.min():.3g} m/s", "speeds forwards; 'reverse'?", key=name)

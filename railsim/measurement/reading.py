@@ -161,7 +161,7 @@ def _channel(
     x = bridged(x, round(how.longest_gap * clock.rate))
     unknown = float(np.mean(np.isnan(x)))
     if unknown and channel.quantity not in AXES:
-        remarks.append(f"{name}: {100.0 * unknown:.2g} % of the values are missing.")
+        remarks.append(f"{name}: {100.0 * unknown:.3g} % of the values are missing.")
     return x
 
 

@@ -201,3 +201,25 @@ def test_a_series_is_a_row_or_a_column_or_along_the_first_axis(shape, index, cou
         return
     with pytest.raises(InputError, match="index"):
         _length(Path("made.mat"), array, "a", index)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10_000), st.floats(0.4, 0.49))
+def test_unequal_steps_leave_nothing_without_a_value(seed, jitter):
+    """Interpolated from the first value to the last, and not beyond."""
+    random = np.random.default_rng(seed)
+    written = 0.01 * (np.arange(200) + jitter * random.uniform(-1.0, 1.0, 200))
+    clock = clock_of("made", written)
+    if clock.places is not None:  # so even by chance that they are a clock with few digits
+        return
+    found = clock.on_grid(3.0 * written)
+    assert np.isfinite(found).all()
+    assert found == pytest.approx(3.0 * clock.time)
+    assert written[-1] - clock.time[-1] < 1.0 / clock.rate
+
+
+def test_shares_of_missing_values_are_plain_numbers():
+    how = SimpleNamespace(speed=None, start=0.0)
+    gappy = np.where(np.arange(len(V)) < 3, V, np.nan)
+    _, _, (remark, *_) = position("made", how, TIME, {"distance": WAY, "speed": gappy}, None)
+    assert "gaps (99.8 %)" in remark
