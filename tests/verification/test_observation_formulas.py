@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from railsim.errors import InputError
+from railsim.linear.track_response import QUANTITIES
 from railsim.observation.contact import Noise, _smoothed
-from railsim.observation.estimate import BANDS, estimate_of
+from railsim.observation.estimate import BANDS, Estimate, estimate_of, joined
 from railsim.observation.innovations import Powers, Sizes, disagreeing, level_of, spectra_of
 from railsim.observation.pieces import Piece, on_grid, pieces_of
 
@@ -210,3 +211,77 @@ def test_estimate_of_a_piece_adds_up_its_fields_and_leaves_out_what_is_not_seen(
         assert found.bands[name] == pytest.approx(inside)
         spread = np.sqrt((gain**2 * both) @ error / points)
         assert found.band_deviations[name] == pytest.approx(spread)
+
+
+NAMES = ("Q.1.left", "Y.1.right", "lateral.1")
+
+
+def made_irregularity(random):
+    """One piece of 1001 places; between 5 and 10 m nothing is seen of the level."""
+    s, count = 100.0 + STEP * np.arange(1001), len(QUANTITIES)
+    k = 2.0 * np.pi * np.fft.rfftfreq(2048, STEP)
+    power = np.tile(np.where((k > 0.05) & (k < 2.0), 1.0 / (0.1 + k**2), 0.0), (count, 1))
+    seen = np.where(power > 0.0, 0.9, 0.0)
+    seen[1, (k > 2.0 * np.pi / 10.0) & (k < 2.0 * np.pi / 5.0)] = 0.2
+    values, names = 1e-3 * random.normal(size=(count, len(s))), NAMES
+    forces = np.array([[5e4], [2e3], [1e-3]]) * (1.0 + 0.1 * random.normal(size=(3, len(s))))
+    piece = Estimate(
+        s=s, speed=20.0, values=values, deviations=1e-4 * np.arange(1.0, count + 1.0),
+        bands={band: (2.0 + j) * values for j, band in enumerate(BANDS)},
+        band_deviations={band: 1e-4 * (3.0 + j) * np.arange(1.0, count + 1.0)
+                         for j, band in enumerate(BANDS)},
+        wave_numbers=k, seen=seen, power=power, outputs=names, forces=forces,
+        force_deviations=np.array([300.0, 200.0, 1e-4]),
+    )  # fmt: skip
+    return piece, joined("run", "coach", [piece], np.array([1.0]), ())
+
+
+def test_tables_of_an_estimate_are_its_rms_values_and_largest_forces():
+    piece, found = made_irregularity(np.random.default_rng(9))
+    rows = {(row["quantity"], row["band"]): row for row in found.table().records()}
+    for q, name in enumerate(QUANTITIES):
+        for j, (band, (shortest, longest)) in enumerate(BANDS.items()):
+            row = rows[name.replace("_", " "), band]
+            assert row["rms"] == pytest.approx((2.0 + j) * np.std(piece.values[q]))
+            assert row["deviation"] == pytest.approx(1e-4 * (3.0 + j) * (q + 1.0))
+            inside = (piece.wave_numbers >= 2.0 * np.pi / longest) & (
+                piece.wave_numbers <= 2.0 * np.pi / shortest
+            )
+            share = np.average(piece.seen[q, inside], weights=piece.power[q, inside])
+            assert row["seen"] == pytest.approx(share)
+    ((low, high),) = found.unseen()["level"]
+    assert (low, high) == pytest.approx((5.0, 10.0), abs=0.25)
+    assert not any(found.unseen()[name] for name in QUANTITIES if name != "level")
+    assert found.notes[0].startswith("Wavelengths not seen and not filled in, level: ")
+    forces = found.forces_table().records()
+    assert [row["force"] for row in forces] == ["Q.1.left", "Y.1.right"]
+    for row, values, rest in zip(forces, piece.forces, (300.0, 200.0), strict=False):
+        at = np.argmax(np.abs(values))
+        assert row["largest"] == pytest.approx(np.abs(values[at]))
+        assert row["place"] == pytest.approx(piece.s[at])
+        assert (row["rms"], row["deviation"]) == pytest.approx((np.std(values), rest))
+
+
+def test_files_of_an_estimate_hold_every_column_in_its_unit(tmp_path):
+    piece, found = made_irregularity(np.random.default_rng(10))
+    paths = {path.name: path for path in found.write(tmp_path)}
+    wanted = {"s_m": piece.s}
+    for q, name in enumerate(QUANTITIES):
+        wanted[f"{name}_mm"] = 1e3 * piece.values[q]
+        wanted[f"{name}_deviation_mm"] = np.full(1001, 0.1 * (q + 1.0))
+        for j, band in enumerate(BANDS):
+            wanted[f"{name}_{band}_mm"] = 1e3 * (2.0 + j) * piece.values[q]
+            wanted[f"{name}_{band}_deviation_mm"] = np.full(1001, 0.1 * (3.0 + j) * (q + 1.0))
+    for k, (name, unit, factor) in enumerate(
+        (("Q.1.left", "kN", 1e-3), ("Y.1.right", "kN", 1e-3), ("lateral.1", "mm", 1e3))
+    ):
+        wanted[f"{name}_{unit}"] = factor * piece.forces[k]
+        wanted[f"{name}_deviation_{unit}"] = np.full(1001, factor * piece.force_deviations[k])
+    columns = {}
+    for path in paths.values():
+        if path.suffix == ".csv":
+            heads = path.read_text().splitlines()[0].split(",")
+            rows = np.loadtxt(path, delimiter=",", skiprows=1)
+            columns |= dict(zip(heads, rows.T, strict=True))
+    for name, values in wanted.items():
+        np.testing.assert_allclose(columns[name], values, rtol=1e-5, atol=1e-9, err_msg=name)
