@@ -187,8 +187,8 @@ class Irregularity(Estimated):
         return (
             'format = "railsim-track/1"\n'
             f'name = "Track under {self.vehicle}"\n\n'
-            f'[[plan]]\ntype = "STR"\nlength = {length:g}\n\n'
-            f'[[cant]]\ntype = "CST"\nlength = {length:g}\ncant = 0.0\n\n'
+            f'[[plan]]\ntype = "STR"\nlength = {length:.1f}\n\n'
+            f'[[cant]]\ntype = "CST"\nlength = {length:.1f}\ncant = 0.0\n\n'
             f'[[irregularities]]\ntype = "measured"\nfile = "{FILES[0]}"\n'
         )
 
@@ -313,4 +313,6 @@ def _merged(ranges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 def _csv(path: Path, columns: Mapping[str, Floats]) -> None:
     with whole_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(columns) + "\n")
-        np.savetxt(file, np.transpose(list(columns.values())), fmt="%.6g", delimiter=",")
+        # the arc length to 0.1 mm at 100 km, where six digits are a metre
+        formats = ["%.9g", *["%.6g"] * (len(columns) - 1)]
+        np.savetxt(file, np.transpose(list(columns.values())), formats, delimiter=",")

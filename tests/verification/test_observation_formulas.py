@@ -1,17 +1,20 @@
 """Pieces of a run and what its channels say of each other, of signals that are known."""
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from railsim.definitions.loading import load_track
 from railsim.errors import InputError
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation.contact import Noise, _smoothed
 from railsim.observation.estimate import BANDS, Estimate, estimate_of, joined
 from railsim.observation.innovations import Powers, Sizes, disagreeing, level_of, spectra_of
 from railsim.observation.pieces import Piece, on_grid, pieces_of
+from railsim.track.irregularity import displacement
 
 N = 2000  # points of a piece
 STEP = 0.25  # m
@@ -285,3 +288,15 @@ def test_files_of_an_estimate_hold_every_column_in_its_unit(tmp_path):
             columns |= dict(zip(heads, rows.T, strict=True))
     for name, values in wanted.items():
         np.testing.assert_allclose(columns[name], values, rtol=1e-5, atol=1e-9, err_msg=name)
+
+
+def test_a_recording_beyond_100_km_is_read_as_it_was_written(tmp_path):
+    _, found = made_irregularity(np.random.default_rng(11))
+    far = replace(found, s=found.s + 150e3)
+    far.write(tmp_path)
+    track = load_track(tmp_path / "track.toml")
+    assert track.length >= far.s[-1]
+    inner = slice(300, 700)
+    y_left, z_left, y_right, z_right = displacement(track)(far.s[inner])[0]
+    read = 0.5 * (y_left + y_right), 0.5 * (z_left + z_right), z_right - z_left, y_right - y_left
+    np.testing.assert_allclose(read, far.values[:, inner], atol=1e-7)
