@@ -4,13 +4,18 @@ Forces are those of the potential energy over the actuator's length, by differen
 the program finds least and largest values between positions is used.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_mechanism
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
+from railsim.mechanisms.dynamics import law_of
+from railsim.mechanisms.forces import Rates, generalised_force
 from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.model import build
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.summary import analysis_data
 
@@ -106,3 +111,29 @@ def test_a_bore_is_chosen_that_gives_the_largest_force_and_a_stroke_that_fits(re
         size = 1e-3 * float(choice.name.split()[1])
         assert choice.fits == (size >= bore and not short), choice
         assert any("bore" in why for why in choice.reasons) == (size < bore)
+
+
+@pytest.mark.parametrize("body", ["boom", "trapezoid"])
+def test_friction_of_a_joint_takes_work_whichever_way_its_body_turns(body):
+    """The trapezoid turns against the boom: Q = -M |theta'| on the way, and + on the way back."""
+    rubbing = [f"elements.rub={{joint_friction='{body}',moment=50.0}}"]
+    found = build(load_mechanism("atr95_lift_5", rubbing))
+    motion = solve(found, np.linspace(found.start, found.end, 9))
+    turning = motion.q1[:, found.bodies[body], 2]
+    assert np.all(turning > 0.0) == (body == "boom")
+    without = generalised_force(motion, Rates())
+    for way in (1, -1):
+        taken = generalised_force(motion, Rates(friction=way)) - without
+        assert taken == pytest.approx(-way * 50.0 * np.abs(turning))
+
+
+def test_a_motion_by_table_lasts_from_its_first_time_to_its_last():
+    """Of rows that begin at 2 s; a cubic through four of them."""
+    rows = [(2.0, 0.1), (3.0, 0.2), (4.5, 0.25), (5.0, 0.4)]
+    law = SimpleNamespace(law="table", table=rows)
+    function, duration = law_of(SimpleNamespace(number=float), law, 0.3)
+    assert duration == 3.0
+    cubic = np.polynomial.Polynomial.fit(*np.transpose(rows), 3)
+    t = np.linspace(0.0, 3.0, 7)
+    for k, values in enumerate(function(t)):
+        assert values == pytest.approx(cubic.deriv(k)(t + 2.0) if k else cubic(t + 2.0))
