@@ -13,6 +13,7 @@ from scipy import stats
 from railsim.assessment.criteria import CRITERIA
 from railsim.assessment.en14363 import SectionValues
 from railsim.assessment.sections import TestSection
+from railsim.assessment.statistics import multiple_regression
 from railsim.assessment.zones import Population, zone_reports
 from railsim.definitions.loading import load_running_limits, load_vehicle
 from railsim.definitions.vehicle.tables import Service
@@ -63,7 +64,7 @@ def made(zone, count, spread, *, signs=1, high=0.0, seed=0):
             size = SIZES[criterion.unit]
             for place in places(name):
                 number = size * (0.3 + 0.1 * random.normal(size=signs) + 2.0 * deficiency)
-                number = 2.4 * number if high and name == "Y_qst" else number
+                number = 2.2 * number if high and name == "Y_qst" else number
                 values[name, place] = (number + high * (name == "Y_over_Q_inner")).tolist()
         found.append(SectionValues(section, values))
     return found
@@ -159,3 +160,18 @@ def test_rows_of_a_zone(zone, count, spread, signs, category, km_h, high, method
         else:
             best = min if row.criterion.kind == "smallest" else max
             assert row.estimate.value == best(one.estimate.value for one in rivals)
+
+
+def test_regression_over_several_influences_is_that_of_the_normal_equations():
+    """Standard error with N - k - 1 degrees of freedom; share of the variance explained."""
+    random = np.random.default_rng(3)
+    x, y = random.normal(size=(9, 3)) * [1.0, 1e-3, 50.0], random.normal(size=9)
+    target = np.array([0.5, 2e-3, -30.0])
+    design = np.column_stack([np.ones(9), x])
+    b = np.linalg.solve(design.T @ design, design.T @ y)
+    rest = y - design @ b
+    found = multiple_regression(x, y, target)
+    assert found.coefficients == pytest.approx(b)
+    assert found.error == pytest.approx(np.sqrt(rest @ rest / (9 - 3 - 1)))
+    assert found.determination == pytest.approx(1.0 - rest @ rest / np.sum((y - y.mean()) ** 2))
+    assert found.value == pytest.approx(b[0] + target @ b[1:])

@@ -11,6 +11,7 @@ import pytest
 
 from railsim.definitions.loading import load_mechanism
 from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.cams import transitions
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.dynamics import law_of
 from railsim.mechanisms.forces import Rates, generalised_force
@@ -137,3 +138,15 @@ def test_a_motion_by_table_lasts_from_its_first_time_to_its_last():
     t = np.linspace(0.0, 3.0, 7)
     for k, values in enumerate(function(t)):
         assert values == pytest.approx(cubic.deriv(k)(t + 2.0) if k else cubic(t + 2.0))
+
+
+def test_arcs_of_a_cam_are_counted_from_one_where_the_roller_changes_between_them():
+    """Of three arcs in their order, at 9.16 and 26.70 degrees of travel; both rates agree there."""
+    found = build(load_mechanism("atr95"))
+    one, other = transitions(solve(found, np.linspace(found.start, found.end, 101)))
+    assert (one.before, one.after, other.before, other.after) == (1, 2, 2, 3)
+    travel = np.degrees([one.travel, other.travel])
+    assert travel == pytest.approx([9.16, 26.70], abs=0.01)
+    for change in (one, other):
+        assert change.rate_before == pytest.approx(change.rate_after, rel=1e-6)
+        assert change.gap < 1e-9
