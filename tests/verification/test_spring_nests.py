@@ -16,6 +16,7 @@ from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import design
 from railsim.springs.nests import Dimensions, evaluate
 from railsim.springs.summary import coils_by_wire
+from railsim.springs.vehicle_table import vehicle_part, vehicle_text
 from railsim.springs.verification import fatigue, load_cases, verify
 
 CHANGES = [
@@ -238,3 +239,13 @@ def test_wires_of_a_design_are_those_within_the_spring_index_and_its_ends():
             assert row["spring_index"] == pytest.approx(D / d, rel=1e-12)
             n = own.material.G * d**4 / (8.0 * K_V * D**3)
             assert row["active_coils"] == pytest.approx(n, rel=1e-12)
+
+
+def test_a_vehicle_file_says_which_spring_it_leaves_out():
+    """The inner one works from 120 mm on; the outer one alone carries tare at 95 mm."""
+    own = load_spring("turasas_axlebox", ["inner.engagement=0.12"])
+    part = vehicle_part(own)
+    (remark,) = [said for said in part.remarks if "inner spring" in said]
+    assert f"# {remark}\n" in vehicle_text(own, part)
+    vertical = part.elements["coil_nest"]["stiffness"][2]
+    assert vertical == pytest.approx(78.48e9 * 0.041**4 / (8.0 * 3.6 * 0.23**3), rel=1e-6)
