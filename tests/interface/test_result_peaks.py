@@ -29,6 +29,23 @@ def test_peak_names_value_wheel_and_time():
     assert peak(result, "Q", "min").value == -7.0
 
 
+def test_peak_of_all_steps_has_their_time_and_place():
+    """Largest and smallest of every wheel between the stored instants, as a run keeps them."""
+    whole = small([[[1.0, 2.0]], [[3.0, -7.0]], [[5.0, 6.0]]])
+    of_steps = {
+        "Q": np.array([[[5.5, 8.0]], [[0.5, -9.0]]]),
+        "Q_time": np.array([[[1.9, 0.3]], [[0.1, 0.7]]]),
+        "Q_distance": np.array([[[19.0, 3.0]], [[1.0, 7.0]]]),
+    }
+    about = whole.quantities, whole.coordinates, whole.attributes
+    result = Result({n: whole[n] for n in whole}, *about, groups={"peaks": of_steps})
+    found = {kind: peak(result, "Q", kind) for kind in ("abs", "max", "min")}
+    assert [found[k].value for k in found] == [-9.0, 8.0, -9.0]
+    assert [found[k].time for k in found] == [0.7, 0.3, 0.7]
+    assert [found[k].distance for k in found] == [7.0, 3.0, 7.0]
+    assert {found[k].labels["side"] for k in found} == {"right"}
+
+
 def test_peak_leaves_out_the_start():
     """From the attribute `evaluation_start` on; files without it count as a whole."""
     values = [[[9.0, 2.0]], [[3.0, -7.0]], [[5.0, 6.0]]]
