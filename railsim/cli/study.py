@@ -82,7 +82,7 @@ def _is_number(text: str) -> bool:
 @cli.option("--keep", "all; summary: no result files; or quantities: Q,Y.", "WHAT", default="all")
 @cli.flag("--compress", "Store arrays compressed, without loss.")
 @cli.flag("--single", "Store arrays with 4 bytes a number: 7 digits.")
-@cli.flag("--plots", "Plot every run, and the vehicles against each other.")
+@cli.flag("--plots", "Plot every run; where results are kept also vehicles against each other.")
 @cli.flag("--report", "Write report.html into DIR, see `railsim report`.")
 @cli.output_options()
 @cli.code_options

@@ -97,7 +97,7 @@ def study(
     overwrite : bool
         Compute everything again.
     plots : bool
-        Draw every run, and comparisons of the vehicles.
+        Draw every run; where results are kept also comparisons of the vehicles.
     keep : str
         ``all``; ``summary``, no result files; or names of quantities separated by commas, with
         ``*`` for any characters.  Summaries are always made from the complete result.
