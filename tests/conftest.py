@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 from selection import LONG
 
+import railsim.contact.section_tables
 import railsim.contact.stored_table  # uses the class that the fixture replaces
 import railsim.contact.table
 import railsim.model.solutions
@@ -63,8 +64,13 @@ def small_tables():
 
     For tests that need another pair of profiles, another gauge or a new table, not fine values.
     """
+    generator = railsim.contact.stored_table.generator_hash
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+        # those of sections have keys without the grid
+        patch.setattr(
+            railsim.contact.section_tables, "generator_hash", lambda: f"{generator()} small"
+        )
         yield
 
 
