@@ -313,7 +313,7 @@ def by_hand(T, area, against, D):
 def test_wear_of_any_run_is_the_mean_over_the_distance_of_the_printed_laws(patched):
     """Random wear numbers on a run whose speed changes; the first three seconds do not count."""
     random = np.random.default_rng(8)
-    whole = made(track(STRAIGHT), FAST, until=160.0)
+    whole = made(track(STRAIGHT), FAST, until=160.0, **FINE)
     shape = whole.T_gamma.shape
     way = FAST / 1000.0 * (1.0 + np.linspace(0.0, 0.5, shape[0]))
     T = random.lognormal(4.0, 1.0, (*shape, 3)) * random.integers(0, 2, (*shape, 3))

@@ -7,7 +7,7 @@ known in closed form; percentiles and means over distance are taken of that.
 import numpy as np
 import pytest
 from example_result import BODIES, OFFSETS
-from made_record import Q0, curve, made, track
+from made_record import FINE, Q0, curve, made, track
 from scipy import signal
 
 from railsim.assessment.criteria import CRITERIA
@@ -68,7 +68,7 @@ def run(turn, speed):
         else track(*straight)
     )
     given = {"Y": lambda t, s: Y(t), "Q": lambda t, s: Q(t), "T_gamma": lambda t, s: T(t)}
-    return Record(made(on, speed, accelerations=A, **given), "made")
+    return Record(made(on, speed, accelerations=A, **given, **FINE), "made")
 
 
 def reading(name, t, band, turn, speed):

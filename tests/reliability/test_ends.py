@@ -26,7 +26,7 @@ def whole(tmp_path_factory):
     ("changed", "instants", "reason"),
     [
         (FREE, range(2, 600), "came to a standstill"),
-        ([BESIDE[0], BESIDE[1] % 0.02], [1], "beyond the range"),
+        ([BESIDE[0], BESIDE[1] % 0.025], [1], "beyond the range"),
         ([BESIDE[0], BESIDE[1] % 1e300], [0], "beyond the range"),
     ],
     ids=["standstill", "in the first step", "before the first instant"],

@@ -167,7 +167,7 @@ def test_runs_are_stable_where_one_end_of_their_class_does_not_tell(
     """2.5 ms have the margin at the lowest speed and highest friction of their classes."""
     monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve: solve())
     monkeypatch.setattr(step_choice, "_JUDGED", {})
-    longest = time_step.MARGIN * 2.5e-3
+    longest = time_step.MARGIN_ELASTIC * 2.5e-3
     track = curve_of(radius)
     of_class = 0.1 * math.ceil(friction / 0.1)
     run, end = with_friction(track, friction), with_friction(track, of_class)
@@ -179,7 +179,7 @@ def test_runs_are_stable_where_one_end_of_their_class_does_not_tell(
     at = flange.in_flange_contact(model, run, state, STEP)
     assert growth_beyond_the_vehicle(model, at, longest) > growth
     step, _ = prepare(load_vehicle(name), run, Settings(), speed, duration=1.0).steps.at(speed)
-    assert growth_beyond_the_vehicle(model, at, time_step.MARGIN * step) < 1.0
+    assert growth_beyond_the_vehicle(model, at, time_step.MARGIN_ELASTIC * step) < 1.0
 
 
 def curve_of(radius):
