@@ -140,7 +140,7 @@ def test_coach_on_hollow_wheels_runs_the_same_with_half_the_step(
     half = run(*case, step=0.5 * full.attributes["step"])
     assert full.status == half.status == "complete"
     Q0 = float(np.max(full.Q0))
-    last = full.time > full.time[-1] - 4.0
+    last = slice(-np.count_nonzero(full.time > full.time[-1] - 4.0), None)  # one may have one more
     motion, half_motion = (
         np.std(result.wheelset_lateral[last], axis=0).max() for result in (full, half)
     )
