@@ -2,5 +2,6 @@
 
 GRAVITY = 9.81  # m/s2, as in the reference study
 NORMAL_GAUGE = 1.435  # m
-WIDENED = 0.030 + 1e-9  # m, difference of a gauge that does not make it another one: 1.465 - 1.435
+# m, difference of a gauge that does not make it another one, with the round-off of 1.465 - 1.435
+WIDENED = 0.030 + 1e-9
 CANT_BASE = 1.5  # m, 2 b_0: distance of the nominal rolling circles, over which cant is measured

@@ -161,7 +161,7 @@ class Stability:
 
     @property
     def margin(self) -> float:
-        """Factor by which a step that is stable too is longer than one that is taken."""
+        """A step is taken where one that is longer by this factor is stable too."""
         return MARGIN_ELASTIC if self._straight[0].support.elastic else MARGIN
 
     def choose(self, interval: float, holds: Callable[[float], bool] | None = None) -> float:
@@ -273,10 +273,11 @@ def _step_growth(
 
 
 def _after_step(system: System, state: Floats, h: float) -> tuple[System, Floats]:
-    """Return a state on elastic rails as a step of length `h` leaves it, see `step_compliance`.
+    """Return the system and a state on elastic rails for the map of a step.
 
-    And the system with loads beside which no difference of forces is large enough for the rails to
-    be corrected: small ones are not, and those of the map are small in part only.
+    The state is as a step of length `h` [s] leaves it, see `step_compliance`.  The loads of the
+    system are so large that no difference of the forces counts as an error of the rails to be
+    corrected: the small disturbances of the map must not be corrected in part only.
     """
     state = state.copy()
     state[LAST_STEP] = h

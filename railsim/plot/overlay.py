@@ -16,7 +16,7 @@ from railsim.plot.selection import STUDY, Panel, panels
 from railsim.result import Result
 from railsim.text import unformatted
 
-WHEELS = {"time", "wheelset", "side"}
+WHEELS = {"time", "wheelset", "side"}  # dimensions of what is drawn by default
 
 
 @style.styled()

@@ -263,8 +263,9 @@ def with_class_friction(model: Model, *, least: bool = False) -> Model:
 def braked_step(system: System) -> float:
     """Longest step with which brakes hold a locked wheelset still [s].
 
-    Below `BRAKES_FULLY` they are dampers of its spin, which alternates from z = h c/I = 1.7 on. A
-    commanded brake is taken at its limit, and not above what slides on dry rails.
+    Below the speed v = `BRAKES_FULLY` of its tread a torque M damps the spin by c = M r/v, and the
+    spin alternates from z = h c/I = 1.7 on.  A commanded brake is taken at its limit, and not above
+    what slides on dry rails.
     """
     drives, bodies = system.drives, system.bodies
     torque = np.zeros(len(bodies.kind))
@@ -278,8 +279,9 @@ def braked_step(system: System) -> float:
         w = acts.body[i, 1]
         dry = DRY * 2.0 * contact.load[contact.body == w].sum() * bodies.row[w, RADIUS]
         torque[w] += min(acts.row[i, LIMIT], dry)
-    rate = torque * bodies.row[:, RADIUS] / (BRAKES_FULLY * bodies.inertia[:, 1])
-    return HELD / fastest if (fastest := float(rate.max())) else math.inf
+    braked = np.flatnonzero(torque)
+    rate = torque[braked] * bodies.row[braked, RADIUS] / bodies.inertia[braked, 1] / BRAKES_FULLY
+    return HELD / float(rate.max()) if len(braked) else math.inf
 
 
 def inputs_hash(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> str:

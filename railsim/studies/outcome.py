@@ -53,19 +53,17 @@ class Outcome:
 
         Looked for where no more than `MOST_COMPARED` runs are there.
         """
-        names, found = self._labels(), list[str]()
-        if len(self.records) > MOST_COMPARED:
-            return []
-        for name in names:
-            alike: dict[str, set[str]] = {}
-            several = set[str]()
+        names = [name for name in self._labels() if "." in name]
+        found = list[str]()
+        for name in names if len(self.records) <= MOST_COMPARED else ():
+            alike: dict[str, list[str]] = {}  # runs that differ in this key only
             for record in self.records:
-                if "." in name and record.get("peaks"):
+                if record.get("peaks"):
                     others = json.dumps({k: v for k, v in record["labels"].items() if k != name})
-                    several |= {others} & alike.keys()
                     values = json.dumps([record["peaks"], record.get("mid_curves")])
-                    alike.setdefault(others, set()).add(values)
-            if several and all(len(alike[others]) == 1 for others in several):
+                    alike.setdefault(others, []).append(values)
+            groups = alike.values()
+            if any(len(one) > 1 for one in groups) and all(len({*one}) == 1 for one in groups):
                 found.append(name)
         return found
 
