@@ -116,6 +116,14 @@ class FrozenDict(dict[Any, Any]):
         return FrozenDict, (dict(self),)
 
 
+def kept(definition: "Definition", name: str, make: Callable[[], Any]) -> Any:
+    """Return what follows from a definition alone, made once; a copy of it has it no more."""
+    stored = definition.__dict__
+    if name not in stored:
+        stored[name] = make()
+    return stored[name]
+
+
 class Definition(BaseModel):
     """Base of everything that a user may write."""
 

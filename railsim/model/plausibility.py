@@ -11,7 +11,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions import Track, Vehicle
-from railsim.definitions.base import Remark
+from railsim.definitions.base import Remark, kept
 from railsim.definitions.elements.base import FreeLength
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import SpringDamper
@@ -62,11 +62,14 @@ def vehicle_remarks(
     >>> print(vehicle_remarks(coach)[0])
     carbody: a moment of inertia is above the sum of the other two: Ixx, Iyy, Izz in this order?
     """
-    flat = flatten(vehicle) if balanced is None else balanced.flat
+    found = kept(vehicle, "_remarks_without_supports", lambda: _without_supports(flatten(vehicle)))
+    return [*found, *(_supports(vehicle, balanced) if supports else ())]
+
+
+def _without_supports(flat: FlatVehicle) -> list[Remark]:
     found = [*_below_the_rails(flat), *_lengths(flat), *_by_text(_far_from_axles(flat))]
     found += [*_inertias(flat), *_wheel_load(flat), *_vertical_modes(flat)]
-    found += _by_text(_pulling(flat))
-    return [*found, *_supports(vehicle, balanced)] if supports else found
+    return [*found, *_by_text(_pulling(flat))]
 
 
 def gauge_remarks(flat: FlatVehicle, track: Track) -> list[Remark]:

@@ -15,9 +15,11 @@ Means over distance integrate the record, taken as linear between its samples, e
 import math
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy import fft  # scipy's takes a tenth of the whole command `run` to import
+from numpy.typing import NDArray
 
 from railsim.arrays import Complexes, Floats
 
@@ -30,6 +32,7 @@ REACH = 6.0
 (its slowest part has fallen to exp(-2 pi 0.383 6) = 5e-7)."""
 
 
+@lru_cache(50)
 def butterworth(low: float = 0.0, high: float = math.inf, order: int = 4) -> Response:
     """Magnitude of a Butterworth low pass, high pass or band pass.
 
@@ -78,9 +81,7 @@ def filtered(x: Floats, rate: float, response: Response, margin: float) -> Float
         return np.array(x, dtype=np.float64)
     edge = max(1, math.ceil(margin * rate))
     size = fast_length(min(max(BLOCK, 4 * edge), n + 2 * edge))
-    frequencies = np.asarray(fft.rfftfreq(size, 1.0 / rate), dtype=np.float64)
-    factor = np.asarray(response(frequencies))
-    factor = factor.reshape(-1, *(1 for _ in x.shape[1:]))
+    factor = _factor(response, size, rate).reshape(-1, *(1 for _ in x.shape[1:]))
     out = np.empty_like(x, dtype=np.float64)
     inner = size - 2 * edge
     for begin in range(0, n, inner):
@@ -90,6 +91,11 @@ def filtered(x: Floats, rate: float, response: Response, margin: float) -> Float
         spectrum *= factor
         out[begin:end] = fft.irfft(spectrum, size, axis=0)[edge : edge + end - begin]
     return out
+
+
+@lru_cache(8)
+def _factor(response: Response, size: int, rate: float) -> NDArray[Any]:
+    return np.asarray(response(np.asarray(fft.rfftfreq(size, 1.0 / rate), dtype=np.float64)))
 
 
 @lru_cache(100)

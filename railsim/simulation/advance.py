@@ -44,7 +44,7 @@ Progress = Callable[[float], None]
 
 # Longest chunk in outputs, and in steps of all its vehicles: some hundredths of a second of
 # computing by the fast scheme, and below a second by the other one
-ROWS, STEPS = 1000, 64_000
+ROWS, STEPS = 2000, 64_000
 ROUND_OFF = 1e-9  # s
 
 # what a chunk changes in the work arrays: counts of patches and of steps, extremes, times without

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
 from railsim.definitions import Track
+from railsim.definitions.base import kept
 from railsim.definitions.track.layout import (
     cant_sections,
     curvature_sections,
@@ -28,8 +29,6 @@ from railsim.definitions.track.layout import (
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 from railsim.errors import Fault, InputError
-
-KEPT = "_alignment"
 
 
 class Alignment:
@@ -113,10 +112,8 @@ def alignment_of(track: Track) -> Alignment:
 
     Raises InputError: elements that do not fit together.
     """
-    kept: dict[str, Alignment] = track.__dict__  # a copy of the track has it no more
-    if KEPT not in kept:
-        kept[KEPT] = Alignment(track)
-    return kept[KEPT]
+    alignment: Alignment = kept(track, "_alignment", lambda: Alignment(track))
+    return alignment
 
 
 def _magnitudes(sections: Sequence[Section]) -> list[Section]:

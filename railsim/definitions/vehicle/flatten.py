@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from railsim.constants import GRAVITY
-from railsim.definitions.base import Vector
+from railsim.definitions.base import Vector, kept
 from railsim.definitions.elements.base import Element
 from railsim.definitions.elements.traction import AxleTorque
 from railsim.definitions.vehicle.loads import load_faults, loaded
@@ -59,9 +59,6 @@ class FlatElement:
     point1: Vector  # in vehicle axes [m]
     point2: Vector
     definition: Element  # with signs as they are in this placement
-
-
-KEPT = "_flattened"
 
 
 @dataclass(frozen=True)
@@ -155,15 +152,17 @@ def flatten(vehicle: "Vehicle") -> FlatVehicle:
     """
     if getattr(vehicle, "KIND", "") != "vehicle":
         raise TypeError(wrong_type("vehicle", vehicle))
-    stored: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
-    if KEPT not in stored:
-        faults = name_faults(vehicle.model_dump()) or position_faults(vehicle)
-        if faults:
-            raise InputError(
-                Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
-            )
-        stored[KEPT] = _flat(vehicle)
-    return stored[KEPT]
+    flat: FlatVehicle = kept(vehicle, "_flattened", lambda: _checked_and_flat(vehicle))
+    return flat
+
+
+def _checked_and_flat(vehicle: "Vehicle") -> FlatVehicle:
+    faults = name_faults(vehicle.model_dump()) or position_faults(vehicle)
+    if faults:
+        raise InputError(
+            Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
+        )
+    return _flat(vehicle)
 
 
 def _flat(vehicle: "Vehicle") -> FlatVehicle:
