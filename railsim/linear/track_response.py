@@ -13,14 +13,14 @@ stands l_w ahead of the reference body, hence over the angular wave number k at 
 The matrix i k V - A is solved by Schur's form A = Z T Z*, which exists for a free vehicle too,
 whose two zero eigenvalues have one eigenvector.  Outputs are what accelerometers read (see
 `railsim.result.sensors`: of a small roll, y reads -g roll as well), Q, Y and the lateral
-displacements of the wheelsets from the middle of their rails.
+displacements of the wheelsets against their deflected rails, as `wheelset_lateral` of a run.
 
 What this model does not hold of the contact forces of a wheelset is an input too: an acceleration d
 of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belong to.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -36,6 +36,7 @@ from railsim.linear.system import jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
 from railsim.notation import SIDES
 from railsim.result.sensors import Sensor
+from railsim.simulation.outputs import against_rails
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
 """Irregularities [m]; the cross level as height of the left rail over the right one."""
@@ -117,10 +118,14 @@ def track_response(
     offsets = system.frame_offset[system.bodies.frame[system.contact.body]]
     x, c = free.x, free.coordinates
 
+    model = replace(vehicle.model, system=system)
+
     def evaluated(x: Floats) -> Floats:
-        rates = free.rate(x)
-        forces = [free.work.wheel[:, :, column].ravel() for column in (W_Q, W_Y)]
-        return np.concatenate([rates, *forces])
+        rates, state = free.rate(x), free.state.copy()
+        state[c.indices] = x
+        Q, Y = (free.work.wheel[:, :, column] for column in (W_Q, W_Y))
+        lateral = against_rails(model, state[None])[0, :, 0]
+        return np.concatenate([rates, Q.ravel(), Y.ravel(), Y.sum(axis=1), lateral])
 
     of_states = jacobian(lambda rows: np.array([evaluated(row) for row in rows]), x, c.steps)
     columns = [*of_states.T]
@@ -140,29 +145,22 @@ def track_response(
                 columns.append((ends[0] - ends[1]) / (2.0 * step))
         rail[cell] = smooth
     whole = without_forceless(np.transpose(columns), c.forceless)
-    steady = evaluated(x)[len(x) :]
-    steady = np.concatenate([steady, steady[len(steady) // 2 :].reshape(-1, 2).sum(axis=1)])
-    guiding = whole[-2 * len(offsets) :].reshape(len(offsets), 2, -1)
-    whole = np.concatenate([whole, guiding.sum(axis=1)])
     n, count = len(x) - len(c.forceless), len(offsets)  # rates without force stand last
-    inputs = whole[:, n:].reshape(len(whole), len(offsets), len(QUANTITIES), ORDERS)
+    inputs = whole[:, n:].reshape(len(whole), count, len(QUANTITIES), ORDERS)
     C, R, names = _readings(sensors, free, n)
-    lateral = np.zeros((len(offsets), *inputs.shape[1:]))
-    lateral[range(len(offsets)), range(len(offsets)), 0, 0] = -1.0
     bodies = system.contact.body
-    places = np.array([c.position_of[int(b), 1] for b in bodies])
     return TrackResponse(
         speed,
         (*names, *_of_wheelsets(len(offsets))),
         offsets,
         whole[:n, :n],
         inputs[:n],
-        np.concatenate([C, whole[n:, :n], np.eye(n)[places]]),
-        np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:], lateral]),
+        np.concatenate([C, whole[n:, :n]]),
+        np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:]]),
         np.concatenate([R, np.zeros((6 * count, n))]),
         np.array([[c.velocity_of[int(b), k] for k in COMPONENTS] for b in bodies]),
         _forces_of(system, len(C)),
-        np.concatenate([np.zeros(len(C)), steady, np.zeros(count)]),
+        np.concatenate([np.zeros(len(C)), evaluated(x)[len(x) :]]),
     )
 
 

@@ -1,0 +1,60 @@
+"""Linear analysis against runs, and against itself in the mirror, on circles and at small sizes."""
+
+import numpy as np
+import pytest
+from dynamics import Settings, load_any_track, load_vehicle
+
+from railsim.linear.eigenmodes import eigenmodes
+from railsim.linear.harmonic import ContactPath
+from railsim.linear.track_response import QUANTITIES, track_response
+from railsim.linear.vehicle import LinearVehicle, smooth_law
+from railsim.simulation import simulate
+
+SPEED, WAVE = 25.0, 8.0
+
+
+@pytest.mark.parametrize("channel", ["lateral", "cross_level"])
+def test_response_to_waves_is_that_of_a_run_on_them(channel):
+    """Amplitude and phase of forces and displacements on elastic rails, by least squares, 3 %."""
+    size, k = 2e-5, 2.0 * np.pi / WAVE
+    settings = smooth_law(Settings(output_rate=500.0))
+    track = load_any_track("straight").replace(
+        plan=[{"type": "STR", "length": 330.0}], support={"preset": "co-running"}
+    )
+    coach = load_vehicle("coach_manchester")
+    found = track_response(LinearVehicle(coach, track, settings=settings), {}, SPEED)
+    waves = {"amplitude": size, "wavelengths": [WAVE, WAVE * (1.0 - 1e-9)], "begin": 20.0}
+    waves |= {"type": "sweep", "channel": channel, "end": 330.0}
+    run = simulate(coach, track.replace(irregularities=[waves]), speed=SPEED, settings=settings)
+    late = (run.distance > 230.0) & (run.distance < 230.0 + 8.0 * WAVE)
+    phase = k * (run.distance[late] - 20.0)
+    basis = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
+    of_run = {"Q": run.Q, "Y": run.Y, "sum_Y": run.sum_Y, "lateral": run.wheelset_lateral}
+    quantity = QUANTITIES.index(channel.replace("lateral", "alignment"))
+    response = found.over(np.array([k]))[0, :, quantity] * size
+    for name, values in of_run.items():
+        sine, cosine, _ = np.linalg.lstsq(basis, values[late].reshape(len(phase), -1))[0]
+        expected = [x for o, x in zip(found.outputs, response, strict=True) if o.startswith(name)]
+        # the waves are the imaginary part of exp(i phase)
+        np.testing.assert_allclose(sine + 1j * cosine, expected, atol=0.03 * np.abs(expected).max())
+
+
+def eigenvalues(**how):
+    vehicle = LinearVehicle(load_vehicle("coach_manchester"), load_any_track("straight"), **how)
+    values = eigenmodes(vehicle.linearised(SPEED)).eigenvalues
+    return vehicle, values[(values.imag > 1.0) & (np.abs(values) < 200.0)]
+
+
+def test_modes_in_curves_are_alike_to_both_hands_and_on_wide_circles_those_on_straight_track():
+    _, straight = eigenvalues()
+    _, wide = eigenvalues(radius=1e7)
+    np.testing.assert_allclose(wide, straight, rtol=1e-5)
+    right, left = (eigenvalues(radius=600.0 * hand, cant=0.1 * hand)[1] for hand in (1, -1))
+    np.testing.assert_allclose(left, right, rtol=1e-6)
+
+
+def test_harmonic_linearisation_of_a_small_amplitude_is_the_tangent_in_a_curve_too():
+    vehicle, _ = eigenvalues(radius=600.0, cant=0.1)
+    tangent, small = (vehicle.linearised(SPEED, path).matrix for path in (None, ContactPath(1e-6)))
+    columns = np.max(np.abs(tangent), axis=0)
+    np.testing.assert_allclose(small / columns, tangent / columns, atol=2e-3)
