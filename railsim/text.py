@@ -6,6 +6,7 @@ these characters and does nothing.  For pages see `railsim.page`.
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
 LONGEST_VALUE, LONGEST_FILE = 60, 300  # characters of a value, of a file's name, in a message
 
@@ -97,3 +98,14 @@ def counted_remarks(remarks: Iterable[tuple[str, str]]) -> list[str]:
             (f"{run}: " if run else "") + (text.removesuffix(".") if more else text) + more
         )
     return found
+
+
+def plain(data: Any) -> Any:
+    """Return data as JSON can hold it: names as text, numbers that it lacks as null."""
+    if isinstance(data, dict):
+        return {str(key): plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [plain(value) for value in data]
+    if isinstance(data, float):
+        return data if abs(data) < float("inf") else None
+    return data

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import click
 
 from railsim.cli.progress import progress_bar
-from railsim.cli.terminal import echo, plain, print_json, show
+from railsim.cli.terminal import echo, print_json, show
 from railsim.errors import Faults, InputError, input_error
 from railsim.files.access import check_file, check_folder, make_folder, whole_file, write_folder
 from railsim.files.sources import OVERRIDE
+from railsim.text import plain
 
 if TYPE_CHECKING:
     from railsim.definitions import Settings, Track, Vehicle

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.text import printable
+from railsim.text import plain, printable
 
 if TYPE_CHECKING:
     from railsim.table import Table
@@ -46,14 +46,3 @@ def in_width(line: str, width: int | None) -> str:
 def print_json(data: Any) -> None:
     """Print data as JSON; numbers that JSON lacks become null."""
     click.echo(json.dumps(plain(data), indent=2, allow_nan=False))
-
-
-def plain(data: Any) -> Any:
-    """Return data as JSON can hold it: names as text, numbers that it lacks as null."""
-    if isinstance(data, dict):
-        return {str(key): plain(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [plain(value) for value in data]
-    if isinstance(data, float):
-        return data if abs(data) < float("inf") else None
-    return data

@@ -36,12 +36,12 @@ from railsim.studies.designs import (
     with_unit,
 )
 from railsim.studies.plan import ROUGH_DURATION, check_number, check_study, faults_of_file
-from railsim.studies.records import finite
 from railsim.studies.search import Task, hypervolume, knee, non_dominated, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 from railsim.studies.spec import Execution, checked
 from railsim.studies.summary import unit_of
 from railsim.table import Column, Table
+from railsim.text import plain
 
 NEAR_BOUND = 0.01  # tolerance, as a share of a range or a limit, within which it counts as reached
 INPUT_BYTES = 1_000_000
@@ -272,7 +272,7 @@ def _write(found: Optimisation) -> None:
     from railsim.plot.study import front_figure, sensitivity_figure
     from railsim.plot.style import save
 
-    text = json.dumps(finite(found.record()), indent=1, allow_nan=False)
+    text = json.dumps(plain(found.record()), indent=1, allow_nan=False)
     write_text(found.folder / "optimise.json", text + "\n")
     write_text(found.folder / "designs.csv", found.table().csv())
     labels = [with_unit(one) for one in found.definition.objectives]

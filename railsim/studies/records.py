@@ -1,7 +1,6 @@
 """Records of finished work as JSON; in files of their own with a CRC-32, so that damage is seen."""
 
 import json
-import math
 import zlib
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import orjson
 
 from railsim.errors import input_error
 from railsim.files.access import TABLE_BYTES, make_folder, read_text, write_text
+from railsim.text import plain
 
 Record = dict[str, Any]
 
@@ -39,15 +39,6 @@ def _crc(record: Any) -> str:
     return f"{zlib.crc32(json.dumps(record).encode()):08x}"
 
 
-def finite(data: Any) -> Any:
-    """Return plain data with None instead of infinite and undefined numbers."""
-    if isinstance(data, dict):
-        return {key: finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
-
-
 def parsed(text: bytes) -> Any:
     """Return what JSON holds; raises ValueError: it is broken, or nested too deeply."""
     try:
@@ -64,7 +55,7 @@ def json_bytes(data: Any) -> bytes:
     try:
         return json.dumps(data, allow_nan=False).encode()
     except ValueError:
-        return json.dumps(finite(data)).encode()
+        return json.dumps(plain(data)).encode()
 
 
 def compact_json(data: Any) -> bytes:
@@ -72,4 +63,4 @@ def compact_json(data: Any) -> bytes:
     try:
         return orjson.dumps(data)
     except TypeError:  # names of files that are no UTF-8
-        return json.dumps(finite(data), separators=(",", ":")).encode()
+        return json.dumps(plain(data), separators=(",", ":")).encode()

@@ -22,12 +22,7 @@ def report_unless_ended(
         sys.__excepthook__(kind, error, trace)
 
 
-def load_compiled_code() -> None:
-    """Load the compiled kernels if they exist; otherwise the first worker compiles them."""
-    if is_compiled():
-        run_briefly()
-
-
 sys.excepthook = report_unless_ended  # inherited by the copies of the server
 keep_freed_memory()  # likewise
-load_compiled_code()
+if is_compiled():  # otherwise the first worker compiles
+    run_briefly()
