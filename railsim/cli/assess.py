@@ -52,13 +52,19 @@ def command(
       railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
     """
     from railsim.assessment import assess
+    from railsim.assessment.assess import RUNNING
+    from railsim.assessment.running import by_vehicle
     from railsim.assessment.tables import assessment_lines
     from railsim.cli.gathered import opened
 
     results = opened(_paths(files))
     output.reserve(*FILES)
     changes = {name: how.pop(name) for name in SERVICE}
-    assessments = assess(results, standard, service=_service(results, changes), **how)
+    assessments = [
+        one
+        for runs in by_vehicle(results, loads=standard in RUNNING)
+        for one in assess(runs, standard, service=_service(runs, changes), **how)
+    ]
     write_assessments(output, assessments)
     lines = [line for one in assessments for line in assessment_lines(one, quiet=output.quiet)]
     output.answer([assessment.record() for assessment in assessments], lines)
@@ -78,7 +84,7 @@ def _paths(files: Sequence[str]) -> list[Path]:
 
 
 def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service | None":
-    """Service table with options instead of the vehicles' values; None where there are none."""
+    """A vehicle's service table with options instead of its values; None where there are none."""
     changes = {name: value for name, value in options.items() if value is not None}
     if not changes:
         return None

@@ -395,6 +395,24 @@ def test_command_prints_writes_and_fails_only_when_asked(hunting, tmp_path, caps
     assert main(["assess", str(bad.to_hdf5(tmp_path / "bad.h5")), "--fail"]) == 4
 
 
+def test_option_of_the_command_leaves_each_vehicle_the_rest_of_its_service_table(
+    hunting, tmp_path, capsys
+):
+    """k1 of a wagon is 0.85, whichever vehicle comes first; benchmark's Q0: 46.36 kN for k1 = 1."""
+    coach = hunting.vehicle()
+    wagon = coach.with_values({"name": "A wagon", "service.category": "freight"})
+    one = made(track(STRAIGHT), FAST, vehicle=wagon.to_toml())
+    paths = [str(r.to_hdf5(tmp_path / f"{n}.h5")) for n, r in (("a", hunting), ("b", one))]
+    for order in (paths, paths[::-1]):
+        assert main(["assess", *order, "--admissible-speed", "33.4", "--coarse", "--json"]) == 0
+        limits = {
+            found["vehicle"]: row["limit"] for found in json.loads(capsys.readouterr().out)
+            for row in found["zones"][0]["quantities"] if row["name"] == "sum_Y"
+        }  # fmt: skip
+        assert limits[coach.name] == pytest.approx(46.36e3, rel=1e-3)
+        assert limits["A wagon"] == pytest.approx(0.85 * 46.36e3, rel=1e-3)
+
+
 @pytest.mark.parametrize("standard", ["comfort", "wear"])
 def test_command_of_other_standards(hunting, tmp_path, capsys, standard):
     path = str(hunting.to_hdf5(tmp_path / "run.h5"))
