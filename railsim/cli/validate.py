@@ -102,9 +102,11 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     if definition.KIND == "study":
         _check_runs(file)
     if definition.KIND == "scenario":
-        from railsim.studies.campaign import curve_faults
+        from railsim.studies.campaign import check_parts
+        from railsim.studies.plan import faults_of_file
 
-        Faults(curve_faults(load_scenario(file), file)).check()
+        with faults_of_file(file):
+            check_parts(load_scenario(file), file)
     Faults(profile_faults(definition, file)).check()
     return definition.KIND, [dict(vars(remark)) for remark in cli.remarks_on(definition)]
 

@@ -39,7 +39,11 @@ LAWS = "laws"
 """Folder of a library with Python files of laws."""
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
-FILE_KEYS_OF = {"study": {"vehicles", "tracks", "settings"}, "mechanism": {"reference"}}
+FILE_KEYS_OF = {
+    "study": {"vehicles", "tracks", "settings", "limits"},
+    "scenario": {"track", "wheels"},
+    "mechanism": {"reference"},
+}
 """Further ones in the files of a kind."""
 
 DEEPEST = 50  # levels of tables and lists
@@ -369,10 +373,10 @@ def _anchor_files(node: Any, folder: Path, keys: set[str]) -> None:
     """Make the names of existing files absolute, so that they mean the same from everywhere."""
     members = node.items() if isinstance(node, dict) else enumerate(node)
     for key, value in list(members):
-        if key in keys:
+        if key in keys and not isinstance(value, dict):
             node[key] = _anchored(value, folder)
-        elif isinstance(value, dict | list):
-            _anchor_files(value, folder, keys)
+        elif isinstance(value, dict | list):  # in a table under such a key all may be files
+            _anchor_files(value, folder, keys.union(value) if key in keys else keys)
 
 
 def _anchored(value: Any, folder: Path) -> Any:

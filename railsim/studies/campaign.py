@@ -25,19 +25,20 @@ from railsim.cant import curve_speed
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
-from railsim.definitions.loading import load_running_limits, load_scenario, load_track, load_vehicle
-from railsim.definitions.study.scenario import Scenario, Speed, TestCondition
+from railsim.definitions.loading import load_running_limits, load_scenario
+from railsim.definitions.study.scenario import Part, Scenario, Speed, TestCondition
 from railsim.definitions.track.elements import Circle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
 from railsim.files.access import check_folder
 from railsim.processes import available_cores
+from railsim.profiles import load_profile
 from railsim.result import Result, open_result
 from railsim.result.sensors import sensors
 from railsim.studies.carry_out import carry_out_cases
-from railsim.studies.case import Case, load_case, short_name
-from railsim.studies.plan import ROUGH_DURATION, check_number
+from railsim.studies.case import Case, Loader, load_case, short_name
+from railsim.studies.plan import ROUGH_DURATION, check_number, faults_of_file
 from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
 from railsim.track.curves import curves
@@ -81,8 +82,13 @@ def campaign(
     folder = Path(out)
     check_folder(folder)
     plan = load_scenario(scenario)
-    Faults(curve_faults(plan, str(scenario))).check()
-    cases = scenario_cases(plan, names, assignments)
+    cases, faults = list[Case](), Faults()
+    with faults_of_file(str(scenario), assignments=not assignments):
+        with faults.caught():
+            check_parts(plan, str(scenario), assignments)
+        with faults.caught():
+            cases = scenario_cases(plan, names, assignments)
+        Faults(dict.fromkeys(faults)).check()
     spec = StudySpec(
         folder=os.path.relpath(Path.cwd(), folder),
         name=plan.name,
@@ -116,23 +122,15 @@ def scenario_cases(
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:
-        vehicle_assignments = [
-            a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")
-        ]
+        always = (*scenario.assignments, *assignments)
         try:
-            loaded = load_vehicle(vehicle, vehicle_assignments)
+            loaded = _vehicle(RunSpec(vehicle, "", None, assignments=always))
         except InputError as error:
             faults += error.faults
-            continue
-        service = loaded.service
-        if service is None:
-            allowed = "add [service] with admissible_speed and cant_deficiency"
-            faults.append(Fault(str(vehicle), "service", "missing", allowed))
             continue
         several = product(conditions, scenario.parts.items(), points)
         for (number, state, condition), (name, part), point in several:
             texts = [*scenario.assignments, *(f"{key}={v}" for key, v in point.items())]
-            speed = part_speed(part.speed, service)
             label = [short_name(vehicle), state, name, *map(in_a_name, point.values())]
             try:
                 if condition:
@@ -140,11 +138,10 @@ def scenario_cases(
                         continue
                     texts += condition.assignments
                     texts += [f"vehicle.load={condition.load}"] if condition.load else []
-                run = RunSpec(
-                    vehicle, part.track, speed, until=part.until,
-                    assignments=(*texts, *assignments),
-                )  # fmt: skip
-                case = load_case(run)
+                texts += assignments
+                run = RunSpec(vehicle, part.track, None, until=part.until, assignments=(*texts,))
+                service = _service(run)
+                case = load_case(replace(run, speed=part_speed(part.speed, service)))
                 made = in_condition(case.vehicle, state, condition) if condition else case.vehicle
             except InputError as error:
                 faults += error.faults
@@ -163,30 +160,64 @@ def scenario_cases(
     return cases
 
 
-def curve_faults(scenario: Scenario, file: str) -> Iterator[Fault]:
-    """Yield the parts whose `radius` or `cant` is beyond those of the curves of their track.
+def _vehicle(run: RunSpec) -> Vehicle:
+    loader = Loader()
+    vehicle = loader.definition("vehicle", run)
+    loader.check()
+    assert isinstance(vehicle, Vehicle)  # without a fault
+    return vehicle
 
-    `file`: Name of the scenario's file. Curves to the left and to the right are alike.
+
+def _service(run: RunSpec) -> Service:
+    """Return the service table of a run's vehicle, with its assignments."""
+    service = _vehicle(run).service
+    if service is None:
+        allowed = "add [service] with admissible_speed and cant_deficiency"
+        raise input_error(str(run.vehicle), "missing", allowed, "service")
+    return service
+
+
+def check_parts(scenario: Scenario, file: str, assignments: Sequence[str] = ()) -> None:
+    """Check what a scenario says without a vehicle: tracks, their curves, settings, wheels.
+
+    `file`: name of the scenario's file. Curves to the left and to the right are alike. Raises
+    InputError: wrong tracks, settings, profiles; `radius` or `cant` beyond those of the curves.
     """
-    texts = [a.removeprefix("track.") for a in scenario.assignments if a.startswith("track.")]
-    for name, part in scenario.parts.items():
-        if part.speed.radius is None:
-            continue
-        try:
-            track = load_track(part.track, texts)
-        except InputError:
-            continue  # told when the runs are loaded
-        found = [(1.0 / abs(one.curvature), 1e3 * abs(one.cant)) for one in curves(track)]
-        key, of_track = f"parts.{name}.speed", f"'{short_name(part.track)}'"
-        given = (("radius", "m", part.speed.radius), ("cant", "mm", 1e3 * abs(part.speed.cant)))
-        if not found:
-            yield Fault(file, f"{key}.radius", f"{given[0][2]:g} m", f"{of_track} has no curve")
-        for (own, unit, value), known in zip(given, zip(*found, strict=True), strict=False):
-            low, high = min(known), max(known)
-            if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
-                ends = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
-                allowed = f"{ends} {unit} in the curves of {of_track}"
-                yield Fault(file, f"{key}.{own}", f"{value:g} {unit}", allowed)
+    loader = Loader()
+    number = math.prod(map(len, (scenario.parts, *scenario.grid.values())))
+    check_number(number, available_cores(), lambda: ROUGH_DURATION)
+    for (name, part), values in product(scenario.parts.items(), product(*scenario.grid.values())):
+        point = (f"{key}={v}" for key, v in zip(scenario.grid, values, strict=True))
+        texts = (*scenario.assignments, *point, *assignments)
+        run = RunSpec("", part.track, None, assignments=texts)
+        loader.definition("settings", run)
+        track = loader.definition("track", run)
+        if track is not None and part.speed.radius is not None:
+            loader.faults += _curve_faults(track, part, file, f"parts.{name}.speed")
+    for name, condition in scenario.conditions.items():
+        for old, new in condition.wheels.items():
+            try:
+                load_profile(new, "wheel")
+            except InputError as error:
+                key, (one, *_) = f"conditions.{name}.wheels.{old}", error.faults
+                found = f"profile '{new}': {one.found}"
+                loader.faults.append(Fault(file, key, found, one.allowed))
+    loader.check()
+
+
+def _curve_faults(track: Track, part: Part, file: str, key: str) -> Iterator[Fault]:
+    """Yield in what the curve of a part's speed, at `key`, is beyond those of its track."""
+    found = [(1.0 / abs(one.curvature), 1e3 * abs(one.cant)) for one in curves(track)]
+    speed, of_track = part.speed, f"'{short_name(part.track)}'"
+    given = (("radius", "m", speed.radius or 0.0), ("cant", "mm", 1e3 * abs(speed.cant)))
+    if not found:
+        yield Fault(file, f"{key}.radius", f"{speed.radius:g} m", f"{of_track} has no curve")
+    for (own, unit, value), known in zip(given, zip(*found, strict=True), strict=False):
+        low, high = min(known), max(known)
+        if not 0.999 * low - 1e-6 <= value <= 1.001 * high + 1e-6:
+            ends = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (low, high)))
+            allowed = f"{ends} {unit} in the curves of {of_track}"
+            yield Fault(file, f"{key}.{own}", f"{value:g} {unit}", allowed)
 
 
 def part_speed(speed: Speed, service: Service) -> float:

@@ -161,6 +161,99 @@ def test_curve_of_a_part_is_one_of_its_track(tmp_path, capsys, monkeypatch, old,
     assert not (tmp_path / "out").exists()
 
 
+SPEEDS = """format = "railsim-scenario/1"
+name = "speeds"
+standard = "comfort"
+{more}
+[parts.one]
+track = "straight"
+speed = {{ admissible = 1.2 }}
+"""
+SLOW = "vehicle.service.admissible_speed=20.0"
+
+
+@pytest.mark.parametrize(
+    ("more", "assignments"),
+    [
+        (f'assignments = ["{SLOW}"]', []),
+        ('[grid]\n"vehicle.service.admissible_speed" = ["20.0"]', []),
+        (f'[conditions.slow]\nassignments = ["{SLOW}"]', []),
+        ("", [SLOW]),
+    ],
+)
+def test_speed_of_a_part_follows_the_service_table_however_it_is_changed(
+    tmp_path, more, assignments
+):
+    """1.2 times 20 m/s, whether file, grid, condition or command says so; 40 m/s before."""
+    (tmp_path / "speeds.toml").write_text(SPEEDS.format(more=more))
+    scenario = load_scenario(tmp_path / "speeds.toml")
+    (case,) = scenario_cases(scenario, ["coach_manchester"], assignments)
+    assert case.vehicle.service.admissible_speed == 20.0
+    assert case.speed == case.labels["speed"] == pytest.approx(24.0)
+
+
+@pytest.mark.parametrize("how", ["set", "grid"])
+def test_curve_of_a_part_is_that_of_the_track_as_it_is_changed(tmp_path, capsys, how):
+    """The speed is after R 250 m, and a command or a grid makes R 400 m of the curve."""
+    grid = '[grid]\n"track.plan.2.radius" = ["400.0"]' if how == "grid" else ""
+    text = SPEEDS.format(more=grid).replace("straight", "curve_r250")
+    curve = "cant_deficiency = 1.0, radius = 250.0, cant = 0.15"
+    file = tmp_path / "curve.toml"
+    file.write_text(text.replace("admissible = 1.2", curve))
+    command = ["study", "--scenario", str(file), "--vehicles", "coach_manchester"]
+    more = ["--set", "track.plan.2.radius=400.0"] if how == "set" else []
+    assert main([*command, *more, "--out", str(tmp_path / "out")]) == 2
+    assert "parts.one.speed.radius: 250 m; 400 m in the curves" in capsys.readouterr().err
+
+
+WRONG = """format = "railsim-scenario/1"
+name = "wrong"
+standard = "comfort"
+assignments = ["settings.output_rat=200"]
+[conditions.worn]
+wheels = { S1002 = "no_wheel.csv" }
+[parts.one]
+track = "no_track"
+speed = { fixed = 20.0 }
+"""
+
+
+def test_scenario_is_checked_as_it_is_run(tmp_path, capsys):
+    """`validate` found nothing wrong in it; the run said that --set was, which nobody gave."""
+    file = tmp_path / "wrong.toml"
+    file.write_text(WRONG)
+    command = ["study", "--scenario", str(file), "--vehicles", "coach_manchester", "--out"]
+    for arguments in (["validate", str(file)], [*command, str(tmp_path / "out")]):
+        assert main(arguments) == 2
+        found = capsys.readouterr().err.splitlines()
+        words = (
+            "no_track: no file 'no_track'",
+            f"{file}: settings.output_rat: unknown key",
+            f"{file}: conditions.worn.wheels.S1002: profile 'no_wheel.csv': ",
+        )
+        assert all(sum(line.startswith(one) for line in found) == 1 for one in words), found
+
+
+def test_files_beside_a_scenario_are_found_from_anywhere(tmp_path, monkeypatch):
+    """As those beside a study or a vehicle."""
+    folder, elsewhere = tmp_path / "mine", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.mkdir()
+    track = railsim.load_track("straight")
+    track.replace(name="Mine").save(folder / "mine.toml")
+    wheel = load_profile("S1002")
+    rows = "\n".join(f"{y:.6f},{z:.6f}" for y, z in zip(wheel.y, wheel.z, strict=True))
+    (folder / "wheel.csv").write_text(f"y,z\n{rows}\n")
+    head = WRONG.replace("output_rat=", "output_rate=").replace("no_track", "mine.toml")
+    (folder / "scenario.toml").write_text(head.replace("no_wheel", "wheel"))
+    monkeypatch.chdir(elsewhere)
+    assert main(["validate", str(folder / "scenario.toml")]) == 0
+    (case,) = scenario_cases(load_scenario(folder / "scenario.toml"), ["coach_manchester"])
+    assert case.track.name == "Mine"
+    wheels = set(flatten(case.vehicle).of_kind("wheelset")[0].wheelset.profile)
+    assert wheels == {str((folder / "wheel.csv").resolve())}
+
+
 SMALL = """format = "railsim-scenario/1"
 name = "small"
 standard = "en14363"
