@@ -120,8 +120,9 @@ def kept(definition: "Definition", name: str, make: Callable[[], Any]) -> Any:
     """Return what follows from a definition alone, made once; a copy of it has it no more."""
     stored = definition.__dict__
     if name not in stored:
-        stored[name] = make()
-    return stored[name]
+        value = make()
+        stored[name] = lambda: value  # equal to itself alone: arrays have no truth value
+    return stored[name]()
 
 
 class Definition(BaseModel):

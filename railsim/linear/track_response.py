@@ -34,9 +34,9 @@ from railsim.linear.circle import POSITION
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.system import jacobian, without_forceless
 from railsim.linear.vehicle import LinearVehicle
+from railsim.model.work import against_rails
 from railsim.notation import SIDES
 from railsim.result.sensors import Sensor
-from railsim.simulation.outputs import against_rails
 
 QUANTITIES = ("alignment", "level", "cross_level", "gauge")
 """Irregularities [m]; the cross level as height of the left rail over the right one."""
@@ -124,7 +124,7 @@ def track_response(
         rates, state = free.rate(x), free.state.copy()
         state[c.indices] = x
         Q, Y = (free.work.wheel[:, :, column] for column in (W_Q, W_Y))
-        lateral = against_rails(model, state[None])[0, :, 0]
+        lateral = against_rails(model.system, state[None])[0, :, 0]
         return np.concatenate([rates, Q.ravel(), Y.ravel(), Y.sum(axis=1), lateral])
 
     of_states = jacobian(lambda rows: np.array([evaluated(row) for row in rows]), x, c.steps)

@@ -13,9 +13,17 @@ from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
 from railsim.kernels.rail_parts import COUNT, NODE_WEIGHTS
-from railsim.kernels.rails import CHANGES, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.rails import (
+    CHANGES,
+    COSINE,
+    MOTION_SIZE,
+    PLANE_SIZE,
+    RAIL_SIZE,
+    recorded_against_rails,
+)
 from railsim.kernels.registers import LANES
-from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP, TRACED
+from railsim.kernels.state import N_SCALARS
+from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_SIZE, SUPPORT_STEP, TRACED
 from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
@@ -25,6 +33,7 @@ from railsim.kernels.system import (
     POSE_SIZE,
     RATES_SIZE,
     RELATIVE_SIZE,
+    Z_0,
     Drive,
     System,
     Work,
@@ -156,3 +165,33 @@ def level_track_with_friction(system: System) -> System:
     for row in (MU_LEFT, MU_RIGHT):
         rail[:, row, 0] = np.max(system.track.rail[:, row, 0])
     return level._replace(track=level.track._replace(rail=rail))
+
+
+def against_rails(system: System, state: Floats) -> Floats:
+    """Lateral displacement and roll of each wheelset against its rails, from recorded states.
+
+    Returns
+    -------
+    float64[time, wheelset, 2]
+        [m], [rad]
+    """
+    axles, elastic = system.contact.body, system.support.elastic
+    found = np.empty((len(state), len(axles), 2))
+    recorded_against_rails(
+        system.track,
+        axles,
+        system.frame_offset[system.bodies.frame[axles]],
+        system.bodies.row[axles, Z_0],
+        first_rail(system, state),
+        SUPPORT_SIZE if elastic else 0,
+        state,
+        smooth_planes(len(axles)),
+        np.zeros((len(axles), 2, RAIL_SIZE)),
+        found,
+    )
+    return found
+
+
+def first_rail(system: System, state: Floats) -> int:
+    """Index of the first wheelset's elastic rails in a state."""
+    return int(state.shape[1] - N_SCALARS - len(system.contact.body) * SUPPORT_SIZE)

@@ -30,14 +30,12 @@ from railsim.kernels.contact_columns import (
 )
 from railsim.kernels.controllers import ACTUATOR
 from railsim.kernels.driving import recorded_axle_torques
-from railsim.kernels.rails import RAIL_SIZE, recorded_against_rails
 from railsim.kernels.recording import Recorder
 from railsim.kernels.state import N_SCALARS
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
-from railsim.kernels.system import Z_0
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
-from railsim.model.work import parts_of_wheel, smooth_planes
+from railsim.model.work import against_rails, first_rail, parts_of_wheel
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
 from railsim.simulation.own_outputs import OwnOutputs
@@ -72,7 +70,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     loaded = np.where(Q > 0.0, Q, np.nan)
     there = np.where(wheel[..., W_NORMAL] > 0.0, 1.0, np.nan)
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
-    on_rails = against_rails(model, state)
+    on_rails = against_rails(model.system, state)
     return {
         "time": state[:, -3],
         "distance": state[:, -2],
@@ -107,37 +105,6 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     }
 
 
-def against_rails(model: Model, state: Floats) -> Floats:
-    """Lateral displacement and roll of each wheelset against its rails, from recorded states.
-
-    Returns
-    -------
-    float64[time, wheelset, 2]
-        [m], [rad]
-    """
-    system = model.system
-    axles, elastic = system.contact.body, system.support.elastic
-    found = np.empty((len(state), len(axles), 2))
-    recorded_against_rails(
-        system.track,
-        axles,
-        system.frame_offset[system.bodies.frame[axles]],
-        system.bodies.row[axles, Z_0],
-        _first_rail(model, state),
-        SUPPORT_SIZE if elastic else 0,
-        state,
-        smooth_planes(len(axles)),
-        np.zeros((len(axles), 2, RAIL_SIZE)),
-        found,
-    )
-    return found
-
-
-def _first_rail(model: Model, state: Floats) -> int:
-    """Index of the first wheelset's elastic rails in a state."""
-    return int(state.shape[1] - N_SCALARS - len(model.index.wheelsets) * SUPPORT_SIZE)
-
-
 def _of_both(values: Floats) -> Floats:
     """Sum over the last axis, the sides; numpy's own takes far longer over an axis of two."""
     total: Floats = 0.0 + values[..., 0] + values[..., 1]  # from zero, so that there is no -0.0
@@ -155,7 +122,7 @@ def rail_deflection(model: Model, state: Floats) -> Floats:
     rows, wheelsets = len(state), len(model.index.wheelsets)
     if not model.system.support.elastic:
         return np.zeros((rows, wheelsets, 2, 2))
-    first = _first_rail(model, state)
+    first = first_rail(model.system, state)
     track = state[:, first:-N_SCALARS].reshape(rows, wheelsets, SUPPORT_SIZE)
     return track[..., :RAIL_DOF].reshape(rows, wheelsets, 2, 2)
 

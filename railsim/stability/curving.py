@@ -35,11 +35,10 @@ from railsim.linear.vehicle import WALKING_PACE
 from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
-from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
+from railsim.model.work import CONSTANT_SPEED, against_rails, without_loads, work_arrays
 from railsim.notation import ROLL, YAW
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
-from railsim.simulation.outputs import against_rails
 from railsim.table import Column, Table
 from railsim.track.tables import track_tables
 
@@ -409,7 +408,7 @@ class _Search:
         found.dQ_over_Q0[index] = (Q - self.Q0) / self.Q0
         found.T_gamma[index] = wheel[:, :, W_T_GAMMA]
         found.contact_y[index] = _contact_positions(solver, len(wheelsets))
-        found.lateral[index] = against_rails(self.model, state[None])[0, :, 0]
+        found.lateral[index] = against_rails(self.model.system, state[None])[0, :, 0]
         found.attack[index] = state[6 * wheelsets + YAW]
         found.sum_Y[index] = Y.sum(axis=1)
         found.steering[index] = state[[6 * b + YAW for b in frames]]

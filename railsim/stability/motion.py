@@ -22,8 +22,7 @@ from railsim.linear.circle import POSITION
 from railsim.linear.eigenmodes import Eigenmodes
 from railsim.linear.vehicle import LinearVehicle
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
-from railsim.model.work import work_arrays
-from railsim.simulation.outputs import against_rails
+from railsim.model.work import against_rails, work_arrays
 
 OUTPUT_RATE = 200.0  # 1/s
 LONGEST = 1.0  # s of a stretch that the table of the track holds
@@ -166,4 +165,4 @@ class VehicleMotion:
 
     def lateral(self, rows: int) -> Floats:
         """Lateral displacements of the wheelsets in these records [m]."""
-        return np.asarray(against_rails(self.model, self._recorder.state[:rows])[..., 0])
+        return np.asarray(against_rails(self.model.system, self._recorder.state[:rows])[..., 0])
