@@ -20,7 +20,7 @@ of it in y, z, roll and yaw, which a force -m d_y on the rails and moments belon
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -118,13 +118,11 @@ def track_response(
     offsets = system.frame_offset[system.bodies.frame[system.contact.body]]
     x, c = free.x, free.coordinates
 
-    model = replace(vehicle.model, system=system)
-
     def evaluated(x: Floats) -> Floats:
         rates, state = free.rate(x), free.state.copy()
         state[c.indices] = x
         Q, Y = (free.work.wheel[:, :, column] for column in (W_Q, W_Y))
-        lateral = against_rails(model.system, state[None])[0, :, 0]
+        lateral = against_rails(system, state[None])[0, :, 0]
         return np.concatenate([rates, Q.ravel(), Y.ravel(), Y.sum(axis=1), lateral])
 
     of_states = jacobian(lambda rows: np.array([evaluated(row) for row in rows]), x, c.steps)
