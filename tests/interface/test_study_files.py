@@ -57,6 +57,17 @@ seed = 7
     assert inputs["sample"]["seed"] == 7
 
 
+def test_limits_beside_a_study_are_found_from_anywhere(tmp_path, monkeypatch):
+    """As vehicles, tracks and settings beside it."""
+    folder, elsewhere = tmp_path / "mine", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.mkdir()
+    (folder / "own.toml").touch()
+    file = written(folder, 'speeds = [20.0]\n[analyses.a]\nkind = "assess"\nlimits = "own.toml"\n')
+    monkeypatch.chdir(elsewhere)
+    assert load_study(file).analyses["a"].limits == str((folder / "own.toml").resolve())
+
+
 def test_study_goes_on_alone_from_what_its_journal_says(tmp_path, simulated):
     file = written(tmp_path, 'speeds = "10:12:2"\n[sample]\nnumber = 2\n[sample.parameters]\n'
                    '"track.friction" = { low = 0.2, high = 0.4 }\n')  # fmt: skip
