@@ -6,9 +6,10 @@ from pathlib import Path
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import caused_by_hunting, comfort_report, short_of_blocks
 from railsim.assessment.record import Record
-from railsim.assessment.running import assess_running, by_vehicle
+from railsim.assessment.running import assess_running, by_vehicle, running_limits
 from railsim.assessment.safety import safety_report
 from railsim.assessment.wear_report import wear_report
+from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import argument_error
@@ -16,6 +17,28 @@ from railsim.result import Result
 
 RUNNING = ("en14363", "uic518")
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
+# what uses an option; others are used by those of running behaviour
+USED_BY = {"limits": (*RUNNING, "comfort"), "law": ("wear",)}
+
+
+def check_options(standard: str, **options: object) -> None:
+    """Refuse, by InputError, options that a standard does not use; None and False: not given."""
+    for name, value in options.items():
+        users = USED_BY.get(name, RUNNING)
+        if value not in (None, False) and standard not in users:
+            found = f"not used by the standard '{standard}'"
+            raise argument_error(name, found, "only with " + ", ".join(users))
+
+
+def limits_of(standard: str, file: str | Path | None = None) -> RunningLimits | ComfortLimits:
+    """Return the limits of a standard, from a file or those shipped.
+
+    Raises InputError: what is wrong in the file; limits of another standard, or of one without.
+    """
+    check_options(standard, limits=file)
+    if standard in RUNNING:
+        return running_limits(standard, file)
+    return load_comfort_limits(file or "comfort")
 
 
 def assess(
@@ -59,7 +82,8 @@ def assess(
     Raises
     ------
     InputError
-        A result lacks a quantity, is sampled too coarsely or is too short.
+        A result lacks a quantity, is sampled too coarsely or is too short; an option that the
+        standard does not use.
 
     Examples
     --------
@@ -75,6 +99,10 @@ def assess(
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
+    check_options(
+        standard, limits=limits, service=service, method=method != "normal", causal=causal,
+        all_sections=all_sections, law=law,
+    )  # fmt: skip
     groups = by_vehicle(results, loads=standard in RUNNING)
     if standard in RUNNING:
         return [

@@ -31,8 +31,11 @@ from railsim.definitions.limits import RunningLimits
 from railsim.definitions.loading import load_running_limits
 from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, input_error, nearest
+from railsim.errors import Fault, InputError, input_error, listed, nearest
 from railsim.result import Result
+
+OF_LIMITS = ("admissible_speed", "cant_deficiency", "category")
+"""Keys of the service table that limits depend on."""
 
 
 @dataclass
@@ -102,7 +105,7 @@ def assess_running(
     Raises InputError: no service table; a run lacks a quantity, is sampled too coarsely or too
     short; limits of another standard, or not those of the assessed quantities.
     """
-    limits = _limits(standard, file)
+    limits = running_limits(standard, file)
     service = service or _service(runs)
     done = []
     populations = _populations(runs)
@@ -145,7 +148,7 @@ def assess_running(
     )  # fmt: skip
 
 
-def _limits(standard: str, file: str | Path | None) -> RunningLimits:
+def running_limits(standard: str, file: str | Path | None) -> RunningLimits:
     """Return the limits of a standard, each of a known quantity, from a file or those shipped.
 
     Raises InputError: the limit of a quantity that decides is missing; the limit of an unknown
@@ -167,8 +170,19 @@ def _limits(standard: str, file: str | Path | None) -> RunningLimits:
 
 
 def _service(runs: Mapping[str, Result]) -> Service:
-    name, first = next(iter(runs.items()))
-    service = first.vehicle().service
+    services = {name: result.vehicle().service for name, result in runs.items()}
+    name, service = next(iter(services.items()))
+    differing = {
+        key: values
+        for key in OF_LIMITS
+        if len(values := {getattr(one, key, None) for one in services.values()}) > 1
+    }
+    if differing:
+        allowed = "the same in all conditions, or give one as an option"
+        raise InputError(
+            Fault(name, f"vehicle.service.{key}", listed([*map(str, values)]), allowed, name)
+            for key, values in differing.items()
+        )
     if service is None:
         allowed = (
             "add [service] with admissible_speed and cant_deficiency to its file, or give "

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 STANDARDS = "en14363|uic518|comfort|wear|safety"
 CATEGORIES = "passenger|freight|locomotive|multiple_unit"
-SERVICE = ("admissible_speed", "cant_deficiency", "category")  # keys of the service table
 ENDINGS = (".json", ".csv", ".png", "_sections.png", "_regression.png")
 FILES = [f"assessment{ending}" for ending in ENDINGS]
 
@@ -52,14 +51,15 @@ def command(
       railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
     """
     from railsim.assessment import assess
-    from railsim.assessment.assess import RUNNING
-    from railsim.assessment.running import by_vehicle
+    from railsim.assessment.assess import RUNNING, check_options
+    from railsim.assessment.running import OF_LIMITS, by_vehicle
     from railsim.assessment.tables import assessment_lines
     from railsim.cli.gathered import opened
 
     results = opened(_paths(files))
     output.reserve(*FILES)
-    changes = {name: how.pop(name) for name in SERVICE}
+    changes = {name: how.pop(name) for name in OF_LIMITS}
+    check_options(standard, **changes)
     assessments = [
         one
         for runs in by_vehicle(results, loads=standard in RUNNING)

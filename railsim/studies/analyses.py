@@ -53,9 +53,7 @@ def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Ou
     from railsim.assessment import assess
 
     assert result is not None  # a case with this analysis has a run
-    (found,) = assess(
-        result, analysis.standard, limits=analysis.limits, service=case.vehicle.service, coarse=True
-    )
+    (found,) = assess(result, analysis.standard, limits=analysis.limits, coarse=True)
     shares: dict[str, float] = {}
     for row in found.worst:
         if not math.isnan(row.share):

@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,10 @@ from typing import Any
 from railsim.errors import Fault, InputError, argument_error, argument_fault, listed
 from railsim.files.access import is_file, make_folder, sweep
 from railsim.laws.permission import check_laws
+from railsim.notation import QUANTITIES
 from railsim.processes import available_cores
-from railsim.result import open_result
+from railsim.result import Result, open_result
+from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import Storage
 from railsim.studies import execute
 from railsim.studies.case import Case
@@ -115,8 +118,8 @@ def _jobs(
     for case in state.cases:
         path = (folder / f"{case.name}.h5").resolve()
         picture = path.with_suffix(".png") if execution.plots and case.file_name else None
-        exists = case.name in state.to_be_analysed
-        jobs.append(execute.Job(case, path, picture, spec.quantities, keep, storage, exists))
+        known = state.to_be_analysed.get(case.name)
+        jobs.append(execute.Job(case, path, picture, spec.quantities, keep, storage, known))
     if execution.longest_first:
         jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
     return jobs
@@ -189,9 +192,9 @@ class State:
     """Which runs of a study are done, and which are to be computed.
 
     `cases`: cases to compute; `keys`: keys of all points by their names; `found`: existing results
-    that are not in the journal; `to_be_analysed`: names of the cases whose run exists, but not
-    their analyses. Raises InputError: all faults of the cases to compute; without `resume` also
-    results that would have to be replaced.
+    that are not in the journal; `to_be_analysed`: of cases whose run exists, but not their
+    analyses, what the journal knows of it, perhaps nothing. Raises InputError: all faults of the
+    cases to compute; without `resume` also results that would have to be replaced.
     """
 
     def __init__(
@@ -209,10 +212,11 @@ class State:
         self._files = {} if anew else _files(folder)
         self._damaged: dict[Path, str] = {}
         self._changed: list[str] = []
+        self._reduced: list[str] = []
         self._damaged_lines = known.damaged if known else 0
         self.keys = {point.name: point.key for point in points}
         self.found: list[tuple[Point, Record]] = []
-        self.to_be_analysed: set[str] = set()
+        self.to_be_analysed: dict[str, Record] = {}
         waiting = [point for point in points if not self._is_done(point)]
         self._waiting = dict(zip(waiting, load(waiting), strict=True))
         faults = [fault for one in self._waiting.items() for fault in self._faults_of(*one)]
@@ -248,17 +252,39 @@ class State:
         try:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
-                if case.analyses:  # takes time: done as a job like others
-                    self.to_be_analysed.add(case.name)
+                known = self._known(case)
+                if self._lacks(case, result, known):
+                    self._reduced.append(case.name)
+                    found = "a result without all quantities of this study"
+                    return [argument_fault("out", str(path), found, CHANGED)]
+                if case.analyses or self._spec.quantities:  # takes time: done as a job like others
+                    self.to_be_analysed[case.name] = known
                 else:
-                    record = finished_record(case, result, self._spec.quantities)
-                    self.found.append((point, record))
+                    self.found.append((point, finished_record(case, result, None, known)))
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
             return [replace(f, allowed=DAMAGED, option=f.file) for f in error.faults]
         self._changed.append(case.name)
         return [argument_fault("out", str(path), "a result of other inputs", CHANGED)]
+
+    def _known(self, case: Case) -> Record:
+        """Return what the journal knows of a run whose file is there; empty: nothing."""
+        entry = self._entries.get(case.name)
+        if entry is None or not (entry.is_done and entry.is_of(self._files[case.file_name])):
+            return {}
+        record = Records(self._folder / JOURNAL, [entry])[0]
+        return record if record["inputs_hash"] == case.key else {}
+
+    def _lacks(self, case: Case, result: Result, known: Record) -> bool:
+        """Whether a file lacks quantities to be kept, or those of a summary that is not known."""
+        recorded = case.settings.outputs.quantities or ("*",)
+        wanted = [*kept_quantities(self._spec.keep), *(() if known else OF_FACTS)]
+        return any(
+            name not in result
+            for name in QUANTITIES
+            if all(any(fnmatchcase(name, p) for p in some) for some in (recorded, wanted))
+        )
 
     def settle(self, journal: Journal) -> list[str]:
         """Record existing results, rename damaged files; return remarks for the user."""
@@ -272,7 +298,11 @@ class State:
             remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
         gone = [case.name for case in self.cases if case.file_name not in self._files]
         lost = [name for name in gone if name in self._entries and self._entries[name].size]
-        for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
+        for names, words in (
+            (self._changed, "of other inputs"),
+            (self._reduced, "without all quantities"),
+            (lost, "no longer there"),
+        ):
             if names:
                 number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
                 remarks.append(f"{number} {words} and computed again: {listed(names)}")

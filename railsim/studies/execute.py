@@ -60,7 +60,8 @@ class Job:
     # quantities of the result, see `railsim.studies.spec.kept_quantities`
     keep: tuple[str, ...] = ("*",)
     storage: Storage = PLAIN  # compression and precision of its file
-    exists: bool = False  # the run exists, only its analyses are to be computed
+    # of a run that exists, whose analyses alone are to be computed: what is known of it
+    known: Record | None = None
 
 
 Batch = tuple[Job, ...]
@@ -79,7 +80,7 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
     found: list[Batch] = []
     alike: list[list[Job]] = []  # jobs that differ only in the vehicle
     for job in jobs:
-        if size <= 1 or job.exists or not job.case.file_name:
+        if size <= 1 or job.known is not None or not job.case.file_name:
             found.append((job,))
             continue
         group = next((some for some in alike if can_share_a_call(some[0].case, job.case)), None)
@@ -99,9 +100,10 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     first = batch[0]
     if not first.case.file_name:
         return [_analysed(job) for job in batch]
-    if first.exists:
+    if first.known is not None:
         with suppress(RailsimError):  # its file lacks required quantities: it is run again
-            return [finished_record(first.case, open_result(first.path), first.function)]
+            result = open_result(first.path)
+            return [finished_record(first.case, result, first.function, first.known)]
     files = [job.path if job.keep else None for job in batch]
     found: list[Result | Exception]
     try:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.definitions.loading import load_track
-from railsim.definitions.study.analyses import AssessAnalysis, needs_run
+from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run
 from railsim.definitions.study.definition import Study, value_texts
 from railsim.definitions.study.design import Optimise
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error, nearest
@@ -76,6 +76,8 @@ class Plan:
         # what the record of a run depends on besides the run
         self._further = [f"told {told}"] if (told := fingerprint(spec.quantities)) else []
         self._further += [f"analyses {spec.analyses}"] if spec.analyses else []
+        self._further += [f"limits {self._limits(one)}" for one in spec.analyses.values()]
+        self._further += [f"keep {spec.keep}"] if spec.keep != "all" else []
         linked = [next(iter(table.values())) for table in spec.linked]
         lists: list[Sequence[object]] = [spec.vehicles, spec.tracks, spec.speeds]
         lists += [*spec.grid.values(), *linked]
@@ -114,6 +116,15 @@ class Plan:
         self._loader.check()
         check_names(self.points)
         return [case for case in found if case is not None]
+
+    def _limits(self, analysis: Analysis) -> str:
+        """Return a hash of the limits file of an analysis, which is checked; empty without one."""
+        if not isinstance(analysis, AssessAnalysis) or analysis.limits is None:
+            return ""
+        from railsim.assessment.assess import limits_of
+
+        limits_of(analysis.standard, analysis.limits)
+        return self._fingerprints.of("limits", analysis.limits, ())
 
     def _permitted(self, run: RunSpec) -> float | None:
         """Return the lower of the admissible speed of a vehicle and the speed of a track [m/s]."""

@@ -48,10 +48,16 @@ def waiting_record(case: Case) -> Record:
     return {**about, "inputs_hash": case.key, "status": "waiting", "status_reason": ""}
 
 
-def finished_record(case: Case, result: Result, function: str | None = None) -> Record:
-    """Return the record of a run with its own quantities and analyses; RailsimError: one fails."""
+def finished_record(
+    case: Case, result: Result, function: str | None = None, known: Record | None = None
+) -> Record:
+    """Return the record of a run with its own quantities and analyses; RailsimError: one fails.
+
+    `known`: an earlier record of the run, from all its quantities; the result may be reduced.
+    """
     numbers, said = analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
+    facts |= {name: known[name] for name in ("peaks", "mid_curves") if known and name in known}
     facts["remarks"] = [*facts["remarks"], *said]
     found = user_quantities(function, result) | numbers
     return {**facts, "quantities": found} if function or case.analyses else facts

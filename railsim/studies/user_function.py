@@ -43,7 +43,7 @@ def full_name(function: "str | Function | None") -> str | None:
     if not (file.endswith(".py") and name.isidentifier()):
         raise argument_error(PARAMETER, "not understood", f"allowed: {ALLOWED}", key=function)
     whole = f"{Path(file).resolve()}:{name}"
-    _loaded(whole)
+    _loaded(whole, fingerprint(whole))
     return whole
 
 
@@ -76,7 +76,10 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
     if name is None:
         return {}
     try:
-        found = {key: float(value) for key, value in dict(_loaded(name)(result)).items()}
+        found = {
+            key: float(value)
+            for key, value in dict(_loaded(name, fingerprint(name))(result)).items()
+        }
         for key, number in found.items():
             if not isinstance(key, str) or not key.isprintable() or not key:
                 raise TypeError(f"the name {key!r} is not a text")
@@ -88,7 +91,8 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
 
 
 @cache
-def _loaded(name: str) -> Function:
+def _loaded(name: str, _: str) -> Function:
+    """Load a function, anew where the content of its file, of which a hash is given, has changed."""
     file, _, function = name.rpartition(":")
     spec = spec_from_file_location(f"railsim_quantities_{Path(file).stem}", file)
     try:

@@ -231,6 +231,38 @@ def test_vehicle_without_a_service_table_is_refused():
         assess(made(track(STRAIGHT), FAST, vehicle=vehicle))
 
 
+@pytest.mark.parametrize(("standard", "option", "value"), [
+    ("wear", "limits", "en14363"),
+    ("safety", "limits", "en14363"),
+    ("comfort", "law", "usfd"),
+    ("comfort", "admissible_speed", 30.0),
+    ("wear", "causal", True),
+    ("safety", "method", "simplified"),
+    ("comfort", "all_sections", True),
+])  # fmt: skip
+def test_options_that_a_standard_does_not_use_are_refused(
+    tmp_path, capsys, standard, option, value
+):
+    name = "--" + option.replace("_", "-")
+    given = [name] if value is True else [name, str(value)]
+    made(track(STRAIGHT), FAST).save(tmp_path / "r.h5")
+    assert main(["assess", str(tmp_path / "r.h5"), "--standard", standard, *given]) == 2
+    assert f"{name}: not used by the standard '{standard}'; only with" in capsys.readouterr().err
+
+
+def test_conditions_of_a_vehicle_with_different_limits_are_not_assessed_together():
+    coach = railsim.load_vehicle("coach_manchester")
+    runs = {}
+    for condition, deficiency in (("new", 0.15), ("worn", 0.13)):
+        service = {"service.condition": condition, "service.cant_deficiency": deficiency}
+        vehicle = coach.with_values(service).to_toml()
+        runs[condition] = made(track(STRAIGHT), FAST, vehicle=vehicle)
+    with pytest.raises(InputError, match=r"service\.cant_deficiency: 0\.1[35], 0\.1[35]; the same"):
+        assess(runs)
+    (found,) = assess(runs, service=coach.service)
+    assert found.verdict == "incomplete"
+
+
 def test_limits_file_with_an_unknown_key_is_refused(tmp_path):
     limits = tmp_path / "own.toml"
     limits.write_text('format = "railsim-limits/1"\nextends = "en14363"\nsum_Z = 3\n')

@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from example_result import ROOT
 from planned import combinations
 from test_study import CURVE, arguments, index, rows
 from test_study import simulated as simulated
@@ -66,6 +67,77 @@ def test_limits_beside_a_study_are_found_from_anywhere(tmp_path, monkeypatch):
     file = written(folder, 'speeds = [20.0]\n[analyses.a]\nkind = "assess"\nlimits = "own.toml"\n')
     monkeypatch.chdir(elsewhere)
     assert load_study(file).analyses["a"].limits == str((folder / "own.toml").resolve())
+
+
+def test_function_that_changes_leaves_the_peaks_of_what_was_not_kept(tmp_path, simulated):
+    """They are those of the whole run, in full precision, not of the reduced file."""
+    own = tmp_path / "own.py"
+    how = {"out": tmp_path / "s", "workers": 1, "keep": "Y", "single": True}
+    own.write_text("def most(r):\n    return {'most': abs(r['Y']).max()}\n")
+    railsim.study([COACH], [CURVE], [20.0], quantities=f"{own}:most", **how)
+    before = rows(tmp_path / "s")[0]
+    own.write_text("def most(r):\n    return {'first': abs(r['Y'][0]).max()}\n")
+    railsim.study([COACH], [CURVE], [20.0], quantities=f"{own}:most", resume=True, **how)
+    after = rows(tmp_path / "s")[0]
+    assert simulated == [20.0]
+    assert float(after.pop("first")) < float(before.pop("most"))
+    assert after == before
+
+
+def test_function_of_a_quantity_that_was_not_kept_has_the_run_computed_again(tmp_path, simulated):
+    own = tmp_path / "own.py"
+    how = {"out": tmp_path / "s", "workers": 1, "keep": "Y"}
+    own.write_text("def most(r):\n    return {}\n")
+    railsim.study([COACH], [CURVE], [20.0], quantities=f"{own}:most", **how)
+    own.write_text("def most(r):\n    return {'most': r['Q'].max()}\n")
+    railsim.study([COACH], [CURVE], [20.0], quantities=f"{own}:most", resume=True, **how)
+    assert simulated == [20.0, 20.0]
+    assert float(rows(tmp_path / "s")[0]["most"]) > 0.0
+
+
+def test_reduced_results_do_not_count_as_whole_ones(tmp_path, simulated):
+    remarks = []
+    how = {"out": tmp_path, "workers": 1, "on_remark": remarks.append}
+    railsim.study([COACH], [CURVE], [20.0], keep="Q,Y", **how)
+    railsim.study([COACH], [CURVE], [20.0], keep="Y", resume=True, **how)
+    assert (simulated, remarks) == ([20.0], [])
+    railsim.study([COACH], [CURVE], [20.0], resume=True, **how)
+    assert simulated == [20.0, 20.0]
+    words = "1 result is without all quantities and computed again"
+    assert remarks == [f"{words}: {COACH}_{CURVE}_20"]
+
+
+@pytest.mark.parametrize(
+    ("standard", "change", "words"),
+    [
+        ("en14363", ("", ""), "limits.toml"),
+        ("en14363", ('standard = "en14363"', 'standard = "uic518"'), "wanted: 'en14363'"),
+        ("wear", (" ", " "), "not used by the standard 'wear'"),
+    ],
+)
+def test_limits_of_an_analysis_are_looked_at_first(tmp_path, simulated, standard, change, words):
+    """Not after the runs."""
+    text = (ROOT / "limits/en14363.toml").read_text(encoding="utf-8")
+    own = tmp_path / "limits.toml"
+    own.write_text(text.replace(*change) if change[0] else "format = 3", encoding="utf-8")
+    analysis = {"kind": "assess", "standard": standard, "limits": str(own)}
+    with pytest.raises(InputError, match=words):
+        railsim.study([COACH], [CURVE], [20.0], analyses={"a": analysis}, out=tmp_path / "s")
+    assert simulated == []
+
+
+def test_limits_that_have_changed_have_the_assessment_made_again(tmp_path):
+    text = (ROOT / "limits/en14363.toml").read_text(encoding="utf-8")
+    own = tmp_path / "limits.toml"
+    analysis = {"a": {"kind": "assess", "limits": str(own)}}
+    keys = []
+    for now in (text, text + "# a comment\n", text.replace("A2:2022", "A2:2023")):
+        own.write_text(now, encoding="utf-8")
+        spec = StudySpec.model_validate(
+            {"vehicles": [COACH], "tracks": [CURVE], "speeds": [20.0], "analyses": analysis}
+        )
+        keys += [Plan(spec).points[0].key]
+    assert keys[0] == keys[1] != keys[2]
 
 
 def test_study_goes_on_alone_from_what_its_journal_says(tmp_path, simulated):
