@@ -76,10 +76,8 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
     if name is None:
         return {}
     try:
-        found = {
-            key: float(value)
-            for key, value in dict(_loaded(name, fingerprint(name))(result)).items()
-        }
+        values = dict(_loaded(name, fingerprint(name))(result))
+        found = {key: float(value) for key, value in values.items()}
         for key, number in found.items():
             if not isinstance(key, str) or not key.isprintable() or not key:
                 raise TypeError(f"the name {key!r} is not a text")
@@ -92,7 +90,7 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
 
 @cache
 def _loaded(name: str, _: str) -> Function:
-    """Load a function, anew where the content of its file, of which a hash is given, has changed."""
+    """Load a function; the hash of its file has it loaded anew when that has changed."""
     file, _, function = name.rpartition(":")
     spec = spec_from_file_location(f"railsim_quantities_{Path(file).stem}", file)
     try:
