@@ -1,8 +1,11 @@
 """The house itself: sizes of functions and modules, and where numba's inside may be used."""
 
 import ast
+import gc
 from functools import cache
 from pathlib import Path
+
+import pytest
 
 import railsim
 
@@ -12,6 +15,17 @@ PARAMETERS, FUNCTION, MODULE = 10, 80, 500
 LARGER = {"notation.py": "the table of quantities"}
 # public functions that take the numbers of one patch or pair of profiles
 MORE_PARAMETERS = {"creep_force", "exact_creep_force"}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def million_nodes():
+    """The syntax trees, which no collection of garbage searches, and which go with these tests."""
+    gc.disable()
+    nodes()
+    gc.enable()
+    yield
+    nodes.cache_clear()
+    modules.cache_clear()
 
 
 @cache
