@@ -51,14 +51,16 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
     """Compare the peaks and the full-curve values of results, by what they are called.
 
     The first is what the others are compared with.  Returns: peaks first, then the medians over
-    every full curve that the first result passed.
+    every full curve that the first result passed, by its number along the track.
     """
     rows: dict[tuple[str, str], dict[str, Peak]] = {}
     for label, result in results.items():
         for peak in peaks(result):
             rows.setdefault((WORDS[peak.kind], peak.quantity.name), {})[label] = peak
-        for number, curve in enumerate(mid_curves(result), start=1):
-            where = f"full curve {number}, median"
+        sections = [one for one in curvature_sections(result.track()) if one.type == "CIR"]
+        middles = [0.5 * (one.begin + one.end) for one in sections]  # a run may begin after some
+        for curve in mid_curves(result):
+            where = f"full curve {1 + middles.index(curve.distance)}, median"
             for peak in curve.median_peaks:
                 rows.setdefault((where, peak.quantity.name), {})[label] = peak
     first = next(iter(results))
@@ -95,8 +97,13 @@ class Difference:
 
     @property
     def largest(self) -> tuple[float, float]:
-        """The difference of the largest magnitude [SI], and where it is [m]."""
-        index = int(np.argmax(np.abs(self.values)))
+        """The difference of the largest magnitude [SI], and where it is [m]; nan if there is none.
+
+        Not where one has no value, as Y/Q of a wheel that does not touch.
+        """
+        if np.isnan(self.values).all():
+            return nan, nan
+        index = int(np.nanargmax(np.abs(self.values)))
         return float(self.values[index]), float(self.distance[index])
 
 

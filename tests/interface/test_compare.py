@@ -3,12 +3,15 @@
 import csv
 import json
 
+import numpy as np
 import pytest
-from example_result import example_result
+from example_result import example_result, text
 
 import railsim
 from railsim.cli import main
-from railsim.compare import compare
+from railsim.compare import compare, differences
+from railsim.result import Result
+from railsim.result.export import selected
 
 
 @pytest.fixture
@@ -43,6 +46,37 @@ def test_peaks_and_mid_curve_values_are_compared():
     rows = compare({"base": example_result(), "short": example_result(duration=19.0)})
     assert [row.where for row in rows].count("full curve 1, median") == 10
     assert set(rows[-1].peaks) == {"base"}  # the short run ends before the middle
+
+
+def test_a_run_that_begins_after_a_curve_is_compared_in_the_others():
+    """An S-curve: the circular elements are from 60 m to 120 m and from 126 m to 186 m."""
+    made = example_result(speed=4.0, duration=70.0)
+    whole = changed(made, {"track_toml": text("tracks/s_curve_r150.toml")})
+    rows = compare({"whole": whole, "later": selected(whole, between=(100.0, 280.0))})
+    for row in rows:
+        if row.where.startswith("full curve"):
+            middle = {"1": 90.0, "2": 156.0}[row.where[len("full curve ")]]
+            assert {peak.distance for peak in row.peaks.values()} == {middle}
+            assert set(row.peaks) == ({"whole", "later"} if middle == 156.0 else {"whole"})
+
+
+def changed(made, attributes=None, **arrays):
+    """Return a result with other arrays or attributes."""
+    given = {name: made[name] for name in made} | arrays
+    facts = {**made.attributes, **(attributes or {})}
+    return Result(given, made.quantities, made.coordinates, facts, made.profiles)
+
+
+def test_largest_difference_is_where_both_have_a_value():
+    """A wheel without contact has no Y/Q: neither there nor next to it is there a difference."""
+    base, lower = example_result(), example_result(gain=0.9)
+    apart = (lower["Y_over_Q"] - base["Y_over_Q"])[:, 0, 0]
+    lifted = lower["Y_over_Q"].copy()
+    lifted[100, 0, 0] = lifted[:, 0, 1] = np.nan
+    both = {"base": base, "lower": changed(lower, Y_over_Q=lifted)}
+    left, right = differences(both, ["Y_over_Q"])
+    assert left.largest[0] == apart[np.argmax(np.abs(apart))]
+    assert np.isnan(right.largest).all()
 
 
 def test_command_prints_value_wheel_time_and_difference(files, capsys):
