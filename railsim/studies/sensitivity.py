@@ -62,7 +62,9 @@ def sensitivities(
     # a quantity that does not vary has no variance to explain
     varied = np.flatnonzero(spread > 1e-12 * np.abs(values[known]).max(axis=0))
     first, total = np.zeros((2, len(quantities), count))
-    if len(varied):
+    if count == 1:
+        first[varied] = total[varied] = 1.0
+    elif len(varied):
         distributions: list[Any] = [uniform()] * count
         indices = sobol_indices(
             func=lambda x: model(x.T)[:, varied].T,

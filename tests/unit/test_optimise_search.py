@@ -126,6 +126,12 @@ def test_indices_of_a_sum_are_its_shares_of_the_variance():
     assert found.total == pytest.approx({"x": 0.2, "y": 0.8}, abs=0.02)
 
 
+def test_a_single_variable_explains_all_of_a_single_quantity():
+    designs = np.linspace(0.0, 1.0, 6)[:, None]
+    (found,) = sensitivities(designs, designs**2, np.array([0.5]), ["x"], ["square"])
+    assert found.first == found.total == {"x": 1.0}
+
+
 def test_a_surrogate_goes_through_what_is_known():
     designs = np.random.default_rng(2).random((20, 3))
     values = np.column_stack([np.sin(designs.sum(axis=1)), designs[:, 0] ** 2])
