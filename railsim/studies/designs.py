@@ -13,13 +13,14 @@ from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Constraint, Objective, Optimise, Value, Variable
 from railsim.errors import Fault, Faults, nearest
 from railsim.studies.outcome import Outcome
+from railsim.studies.plan import selects
 from railsim.studies.records import Record
 from railsim.studies.search import Values
 from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.study import run_study
 from railsim.studies.summary import summary_row, unit_of
 
-DIGITS = 6  # of the values of variables
+DIGITS = 6  # of the values of variables, more where the range is narrow
 INPUTS = "optimise.toml"
 
 Progress = Callable[[float], None]
@@ -108,7 +109,7 @@ class Evaluation:
             fine = not any(map(math.isnan, objectives)) and all(one <= 0.0 for one in excess)
             values = dict(zip(self.wanted.variables, map(float, row), strict=True))
             reason = str(bad[0]["status_reason"]) if bad else ""
-            limits = tuple(value for value, _ in worst)
+            limits = (math.nan,) * len(worst) if bad else tuple(value for value, _ in worst)
             designs.append(Design(number, values, objectives, limits, fine, reason))
             margins.append(excess)
         self.designs = tuple(designs)
@@ -116,16 +117,20 @@ class Evaluation:
 
 
 def _written(variable: Variable, share: float) -> str:
-    """Return the value at a share of a variable's range as text.
+    """Return the value at a share of a variable's range as text, within the range.
 
     >>> _written(Variable(low=1e3, high=1e5, scale="log"), 0.5)
     '10000'
+    >>> [_written(Variable(low=1234567.8, high=1234569.0), share) for share in (0.0, 0.5)]
+    ['1234567.8', '1234568.4']
     """
     if variable.scale == "log":
         value = variable.low * (variable.high / variable.low) ** share
     else:
         value = variable.low + (variable.high - variable.low) * share
-    return f"{value:.{DIGITS}g}"
+    span = (variable.high - variable.low) / max(abs(variable.low), abs(variable.high))
+    rounded = float(f"{value:.{DIGITS + max(0, math.floor(-math.log10(span)))}g}")
+    return repr(min(max(rounded, variable.low), variable.high)).removesuffix(".0")
 
 
 def share_of(variable: Variable, value: float) -> float:
@@ -147,20 +152,12 @@ def _values(one: Value, rows: Rows) -> list[float]:
     """Return a quantity of the selected runs, NaN where a run lacks it."""
     found = []
     for labels, cells in rows:
-        if not all(_alike(labels.get(key), value) for key, value in one.where.items()):
+        if not selects(one, labels):
             continue
         cell = cells.get(one.quantity)
         value = float(cell) if isinstance(cell, int | float) else math.nan
         found.append(abs(value) if one.magnitude else value)
     return found
-
-
-def _alike(label: object, wanted: object) -> bool:
-    """Whether a label, a text in a grid, equals a value."""
-    try:
-        return label == wanted or float(str(label)) == float(str(wanted))
-    except ValueError:
-        return False
 
 
 def _objective(one: Objective, rows: Rows) -> float:
@@ -188,7 +185,7 @@ def _constraint(one: Constraint, rows: Rows) -> tuple[float, float]:
 
 
 def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
-    """Refuse a quantity that no complete run has, or labels that no run has."""
+    """Refuse a quantity that no complete run has."""
     rows = [
         (record["labels"], summary_row(record))
         for record in outcome.records
@@ -204,8 +201,6 @@ def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
             if one.quantity not in known:
                 found = f"no run has '{one.quantity}'"
                 faults.append(Fault(INPUTS, f"{key}.quantity", found, nearest(one.quantity, known)))
-            elif not _values(one, rows):
-                faults.append(Fault(INPUTS, f"{key}.where", "no run has these labels", ""))
     faults.check()
 
 

@@ -24,7 +24,7 @@ from typing import Any
 from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run
 from railsim.definitions.study.definition import Study, value_texts
-from railsim.definitions.study.design import Optimise
+from railsim.definitions.study.design import Optimise, Value
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error, nearest
 from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
@@ -40,6 +40,7 @@ from railsim.version import __version__
 
 LONGEST_NAME = 250  # bytes of a file name with its ending; file systems allow 255
 MOST_RUNS = 200_000
+BETWEEN = 0.618  # share of a range, at no whole number of a usual one
 ROUGH_DURATION = 60.0  # s; simulated time of a run that has not been looked at
 # what a run takes at a rough guess: simulated seconds per second of one core, and seconds besides
 REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
@@ -220,19 +221,46 @@ def _named_files(assignment: str) -> Iterator[str]:
 def check_study(study: Study) -> None:
     """Check the runs of a study file, as the study does first.
 
-    Of an optimisation those of the designs at both bounds of all variables. Raises InputError:
-    everything that is wrong in any of them.
+    Of an optimisation those of the designs at both bounds of all variables and between them, where
+    a key of whole numbers has none. Raises InputError: everything that is wrong in any of them.
     """
     spec = StudySpec.of_file(study)
     if study.optimise is not None:
         _check_quantities(study, study.optimise)
-        bounds = {
-            key: [str(variable.low), str(variable.high)]
-            for path, variable in study.optimise.variables.items()
-            for key in (path, *variable.also)
+        designs = {
+            key: [str(v.low), str(v.high), str(v.low + BETWEEN * (v.high - v.low))]
+            for path, v in study.optimise.variables.items()
+            for key in (path, *v.also)
         }
-        spec = spec.changed(linked=[*spec.linked, bounds])
-    Plan(spec).cases()
+        spec = spec.changed(linked=[*spec.linked, designs])
+    plan = Plan(spec)
+    plan.cases()
+    if study.optimise is not None:
+        _check_labels(plan, study.optimise)
+
+
+def _check_labels(plan: Plan, wanted: Optimise) -> None:
+    """Refuse labels that no run of an optimisation has."""
+    Faults(
+        Fault("study", f"optimise.{table}.{number}.where", "no run has these labels",
+              "values of a run, such as its track, its speed or a key of the grid", "--optimise")
+        for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints))
+        for number, one in enumerate(ones)
+        if not any(selects(one, point.labels) for point in plan.points)
+    ).check()  # fmt: skip
+
+
+def selects(one: Value, labels: Mapping[str, Any]) -> bool:
+    """Whether a run has the labels of a value of an optimisation."""
+    return all(_alike(labels.get(key), wanted) for key, wanted in one.where.items())
+
+
+def _alike(label: object, wanted: object) -> bool:
+    """Whether a label, a text in a grid, equals a value."""
+    try:
+        return label == wanted or float(str(label)) == float(str(wanted))
+    except ValueError:
+        return False
 
 
 def _check_quantities(study: Study, wanted: Optimise) -> None:

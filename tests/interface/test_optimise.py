@@ -184,6 +184,35 @@ def test_columns_of_a_run_with_a_number_are_quantities(tmp_path, capsys, quantit
     assert (f"no run has '{quantity}'" in capsys.readouterr().err) is not there
 
 
+def test_labels_that_no_run_has_are_found_before_any(tmp_path, capsys):
+    file = written(tmp_path, STUDY + 'where = { track = "curve_r500" }\n')
+    assert main(["optimise", file, "--out", str(tmp_path / "o")]) == 2
+    words = "study.toml: optimise.constraints.0.where: no run has these labels"
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_key_of_whole_numbers_is_refused_before_any_run(tmp_path, capsys):
+    """Both bounds are orders of a polygonal wheel; what lies between them is none."""
+    round_ = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.out_of_round"
+    text = STUDY.replace(X, f"vehicle.{round_}.w.waves.0.0")
+    file = written(tmp_path, text.replace("low = 5e6, high = 40e6", "low = 1, high = 20"))
+    waves = f'[{round_}.w]\ntype = "harmonics"\nwaves = [[1.0, 1e-4, 0.0]]\n'
+    (tmp_path / "mine.toml").write_text(VEHICLE + waves, encoding="utf-8")
+    assert main(["optimise", file, "--out", str(tmp_path / "o")]) == 2
+    assert "is no whole number" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("low", [31391234.0, 31391237.0])
+def test_designs_are_within_bounds_of_many_digits_and_differ(tmp_path, low):
+    text = STUDY.replace("low = 5e6, high = 40e6", f"low = {low}, high = {low + 3.0}")
+    optimised = railsim.optimise(written(tmp_path, text), out=tmp_path / "o", workers=1)
+    values = {design.variables[X] for design in optimised.designs}
+    assert len(values) == 6
+    assert all(low <= value <= low + 3.0 for value in values)
+
+
 def test_a_study_without_the_table(tmp_path, capsys):
     assert main(["optimise", "curving_reference", "--out", str(tmp_path / "o")]) == 2
     assert "optimise: missing" in capsys.readouterr().err
