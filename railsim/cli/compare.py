@@ -51,6 +51,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
         differing, why = _differing(results)
         record = {
             "results": list(results),
+            "status": {label: result.status for label, result in results.items()},
             "remarks": {label: list(result.remarks) for label, result in results.items()},
             "rows": [row.record() for row in rows],
             "along_the_track": [one.record() for one in differing],
@@ -67,6 +68,10 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
             parts += [*[""] * bool(parts), title]
         for one in comparison_tables(rows, results):
             parts += [one, ""]
+        for label, result in results.items():
+            if result.status != "complete":
+                ended = f"{result.status}: {result.attributes['status_reason']}"
+                parts.append(f"{label}: {ended}; compared up to s = {result['distance'][-1]:.1f} m")
         for label, result in () if output.quiet else results.items():
             parts += [f"{label}: remark: {remark}" for remark in result.remarks]
         parts += [difference_table(differing)] if differing else why

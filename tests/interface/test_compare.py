@@ -96,6 +96,15 @@ def test_remarks_are_printed_unless_quiet(files, capsys, monkeypatch):
     assert "remark" not in capsys.readouterr().out
 
 
+def test_a_result_that_ended_early_is_said_to_have(files, tmp_path, capsys):
+    short = example_result(duration=17.0, status="stopped").to_hdf5(tmp_path / "short.h5")
+    assert main(["compare", files[0], str(short), "--quiet"]) == 0
+    assert "short: stopped: ; compared up to s = 340.0 m" in capsys.readouterr().out
+    assert main(["compare", files[0], str(short), "--json"]) == 0
+    status = json.loads(capsys.readouterr().out)["status"]
+    assert status == {"base": "complete", "short": "stopped"}
+
+
 def test_folder_holds_table_record_and_picture(files, tmp_path):
     folder = tmp_path / "comparison"
     assert main(["compare", *files, "--out", str(folder)]) == 0
