@@ -185,7 +185,9 @@ def optimise(
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)
     evaluation = Evaluation(definition, wanted, folder, execution)
     sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)
-    search(wanted.method, Task(evaluation, *sizes, wanted.evaluations, wanted.batch, wanted.seed))
+    number = wanted.evaluations
+    batch = min(wanted.batch, number)
+    search(wanted.method, Task(evaluation, *sizes, number, batch, wanted.seed))
     return _concluded(evaluation, choose)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Flags, Floats
+from railsim.definitions.study.design import FEWEST_EVOLVED
 from railsim.errors import input_error
 
 CANDIDATES = 512  # candidates for a batch, from Sobol's sequence
@@ -235,7 +236,7 @@ def _differential_evolution(task: Task) -> None:
     """Differential evolution of Storn and Price (1997) for one objective, by scipy."""
     from scipy.optimize import Bounds, differential_evolution
 
-    size = max(5, task.batch)
+    size = max(FEWEST_EVOLVED, task.batch)
     scale: list[float] = []  # of the objective, as large as in the first generation
 
     def worth(designs: Any) -> Any:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from contextlib import nullcontext as nothing
 
 import numpy as np
 import pytest
@@ -130,6 +131,7 @@ def test_another_file_is_refused(found, capsys):
         ("low = 5e6", "low = 5e7", "'low' must be below 'high'"),
         ('"vehicle.primary', '"track.primary', "no key of a vehicle"),
         ("high = 0.9", "", "'low' or 'high' is needed"),
+        ("high = 0.9", "high = 0.8\nlow = 0.9", "'low' must not be above 'high'"),
         ("evaluations = 6", 'method = "differential_evolution"', "takes one objective"),
         ('kind = "curving"', 'kind = "curve"', "analyses.curve"),
         ("speeds = [20.0]", "", "'speeds' is needed"),
@@ -211,6 +213,18 @@ def test_designs_are_within_bounds_of_many_digits_and_differ(tmp_path, low):
     values = {design.variables[X] for design in optimised.designs}
     assert len(values) == 6
     assert all(low <= value <= low + 3.0 for value in values)
+
+
+@pytest.mark.parametrize("method", ["nsga2", "differential_evolution"])
+def test_no_more_designs_than_the_given_number(tmp_path, method):
+    """Of a population that is larger by default."""
+    pytest.importorskip("pymoo")
+    one = '[[optimise.objectives]]\nquantity = "curve.attack"\ngoal = "maximise"\n'
+    text = STUDY.replace(one, "").replace("batch = 3", f'method = "{method}"')
+    file = written(tmp_path, text)
+    with pytest.raises(railsim.InputError, match="5 at least") if method[0] == "d" else nothing():
+        railsim.optimise(file, out=tmp_path / "few", evaluations=3, workers=1)
+    assert len(railsim.optimise(file, out=tmp_path / "o", workers=1).designs) == 6
 
 
 def test_a_study_without_the_table(tmp_path, capsys):

@@ -15,6 +15,8 @@ from railsim.definitions.base import (
     check,
 )
 
+FEWEST_EVOLVED = 5  # designs of a generation of differential evolution
+
 
 class Variable(Definition):
     """A parameter that is varied between bounds."""
@@ -68,6 +70,8 @@ class Constraint(Value):
     def _some_limit(self) -> None:
         if self.low is None and self.high is None:
             raise ValueError("'low' or 'high' is needed")
+        if self.low is not None and self.high is not None and self.low > self.high:
+            raise ValueError("'low' must not be above 'high'")
 
 
 class Optimise(Definition):
@@ -98,3 +102,5 @@ class Optimise(Definition):
             raise ValueError(f"'{wrong[0]}' is no key of a vehicle; paths begin with vehicle.")
         if self.method == "differential_evolution" and len(self.objectives) > 1:
             raise ValueError('method = "differential_evolution" takes one objective')
+        if self.method == "differential_evolution" and self.evaluations < FEWEST_EVOLVED:
+            raise ValueError(f"'evaluations' must be {FEWEST_EVOLVED} at least for this method")
