@@ -227,6 +227,22 @@ def test_no_more_designs_than_the_given_number(tmp_path, method):
     assert len(railsim.optimise(file, out=tmp_path / "o", workers=1).designs) == 6
 
 
+def test_a_design_that_derails_has_no_values(tmp_path):
+    """Of its constraints neither: those up to where it ended would be other quantities."""
+    z = '"vehicle.bodies.carbody.position.2" = { low = -3.5, high = -3.3 }'
+    text = STUDY.replace('kind = "curving"\nradius = 300.0\ncant = 0.15', 'kind = "run"')
+    text = text.replace("[20.0]", "[31.0]").replace("curve.T_gamma", "Y_peak")
+    text = text.replace("curve.attack", "Q_peak").replace("curve.Y_over_Q", "Q_peak")
+    start, end = text.index(f'"{X}"'), text.index("[[optimise.objectives]]")
+    file = written(tmp_path, text[:start] + z + "\n" + text[end:])
+    found = railsim.optimise(file, out=tmp_path / "o", evaluations=1, workers=1)
+    (design,) = found.designs
+    assert "rolled beyond" in design.reason
+    assert np.isnan(design.values).all()
+    header = (tmp_path / "o" / "designs.csv").read_text().splitlines()[0]
+    assert header.split(",")[2:4] == ["Y_peak (N)", "Q_peak (N)"]
+
+
 def test_a_study_without_the_table(tmp_path, capsys):
     assert main(["optimise", "curving_reference", "--out", str(tmp_path / "o")]) == 2
     assert "optimise: missing" in capsys.readouterr().err
