@@ -22,6 +22,7 @@ from railsim.studies.summary import summary_row, unit_of
 
 DIGITS = 6  # of the values of variables, more where the range is narrow
 INPUTS = "optimise.toml"
+_END = ("smallest", "largest")
 
 Progress = Callable[[float], None]
 
@@ -220,13 +221,22 @@ def with_unit(one: Value) -> str:
 def values_by_name(wanted: Optimise, designs: Sequence[Design]) -> dict[str, list[float]]:
     """Return objectives and constraints of designs by name with unit.
 
-    A quantity that is both stands once; twice where its values differ, as the mean over the runs
-    and the worst of them do.
+    A quantity that is several of them stands once, and again where its values differ, as the mean
+    over the runs, the smallest and the largest of them do.
     """
     found: dict[str, list[float]] = {}
     for number, one in enumerate((*wanted.objectives, *wanted.constraints)):
         name, values = with_unit(one), [design.values[number] for design in designs]
         if not np.array_equal(found.get(name, values), values, equal_nan=True):
-            name = f"{name}, worst of its limit"
+            name = f"{name}, {_of_the_runs(one)}"
         found[name] = values
     return found
+
+
+def _of_the_runs(one: Value) -> str:
+    """Return which value over the runs of a design an objective or a constraint takes."""
+    if isinstance(one, Objective):
+        return "mean" if one.over == "mean" else _END[one.goal == "minimise"]
+    assert isinstance(one, Constraint)
+    two_sided = one.low is not None and one.high is not None
+    return "worst of its limits" if two_sided else _END[one.low is None]

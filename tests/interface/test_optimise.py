@@ -243,6 +243,28 @@ def test_a_design_that_derails_has_no_values(tmp_path):
     assert header.split(",")[2:4] == ["Y_peak (N)", "Q_peak (N)"]
 
 
+def test_the_values_that_decide_are_in_the_table(tmp_path):
+    """Two runs: the lower limit is one of the smaller value, the upper one of the larger."""
+    text = STUDY.replace("[20.0]", "[20.0, 30.0]").replace('kind = "curving"', 'kind = "modes"')
+    text = text.replace("radius = 300.0\ncant = 0.15\n", "").replace(
+        "curve.T_gamma", "curve.damping"
+    )
+    text = text.replace('curve.attack"', 'curve.damping"\nover = "mean"')
+    text = text.replace("curve.Y_over_Q", "curve.damping").replace("high = 0.9", "low = 0.0")
+    text += '[[optimise.constraints]]\nquantity = "curve.damping"\nhigh = 0.9\n'
+    found = railsim.optimise(written(tmp_path, text), out=tmp_path / "o", evaluations=2, workers=1)
+    with open(tmp_path / "o" / "designs.csv", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    for row, design in zip(rows, found.designs, strict=True):
+        largest, mean = design.objectives
+        smallest, highest = design.constraints
+        assert largest == highest
+        assert mean == pytest.approx(0.5 * (smallest + largest), rel=1e-12)
+        assert float(row["curve.damping"]) == largest
+        assert float(row["curve.damping, mean"]) == mean
+        assert float(row["curve.damping, smallest"]) == smallest
+
+
 def test_a_study_without_the_table(tmp_path, capsys):
     assert main(["optimise", "curving_reference", "--out", str(tmp_path / "o")]) == 2
     assert "optimise: missing" in capsys.readouterr().err
