@@ -136,6 +136,11 @@ def test_another_file_is_refused(found, capsys):
         ('kind = "curving"', 'kind = "curve"', "analyses.curve"),
         ("speeds = [20.0]", "", "'speeds' is needed"),
         ("[optimise]", "[optimize]", "optimize"),
+        (
+            'scale = "log" }',
+            'also = ["vehicle.carbody.mass"] }\n[grid]\n"vehicle.carbody.mass" = [4e4]',
+            "'vehicle.carbody.mass' is varied twice",
+        ),
         ("primary.stiffness.x", "primary.stiffness.q", "study.toml: vehicle.primary"),
         (
             'low = 5e6, high = 40e6, scale = "log"',

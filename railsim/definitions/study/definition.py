@@ -165,7 +165,7 @@ class Study(FileDefinition):
                 raise ValueError(f"linked keys need equally many values: {told}")
         names = [*self.grid, *(name for table in self.linked for name in table)]
         names += list(self.sample.parameters) if self.sample else []
-        names += list(self.optimise.variables) if self.optimise else []
+        names += self.optimise.keys if self.optimise else []
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"'{twice[0]}' is varied twice")
         given = (self.speeds is not None) + ("speed" in names)

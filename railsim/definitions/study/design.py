@@ -92,9 +92,14 @@ class Optimise(Definition):
     seed: Whole = 0
     """Where the random numbers begin: the same seed gives the same designs"""
 
+    @property
+    def keys(self) -> list[str]:
+        """Paths of all keys that are varied."""
+        return [*self.variables, *(key for v in self.variables.values() for key in v.also)]
+
     @check
     def _consistent(self) -> None:
-        names = [*self.variables, *(key for v in self.variables.values() for key in v.also)]
+        names = self.keys
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"'{twice[0]}' is varied twice")
         wrong = [name for name in names if not name.startswith("vehicle.")]
