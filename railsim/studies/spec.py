@@ -7,7 +7,6 @@ The command line, Python's keyword arguments and study files make them; the jour
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import partial
 from numbers import Integral
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -82,6 +81,15 @@ def _table(table: Any, option: str = "grid") -> Any:
     return {key: _texts(f"{option} {key}", values) for key, values in table.items()}
 
 
+def _linked(table: Any) -> Any:
+    """Return the values of linked keys as texts; raises InputError: not equally many of each."""
+    texts = _table(table, "linked")
+    if isinstance(texts, Mapping) and len(set(map(len, texts.values()))) > 1:
+        found = ", ".join(f"'{key}' {len(values)}" for key, values in texts.items())
+        raise argument_error("linked", found, "equally many values of each key")
+    return texts
+
+
 def _stored(value: Any) -> Any:
     """Return definitions as plain data without what is not given."""
     if isinstance(value, Mapping):
@@ -106,9 +114,7 @@ class StudySpec(BaseModel):
     tracks: Annotated[list[str], BeforeValidator(_file_names)]
     speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
     grid: Annotated[dict[str, list[str]], BeforeValidator(_table)] = {}
-    linked: list[
-        Annotated[dict[str, list[str]], BeforeValidator(partial(_table, option="linked"))]
-    ] = []
+    linked: list[Annotated[dict[str, list[str]], BeforeValidator(_linked)]] = []
     sample: Annotated[Sample | None, PlainSerializer(_stored)] = None
     quantities: str | None = None  # ``FILE.py:FUNCTION``, see `railsim.studies.user_function`
     analyses: Annotated[dict[Name, Analysis], PlainSerializer(_stored)] = {}

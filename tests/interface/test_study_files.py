@@ -58,6 +58,21 @@ seed = 7
     assert inputs["sample"]["seed"] == 7
 
 
+def test_a_range_in_a_list_is_as_many_values_as_are_run(tmp_path, capsys):
+    file = written(tmp_path, 'speeds = [10.0, "36:72:3 km/h"]\nanalyses = {m = {kind="modes"}}\n')
+    study = load_study(file)
+    assert study.runs == 4
+    assert [point.run.speed for point in Plan(StudySpec.of_file(study)).points] == [
+        10.0, 10.0, 15.0, 20.0
+    ]  # fmt: skip
+
+
+def test_linked_keys_of_python_need_equally_many_values_too(tmp_path):
+    linked = [{"speed": ["10:20:3", 5.0], "vehicle.bodies.carbody.mass": [40e3, 44e3]}]
+    with pytest.raises(InputError, match=r"'speed' 4, .*mass' 2; equally many"):
+        railsim.study([COACH], [CURVE], None, linked=linked, out=tmp_path / "s")
+
+
 def test_limits_beside_a_study_are_found_from_anywhere(tmp_path, monkeypatch):
     """As vehicles, tracks and settings beside it."""
     folder, elsewhere = tmp_path / "mine", tmp_path / "elsewhere"
@@ -206,6 +221,7 @@ def test_grid_is_outermost_then_links_then_the_sample():
         ("", "'speeds' is needed"),
         ('speeds = [10.0]\n[grid]\n"track.friction" = "0.1:0.2:0"\n', "0 values"),
         ('speeds = [10.0]\n[[linked]]\na = [1, 2]\nb = [1]\n', "equally many"),
+        ('[[linked]]\nspeed = ["10:20:3", 5]\nb = [1, 2]\n', "'speed' 4, 'b' 2"),
         ('speeds = [10.0]\n[grid]\na = [1]\n[[linked]]\na = [1]\n', "'a' is varied twice"),
         ('speeds = [10.0]\n[sample]\nmethod = "sobol"\nnumber = 6\nparameters.a = {low = 0.0, '
          "high = 1.0}\n", "power of two"),

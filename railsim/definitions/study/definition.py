@@ -28,17 +28,18 @@ Values = Text | Annotated[tuple[Value, ...], Field(min_length=1)]
 
 
 def value_texts(values: Values) -> list[str]:
-    """Return values as `key=value` takes them: those of a range, or one for each of a list.
+    """Return values as `key=value` takes them: those of ranges, and one for each other of a list.
 
     Raises ValueError: a range that is none.
 
-    >>> value_texts("0.2:0.4:3"), value_texts((True, 0.5, "72 km/h", (10, 20)))
-    (['0.2', '0.3', '0.4'], ['true', '0.5', '72 km/h', '[10, 20]'])
+    >>> value_texts("0.2:0.4:3"), value_texts((True, "1:2:2", "72 km/h", (10, 20)))
+    (['0.2', '0.3', '0.4'], ['true', '1', '2', '72 km/h', '[10, 20]'])
     """
     if isinstance(values, str):
         found = range_values(values)
         return [values] if found is None else [f"{value:.12g}" for value in found]
-    return [_text(value) for value in values]
+    return [text for one in values
+            for text in (value_texts(one) if isinstance(one, str) else [_text(one)])]  # fmt: skip
 
 
 def _text(value: object) -> str:
