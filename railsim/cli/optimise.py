@@ -77,5 +77,8 @@ def _lines(found: "Optimisation") -> "list[str | Table]":
     for one in found.sensitivities:
         shares = sorted(one.total.items(), key=lambda item: -item[1])
         words = ", ".join(f"{p.removeprefix('vehicle.')} {100.0 * s:.0f} %" for p, s in shares)
+        words += f" (surrogate's error {100.0 * one.error:.0f} %)"
+        if not any(one.total.values()):
+            words = "none of the variables; it is the same in all designs"
         lines.append(f"{one.quantity} depends on: {words}")
     return [*lines, *map(str, found.vehicles), str(found.folder / "front.png")]

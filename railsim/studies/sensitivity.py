@@ -59,8 +59,8 @@ def sensitivities(
     ends[count + np.arange(count), np.arange(count)] = 1.0
     low, high = np.split(model(ends), 2)
     spread = np.ptp(values[known], axis=0)
-    # a quantity that does not vary has no variance to explain
-    varied = np.flatnonzero(spread > 1e-12 * np.abs(values[known]).max(axis=0))
+    # a quantity that varies by round-off, as of eigenvalues, has no variance to explain
+    varied = np.flatnonzero(spread > 1e-9 * np.abs(values[known]).max(axis=0))
     first, total = np.zeros((2, len(quantities), count))
     if count == 1:
         first[varied] = total[varied] = 1.0

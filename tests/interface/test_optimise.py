@@ -36,6 +36,7 @@ high = 0.9
 """
 VEHICLE = 'format = "railsim-vehicle/1"\nname = "mine"\nextends = "coach_manchester"\n'
 X = "vehicle.primary.stiffness.x"
+DAMPER = "vehicle.secondary_vertical_damper.damping"
 
 
 def written(folder, text=STUDY):
@@ -101,6 +102,11 @@ def test_repeated_it_computes_nothing_and_more_evaluations_go_on(found, capsys):
     assert main([*command, "--evaluations", "7", "--choose", "2"]) == 0
     words = capsys.readouterr().out
     assert "front of 7 in 7 designs" in words
+    error = (
+        100.0
+        * json.loads((optimised.folder / "optimise.json").read_text())["sensitivities"][0]["error"]
+    )
+    assert f"depends on: primary.stiffness.x 100 % (surrogate's error {error:.0f} %)" in words
     assert "mine_chosen.toml" in words
     chosen = load_vehicle(optimised.folder / "mine_chosen.toml")
     second = optimised.designs[1].variables[X]
@@ -246,6 +252,17 @@ def test_a_design_that_derails_has_no_values(tmp_path):
     assert np.isnan(design.values).all()
     header = (tmp_path / "o" / "designs.csv").read_text().splitlines()[0]
     assert header.split(",")[2:4] == ["Y_peak (N)", "Q_peak (N)"]
+
+
+def test_a_quantity_that_no_variable_changes_is_said_to_be(tmp_path, capsys):
+    """The least damped mode is one of the wheelsets on their springs, none of the car."""
+    text = STUDY.replace('kind = "curving"\nradius = 300.0\ncant = 0.15', 'kind = "modes"')
+    text = text.replace("curve.T_gamma", "curve.damping").replace("curve.attack", "curve.damping")
+    text = text.replace("curve.Y_over_Q", "curve.damping").replace(X, DAMPER)
+    text = text.replace("5e6", "2e4").replace("40e6", "4e5")
+    out = str(tmp_path / "o")
+    assert main(["optimise", written(tmp_path, text), "--out", out, "--workers", "1"]) == 0
+    assert "curve.damping depends on: none of the variables" in capsys.readouterr().out
 
 
 def test_the_values_that_decide_are_in_the_table(tmp_path):
