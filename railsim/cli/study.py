@@ -148,7 +148,7 @@ def command(
                 there = replace(output, out=str(folder))
                 return campaign(spec.scenario, spec.vehicles, there, **resumed)
     else:
-        spec = _spec(file, inputs, quantities, kept)
+        spec = _spec(file, inputs, quantities, kept, output)
     lines = RunLines()
     # names of files in a study that goes on count from where it was started
     own = faults_of_file(file, assignments=not given.overrides) if file else nullcontext()
@@ -241,7 +241,11 @@ def _campaign(
 
 
 def _spec(
-    file: str | None, inputs: dict[str, Any], quantities: str | None, kept: dict[str, Any]
+    file: str | None,
+    inputs: dict[str, Any],
+    quantities: str | None,
+    kept: dict[str, Any],
+    output: cli.Output,
 ) -> "StudySpec":
     """Return the study of the options, or of a file with the assignments of the options."""
     from railsim.definitions.loading import load_study
@@ -259,6 +263,8 @@ def _spec(
     words = "given together with a study file", "the file holds it"
     Faults(Fault(f"--{name}", "", *words) for name in given).check()
     study = load_study(file)
+    if study.optimise is not None:
+        output.remark("the table 'optimise' is not used here; `railsim optimise` varies its keys")
     assignments = [*study.assignments, *inputs["assignments"]]
     named = {"quantities": full_name(quantities)}
     return StudySpec.of_file(study, assignments=assignments, **named, **kept)

@@ -287,6 +287,13 @@ def test_the_values_that_decide_are_in_the_table(tmp_path):
         assert float(row["curve.damping, smallest"]) == smallest
 
 
+def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
+    command = ["study", written(tmp_path), "--out", str(tmp_path / "s"), "--workers", "1"]
+    assert main(command) == 0
+    captured = capsys.readouterr()
+    assert "the table 'optimise' is not used here" in captured.out + captured.err
+
+
 def test_a_study_without_the_table(tmp_path, capsys):
     assert main(["optimise", "curving_reference", "--out", str(tmp_path / "o")]) == 2
     assert "optimise: missing" in capsys.readouterr().err
