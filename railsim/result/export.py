@@ -33,7 +33,8 @@ def export(
 
     `quantities`: Columns of CSV and Parquet, such as ``Y:1:left``; by default all. Raises
     InputError: the file exists and may not be overwritten, its ending is none of `ENDINGS`, what
-    writes it is not installed, or it is a MATLAB file and a part of a quantity is asked for.
+    writes it is not installed, it is a MATLAB file and a part of a quantity is asked for, or none
+    and a quantity is asked for that is no function of time.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
@@ -45,6 +46,10 @@ def export(
                 raise argument_error("quantities", found, allowed, labelled[0], "QUANTITY")
             _matlab(result, partial)
         else:
+            dims = {q: result.quantities[q.partition(":")[0]].dims for q in quantities}
+            if fixed := [q for q in quantities if dims[q][0] != "time"]:
+                found, allowed = "no function of time", "a MATLAB file (.mat) holds it"
+                raise argument_error("quantities", found, allowed, fixed[0], "QUANTITY")
             write = _csv if path.suffix.lower() == ".csv" else _parquet
             write(_columns(result, quantities), partial)
     return path
@@ -82,7 +87,9 @@ def selected(
     low, high = between or (-np.inf, np.inf)
     rows = np.flatnonzero((distance >= low) & (distance <= high))
     if between and len(rows) < 2:
-        allowed = f"within {distance[0]:.1f} to {distance[-1]:.1f} m"
+        allowed = (
+            f"A below B, two instants at least, within {distance[0]:.1f} to {distance[-1]:.1f} m"
+        )
         faults.require(False, "between", f"{low:g} to {high:g} m", allowed)
     if rate is not None:
         faults.require(0.0 < rate < np.inf, "rate", f"found {rate:g}", "above 0 per s")
@@ -146,8 +153,7 @@ Columns = list[tuple[str, str, Floats]]
 
 def _columns(result: Result, quantities: Sequence[str] = ()) -> Columns:
     """Return name, unit and values of every column, time first."""
-    over_time = (q for q in quantities if result.quantities[q.partition(":")[0]].dims[0] == "time")
-    names = ["distance", *(q for q in over_time if q != "time")] if quantities else []
+    names = ["distance", *(q for q in quantities if q != "time")] if quantities else []
     columns = {column[0]: column for column in result.columns(*names)}  # each once
     return [("time", "s", result["time"]), *columns.values()]
 

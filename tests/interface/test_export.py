@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 from example_result import example_result
+from scipy.io import loadmat
 
 import railsim
 from railsim.cli import main
@@ -55,6 +56,16 @@ def test_single_wheels_are_columns_as_plot_takes_them(result, tmp_path, capsys):
     assert "Y:lef: no label 'lef'; did you mean 'left'?" in capsys.readouterr().err
 
 
+def test_what_is_no_function_of_time_is_refused_where_columns_are(result, tmp_path, capsys):
+    command = ["export", str(result.to_hdf5(tmp_path / "run.h5")), "Q", "Q0", "--out"]
+    assert main([*command, str(tmp_path / "part.csv")]) == 2
+    assert "QUANTITY: Q0: no function of time; a MATLAB" in capsys.readouterr().err
+    assert not (tmp_path / "part.csv").exists()
+    assert main([*command, str(tmp_path / "part.mat")]) == 0
+    found = loadmat(tmp_path / "part.mat")
+    np.testing.assert_array_equal(found["Q0"], result.Q0)
+
+
 def test_units_of_positions_and_angles_are_shown_ones_too(result):
     part = selected(result, ["body_position"], shown_units=True)
     assert part.quantities["body_position"].component("yaw").unit == "mrad"
@@ -98,6 +109,7 @@ def test_all_that_is_wrong_is_named_at_once(result, tmp_path, capsys):
     wrong = ["export", str(file), "QQ", "--between", "1e6", "2e6", "--rate", "-1"]
     assert main([*wrong, "--out", str(tmp_path / "a.csv")]) == 2
     words = capsys.readouterr().err
+    assert "A below B" in words
     for part in ("QQ: no such quantity", "--between: ", "--rate: "):
         assert part in words
     with pytest.raises(railsim.InputError, match="rate"):
