@@ -80,8 +80,8 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
 class Difference:
     """Difference of a result from the first one along the track, in one series of a quantity.
 
-    `distance` (float64[position]): Positions of the first result's reference body that both have
-    passed [m].
+    `distance` (float64[position]): Positions of the first result's reference body at places
+    that both leading wheelsets have passed [m].
     """
 
     quantity: Quantity
@@ -110,7 +110,8 @@ class Difference:
 def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Difference]:
     """Return the differences from the first result along the track, of the leading wheelset.
 
-    Values are interpolated linearly between outputs.
+    Both leading wheelsets are at the same place, wherever the reference bodies of two vehicles are;
+    without `wheelset_distance` these are.  Values are interpolated linearly between outputs.
 
     `results`: Results over one and the same plan. `names`: Quantities of wheels or wheelsets.
     Raises InputError: results over different plans, or that have no part of the track in common.
@@ -121,19 +122,20 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
         if curvature_sections(result.track()) != curvature_sections(base.track()):
             found = f"runs over another plan than {first}"
             faults.append(Fault(label, "track", found, "results over one plan"))
-        elif not _shared(base, result).any():
+        elif not _shared(*_places(base, result)).any():
             found = f"has no part of the track in common with {first}"
             faults.append(Fault(label, "distance", found, "results that share a part of the track"))
     faults.check()
     found_ones = []
     for label, result in others:
-        there = _shared(base, result)
+        at, of_other = _places(base, result)
+        there = _shared(at, of_other)
         positions = base["distance"][there]
         for name in names:
             if name in base and name in result:
                 mine, other = _leading(base, name), _leading(result, name)
                 for side, values in mine.items():
-                    there_too = np.interp(positions, result["distance"], other[side])
+                    there_too = np.interp(at[there], of_other, other[side])
                     labels = {"wheelset": base.wheelsets[0], **({"side": side} if side else {})}
                     apart, quantity = there_too - values[there], base.quantities[name]
                     found_ones.append(Difference(quantity, labels, label, positions, apart))
@@ -148,9 +150,15 @@ def _leading(result: Result, name: str) -> dict[str, Floats]:
     return {side: values[:, k] for k, side in enumerate(("left", "right"))}
 
 
-def _shared(one: Result, other: Result) -> Any:
-    """Which positions of a result lie within the other one's."""
-    positions, others = one["distance"], other["distance"]
+def _places(one: Result, other: Result) -> tuple[Floats, Floats]:
+    """Return where the leading wheelsets of two results are over time [m]."""
+    if "wheelset_distance" in one and "wheelset_distance" in other:
+        return one["wheelset_distance"][:, 0], other["wheelset_distance"][:, 0]
+    return one["distance"], other["distance"]
+
+
+def _shared(positions: Floats, others: Floats) -> Any:
+    """Which positions lie within others."""
     return (positions >= others[0]) & (positions <= others[-1])
 
 

@@ -79,6 +79,15 @@ def test_largest_difference_is_where_both_have_a_value():
     assert np.isnan(right.largest).all()
 
 
+def test_leading_wheelsets_are_compared_at_the_same_place():
+    """Of a longer vehicle the reference body is farther behind its leading wheelset."""
+    base = example_result()
+    longer = changed(base, distance=base["distance"] - 3.0)
+    for one in differences({"base": base, "longer": longer}, ["sum_Y", "Y_over_Q"]):
+        assert not one.values.any()
+        assert one.distance[-1] == base["distance"][-1]
+
+
 def test_command_prints_value_wheel_time_and_difference(files, capsys):
     assert main(["compare", *files]) == 0
     printed = capsys.readouterr().out
