@@ -102,8 +102,9 @@ def _study_figure(
     known = columns(records)
     if not known:
         raise input_error(file, "no run has values", "a study with finished runs")
-    peaks = {re.sub("_abs$", "_peak", name): name for name in known}  # as in summary.csv
-    given = [peaks.get(name, name) for name in selections]
+    of_summary = {re.sub("_abs$", "_peak", name): name for name in known}  # its names there
+    of_summary |= {re.sub(r"_mid(?:1$|(\d+)$)", r"_median\1", name): name for name in known}
+    given = [of_summary.get(name, name) for name in selections]
     names = given or [name for name in DEFAULT if name in known] or list(known)[:4]
     faults = Faults(
         Fault("QUANTITY", name, "no such value in the study", nearest(name, known))

@@ -1,5 +1,6 @@
 """`railsim plot` and `railsim compare` on the folders of studies."""
 
+import csv
 import json
 import shutil
 from pathlib import Path
@@ -58,6 +59,18 @@ def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
     assert main(["plot", str(folder), *chosen]) == 2
     assert words in capsys.readouterr().err
     assert not (folder / "study.png").exists()
+
+
+def test_medians_over_a_full_curve_are_called_as_in_the_summary(folder):
+    """Not the values at its middle, which the summary calls `_mid`."""
+    with open(folder / "summary.csv", encoding="utf-8") as stream:
+        runs = list(csv.DictReader(stream))
+    medians = [1e-3 * float(run["Q_median (N)"]) for run in runs]
+    for name in ("Q_median", "Q_mid1"):
+        figure = _study_figure(str(folder), (name,), None, None, "ranking")
+        (axes,) = figure.axes
+        drawn = sorted(bar.get_width() for bar in axes.patches)
+        assert drawn == pytest.approx(sorted(medians), rel=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["curves", "map", "ranking"])
