@@ -261,12 +261,12 @@ def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
             ("upper", 1.0 - share, variable.high),
         ):
             if distance < NEAR_BOUND:
-                found.append(f"{path} at its {words} bound, {bound:g}")
+                found.append(f"{path} at its {words} bound, {bound:.12g}")
     for one, value in zip(wanted.constraints, chosen.constraints, strict=True):
         for words, limit in (("lower", one.low), ("upper", one.high)):
             if limit is not None and abs(value - limit) <= NEAR_BOUND * (abs(limit) or 1.0):
                 unit = unit_of(one.quantity)
-                found.append(f"{name_of(one)} at its {words} limit, {limit:g} {unit}".rstrip())
+                found.append(f"{name_of(one)} at its {words} limit, {limit:.12g} {unit}".rstrip())
     return tuple(found)
 
 

@@ -10,6 +10,9 @@ import pytest
 import railsim
 from railsim.cli import main
 from railsim.definitions.loading import load_study, load_vehicle
+from railsim.definitions.study.design import Optimise
+from railsim.studies.designs import Design
+from railsim.studies.optimise import _active
 
 STUDY = """format = "railsim-study/1"
 name = "Primary stiffness in a curve"
@@ -285,6 +288,23 @@ def test_the_values_that_decide_are_in_the_table(tmp_path):
         assert float(row["curve.damping"]) == largest
         assert float(row["curve.damping, mean"]) == mean
         assert float(row["curve.damping, smallest"]) == smallest
+
+
+def test_bounds_and_limits_are_told_with_all_their_digits():
+    variable = {"low": 31391234.0, "high": 41391234.0}
+    limit = {"quantity": "curve.T_gamma", "high": 1234567.5}
+    wanted = Optimise.model_validate(
+        {
+            "variables": {X: variable},
+            "constraints": [limit],
+            "objectives": [{"quantity": "curve.T_gamma"}],
+        }
+    )
+    chosen = Design(1, {X: 31391234.0}, (1234567.0,), (1234567.0,), feasible=True)
+    assert _active(wanted, chosen) == (
+        f"{X} at its lower bound, 31391234",
+        "curve.T_gamma at its upper limit, 1234567.5 N",
+    )
 
 
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
