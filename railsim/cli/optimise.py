@@ -61,7 +61,7 @@ def _lines(found: "Optimisation") -> "list[str | Table]":
         reasons = {design.reason for design in found.designs if design.reason}
         why = f": {sorted(reasons)[0]}" if reasons else ""
         return [f"none of {len(found.designs)} designs keeps all constraints{why}"]
-    step = math.ceil(len(found.front) / MOST_ROWS)
+    step = max(1, math.ceil(len(found.front) / MOST_ROWS))
     shown = [*found.front[::step]]
     if found.chosen not in shown:
         shown.append(found.chosen)
@@ -73,6 +73,7 @@ def _lines(found: "Optimisation") -> "list[str | Table]":
     table = Table(["", *designs.columns[:-ends]], rows)
     number = f"front of {len(found.front)} in {len(found.designs)} designs"
     lines: list[str | Table] = [number, "", table, ""]
+    lines += [f"remark: {found.chosen.remark}"] * bool(found.chosen.remark)
     lines += [f"active: {words}" for words in found.active]
     for one in found.sensitivities:
         shares = sorted(one.total.items(), key=lambda item: -item[1])

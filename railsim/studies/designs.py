@@ -44,6 +44,14 @@ class Design:
         """Of objectives, then constraints."""
         return (*self.objectives, *self.constraints)
 
+    @property
+    def remark(self) -> str:
+        """Why it is not feasible; empty if it is."""
+        if self.feasible:
+            return ""
+        why = f"has no values: {self.reason}" if self.reason else "does not keep all constraints"
+        return f"design {self.number} {why}"
+
 
 class Evaluation:
     """Evaluation of designs by a study, as called by a search.

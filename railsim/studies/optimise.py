@@ -114,7 +114,8 @@ class Optimisation:
 
 def _design_record(design: Design) -> dict[str, Any]:
     own = {"objectives": list(design.objectives), "constraints": list(design.constraints)}
-    return {"number": design.number, "variables": design.variables, **own}
+    known = {"number": design.number, "feasible": design.feasible}
+    return {**known, "variables": design.variables, **own}
 
 
 def optimise(
@@ -309,7 +310,8 @@ def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
     for vehicle in evaluation.definition.vehicles:
         file = evaluation.folder / f"{Path(vehicle).stem}_chosen.toml"
         lead = f"# Design {chosen.number} of {len(evaluation.designs)}, by `railsim optimise`."
-        text = "\n".join([lead, *values, vehicle_text(vehicle, overrides, file.parent)])
+        remarks = [f"# {chosen.remark}"] * bool(chosen.remark)
+        text = "\n".join([lead, *remarks, *values, vehicle_text(vehicle, overrides, file.parent)])
         write_text(file, text)
         found.append(file)
     return found

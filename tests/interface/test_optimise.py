@@ -290,6 +290,19 @@ def test_the_values_that_decide_are_in_the_table(tmp_path):
         assert float(row["curve.damping, smallest"]) == smallest
 
 
+def test_a_chosen_design_beyond_a_limit_is_said_to_be(tmp_path, capsys):
+    """All of them are: there is no front."""
+    file = written(tmp_path, STUDY.replace("high = 0.9", "high = 0.01"))
+    command = ["optimise", file, "--out", str(tmp_path / "o"), "--workers", "1"]
+    assert main([*command, "--evaluations", "2", "--choose", "2"]) == 0
+    words = "design 2 does not keep all constraints"
+    assert f"remark: {words}" in capsys.readouterr().out
+    record = json.loads((tmp_path / "o" / "optimise.json").read_text())
+    assert record["front"] == []
+    assert record["chosen"]["feasible"] is False
+    assert f"\n# {words}\n" in (tmp_path / "o" / "mine_chosen.toml").read_text()
+
+
 def test_bounds_and_limits_are_told_with_all_their_digits():
     variable = {"low": 31391234.0, "high": 41391234.0}
     limit = {"quantity": "curve.T_gamma", "high": 1234567.5}
