@@ -71,6 +71,10 @@ def _csv(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
             delimiter = next((d for d in (";", "\t") if d in head), ",")
             names = [cell.strip().strip('"') for cell in head.split(delimiter)]
             _named(path, wanted, names)
+            for theirs, _ in wanted.values():
+                if names.count(theirs) > 1:
+                    found = f"{names.count(theirs)} columns '{theirs}'"
+                    raise _fault(path, "columns", found, "a name of its own for each")
             where = {name: names.index(theirs) for name, (theirs, _) in wanted.items()}
             if how.units_row:
                 next(lines, None)
@@ -135,7 +139,10 @@ def _parquet(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
         raise _unreadable(path, "Parquet", error, "columns of numbers") from None
 
 
-def _hdf5(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
+def _hdf5(
+    path: Path, wanted: Wanted, _: MeasurementFile, *, matlab: bool = False
+) -> Iterator[Piece]:
+    """Yield pieces; MATLAB stores its arrays with their dimensions in the opposite order."""
     import h5py
 
     try:
@@ -145,8 +152,10 @@ def _hdf5(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
                 lambda name, node: known.append(name) if isinstance(node, h5py.Dataset) else None
             )
             _named(path, wanted, known)
-            arrays = {name: file[column] for name, (column, _) in wanted.items()}
-            yield from _slices(path, arrays, wanted)
+            own = {column: file[column] for column, _ in wanted.values()}
+            if matlab:
+                own = {column: np.transpose(array[()]) for column, array in own.items()}
+            yield from _slices(path, {n: own[column] for n, (column, _) in wanted.items()}, wanted)
     except OSError as error:
         words = str(error).partition("(")[2].rstrip(")") or str(error)
         raise _fault(path, "", f"cannot be read as HDF5 ({words})") from None
@@ -159,7 +168,7 @@ def _matlab(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]
     with open_regular(path) as file:
         newer = file.read(10) == b"MATLAB 7.3"
     if newer:  # HDF5 under another name
-        yield from _hdf5(path, wanted, how)
+        yield from _hdf5(path, wanted, how, matlab=True)
         return
     theirs = list(dict.fromkeys(column for column, _ in wanted.values()))
     try:

@@ -40,7 +40,13 @@ def position(
     if counter is None and "mileage" in axes:
         counter = axes["mileage"]
         known = counter[np.isfinite(counter)]
-        falls = bool(len(known) and known[-1] < known[0]) if mileage is None else mileage[1]
+        way = float(known[-1] - known[0]) if len(known) else 0.0
+        falls = way < 0.0 if mileage is None else mileage[1]
+        if (way > 0.0) if falls else (way < 0.0):
+            words = ("rises", "falls") if falls else ("falls", "rises")
+            allowed = f"as on the track, where it {words[1]}; for a run in the other direction the "
+            allowed += "track file from its other end"
+            raise input_error(file, words[0], allowed, key="mileage")
         origin = known[0] if mileage is None and len(known) else (mileage or (0.0,))[0]
         counter = (-1.0 if falls else 1.0) * (counter - origin)
         if mileage is None:
@@ -89,7 +95,10 @@ def _rising(file: str, time: Floats, counter: Floats, remarks: list[str]) -> Flo
     moved = np.concatenate([[True], np.diff(highest) > 0.0])
     if not moved.all():
         s = np.interp(time, time[moved], s[moved])
-        tail = ~moved & (time > time[moved][-1])
-        speed = (s[moved][-1] - s[0]) / (time[moved][-1] - time[0])
-        s[tail] += speed * (time[tail] - time[moved][-1])
+        last = time[moved][-1]
+        tail = ~moved & (time > last)
+        if tail.any():  # less than a further step of the counter: the vehicle may stand
+            further = float(s[moved][-1] - s[moved][-2])
+            speed = min((s[moved][-1] - s[0]) / (last - time[0]), further / (time[-1] - last))
+            s[tail] += speed * (time[tail] - last)
     return s

@@ -9,7 +9,7 @@ from railsim.arrays import Floats, stretches
 from railsim.constants import GRAVITY
 from railsim.definitions.file_definition import loaded
 from railsim.definitions.loading import load_track
-from railsim.definitions.measurement import AXES, FEWEST, Channel, MeasurementFile, quantity_of
+from railsim.definitions.measurement import AXES, FEWEST, MeasurementFile, quantity_of
 from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files import sources
 from railsim.measurement.clock import Clock, bridged, clock_of, delayed, joined
@@ -165,14 +165,17 @@ def _channel(
     return x
 
 
-def _zero(name: str, how: MeasurementFile, channel: Channel, x: Floats, time: Floats) -> float:
-    assert channel.zero is not None
-    inside = (time >= channel.zero[0]) & (time <= channel.zero[1]) & np.isfinite(x)
+def _zeroed(name: str, how: MeasurementFile, x: Floats, time: Floats) -> Floats:
+    """Return a channel without its mean between the times of `zero`."""
+    zero = how.channels[name].zero
+    if zero is None:
+        return x
+    inside = (time >= zero[0]) & (time <= zero[1]) & np.isfinite(x)
     if not inside.any():
-        found = f"no value between {channel.zero[0]:g} and {channel.zero[1]:g} s"
+        found = f"no value between {zero[0]:g} and {zero[1]:g} s"
         allowed = f"times from {time[0]:g} to {time[-1]:g} s"
         raise input_error(how.name, found, allowed, key=f"channels.{name}.zero")
-    return float(x[inside].mean())
+    return np.asarray(x - x[inside].mean())
 
 
 def _clipped(x: Floats) -> str:
@@ -210,7 +213,7 @@ def _measurement(
     path: str, how: MeasurementFile, clock: Clock, values: dict[str, Floats], remarks: list[str]
 ) -> Measurement:
     axes = {
-        how.channels[name].quantity: values.pop(name)
+        how.channels[name].quantity: _zeroed(name, how, values.pop(name), clock.time)
         for name in list(values)
         if how.channels[name].quantity in ("distance", "mileage", "speed")
     }
@@ -220,9 +223,7 @@ def _measurement(
         mileage = track.mileage, track.falling_mileage
     s, speed, said = position(path, how, clock.time, axes, mileage)
     values = _mounted(how, values, remarks)
-    for name, x in values.items():
-        if how.channels[name].zero is not None:
-            values[name] = x - _zero(name, how, how.channels[name], x, clock.time)
+    values = {name: _zeroed(name, how, x, clock.time) for name, x in values.items()}
     return Measurement(how, clock.time, s, speed, values, (*remarks, *said))
 
 

@@ -351,3 +351,73 @@ def test_place_and_correlation_do_not_depend_on_an_offset(offset):
     assert found.shift == pytest.approx(-7.0, abs=0.01)
     assert found.stretch == pytest.approx(0.0, abs=1e-6)
     assert found.correlation == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("rate", [512.0, 700.0, 800.0, 900.0])
+def test_a_clock_in_milliseconds_of_a_rate_near_1_khz_is_a_line(rate):
+    """No value is lost where all lie within half a step of a line."""
+    exact = np.arange(4000) / rate
+    clock = clock_of("a.csv", np.round(exact, 3))
+    assert clock.rate == pytest.approx(rate, rel=1e-5)
+    assert len(clock.time) == 4000
+    assert np.abs(clock.time - exact).max() < 5e-5
+    assert clock.remarks == ()
+    lost = clock_of("a.csv", np.round(np.delete(exact, 1700), 3))
+    assert lost.remarks
+
+
+@pytest.mark.parametrize("digit", [0.1, 0.001])
+def test_a_vehicle_that_stands_at_the_end_goes_no_further(digit):
+    time = np.arange(0.0, 60.0, 0.01)
+    way = np.round(20.0 * np.minimum(time, 40.0), 6)
+    how = MeasurementFile.model_construct(speed=None, start=0.0)
+    s, _, _ = position("a.toml", how, time, {"distance": np.floor(way / digit) * digit}, None)
+    assert np.abs(s - way).max() < 0.2 + 2.0 * digit  # a step of the record and one of the counter
+    assert np.diff(s).min() > 0.0
+
+
+def test_the_mean_between_two_times_is_taken_off_the_speed_too(tmp_path):
+    text = CHANNELS + 'v = { quantity = "speed", unit = "km/h", zero = [0.0, 1.0] }\n'
+    path = written(tmp_path, text=text)
+    lines = (tmp_path / "a.csv").read_text().split("\n")
+    speed = 3.6 * np.where(t < 2.0, 0.0, 20.0) + 5.0
+    rows = [f"{line},{v:.3f}" for line, v in zip(lines[1:], speed, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([lines[0] + ",v", *rows]))
+    run = railsim.load_measurement(path)
+    assert run.speed == pytest.approx(np.where(t < 2.0, 0.0, 20.0), abs=1e-6)
+
+
+def test_a_mileage_against_that_of_the_track_is_said(tmp_path):
+    how = MeasurementFile.model_construct(speed=None, start=0.0)
+    for counter, falling, words in ((5e3 - 20.0 * t, False, "falls"), (5e3 + t, True, "rises")):
+        with pytest.raises(railsim.InputError, match=f"mileage: {words}; as on the track"):
+            position("a.toml", how, t, {"mileage": counter}, (4e3, falling))
+
+
+def test_an_array_of_matlab_7_3_is_that_of_the_older_format(tmp_path):
+    """MATLAB's files of version 7.3 are HDF5 with the dimensions in the opposite order."""
+    path = written(tmp_path)
+    columns = {"t": t[:, None], "box": np.stack([BOX, -BOX / 9.81, t], axis=1)}
+    columns["load"] = (LOAD / 1e3 + 1.5)[:, None]
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for name, x in columns.items():
+            file[name] = x.T
+    with open(tmp_path / "a.mat", "r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
+    savemat(tmp_path / "b.mat", columns)
+    how = ["channels.box.index=[1]"]
+    newer, older = (
+        railsim.load_measurement(path, [f"file={tmp_path / name}", *how])
+        for name in ("a.mat", "b.mat")
+    )
+    assert newer["box"] == pytest.approx(BOX)
+    for name in newer.channels:
+        np.testing.assert_array_equal(newer[name], older[name])
+
+
+def test_two_columns_of_one_name_are_refused(tmp_path):
+    path = written(tmp_path)
+    text = (tmp_path / "a.csv").read_text().replace("t,box,load", "t,load,load", 1)
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(railsim.InputError, match="2 columns 'load'"):
+        railsim.load_measurement(path, ["channels.box.column=t"])
