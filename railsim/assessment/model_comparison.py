@@ -109,8 +109,8 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """Pass, fail, or incomplete with too few sections."""
-        if self.sections < self.least:
+        """Pass, fail, or incomplete with too few sections or one value, which does not scatter."""
+        if self.sections < self.least or len(self.pairs) < 2:
             return INCOMPLETE
         met = abs(self.mean) <= self.mean_limit and self.deviation <= self.limit
         return PASS if met else FAIL

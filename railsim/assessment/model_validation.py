@@ -32,7 +32,7 @@ from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, InputError, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
-from railsim.measurement.alignment import Shift, shift_of
+from railsim.measurement.alignment import common_shift
 from railsim.measurement.counterpart import amplified, check_channels, compared, series
 from railsim.measurement.likeness import suspicions
 from railsim.notation import SIDES
@@ -98,9 +98,9 @@ def validate_model(
     remarks: list[str] = []
     for run, result in zip(runs, found, strict=True):
         one = _Run.of(run, result)
-        remarks += one.remarks
         overlays += one.overlays()
         pairs += one.pairs(tests, limits)
+        remarks += one.remarks
     if not pairs:
         allowed = "a longer run, or channels of Q, Y or the body's accelerations"
         raise input_error(runs[0].name, "no section", allowed, "distance")
@@ -330,6 +330,12 @@ class _Run:
             values.append(quantity.value(x, section.turn) if len(x) else [])
         names_of = quantity.name, self.measurement.name, f"{label} {wheel}".rstrip()
         where = section.begin, section.end, section.radius
+        if not np.isfinite(np.concatenate(values)).all():
+            self.remarks.append(
+                f"{self.measurement.name}: no {quantity.name} of {names_of[2]} from "
+                f"{section.begin:.0f} to {section.end:.0f} m: a wheel without load"
+            )
+            return []
         return [Pair(*names_of, *where, m, v) for m, v in zip(*values, strict=False)]
 
 
@@ -375,13 +381,11 @@ def _placed(
     run: Measurement, distance: Floats, simulated: Mapping[str, Floats]
 ) -> tuple[Measurement, list[str]]:
     """Return a run with its arc length moved to match the simulation, and what was done."""
-    best: Shift | None = None
-    for name, x in simulated.items():
-        found = shift_of(run.distance, run[name], distance, x, most=ALONG)
-        if found is not None and (best is None or found.correlation > best.correlation):
-            best = found
+    signals = ((run.distance, run[name], distance, x) for name, x in simulated.items())
+    best = common_shift(signals, most=ALONG)
     if best is None:
-        return run, ["no channel is like the simulated one: the place on the track is not checked"]
+        found = f"no channel is like the simulated one at places within {ALONG:g} m"
+        return run, [f"{found}: the place on the track is not checked"]
     words = []
     if abs(best.shift) > 1.0 or abs(best.stretch) > 1e-3:
         words = [f"arc length moved by {best.shift:+.1f} m and {1e3 * best.stretch:+.2f} m/km "

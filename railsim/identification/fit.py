@@ -24,7 +24,7 @@ from railsim.identification.residuals import FORMS, Form, banded, whiteness
 from railsim.identification.runs import FEWEST, model_of, prepared, track_of
 from railsim.identification.variants import Workers
 from railsim.measurement import Measurement, load_measurement
-from railsim.measurement.alignment import Shift, shift_of
+from railsim.measurement.alignment import common_shift
 from railsim.measurement.likeness import suspicions
 from railsim.processes import available_cores
 
@@ -265,17 +265,17 @@ def _by_a_part(problem: Problem, x: Floats, bounds: Floats, loss: str) -> Floats
 
 
 def _places(problem: Problem, x: Floats) -> Floats:
-    """Return shift and stretch of each run by its most telling channel."""
+    """Return shift and stretch of each run by its most telling channels."""
     found = []
     for one, values in zip(problem.runs, problem.series(x), strict=True):
-        best = Shift(0.0, 0.0, -np.inf, 0)
-        for measured, simulated in zip(one.measured, values, strict=True):
-            s, inside = one.run.at, np.isfinite(simulated)
-            if inside.any():
-                shift = shift_of(s, measured, s[inside], simulated[inside], most=ALONG)
-                if shift is not None and shift.correlation > best.correlation:
-                    best = shift
-        found += [best.shift, best.stretch / STRETCH]
+        s = one.run.at
+        signals = [
+            (s, measured, s[inside], simulated[inside])
+            for measured, simulated in zip(one.measured, values, strict=True)
+            if (inside := np.isfinite(simulated)).any()
+        ]
+        best = common_shift(signals, most=ALONG)
+        found += [0.0, 0.0] if best is None else [best.shift, best.stretch / STRETCH]
     return np.array(found)
 
 

@@ -5,6 +5,7 @@ the largest cross-correlation, between its grid points by a parabola, and a line
 shifts of all windows gives the whole shift and the drift of the mileage.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,10 @@ from railsim.track.irregularity import displacement
 STEP = 0.1  # m, grid of the comparison
 WINDOW = 250.0  # m
 CLEAR = 0.6  # correlation from which a window counts
+AGREEING = 0.5  # share of the windows of a signal that must show one shift
+TOGETHER = 1.0 / 3.0  # share of the signals that must show it
+NEAR = 3.0  # m, of the line through all shifts
+AS_ALIKE = 0.05  # below the largest correlation
 WAVES = (3.0, 40.0)  # m, that an axlebox and the track's level share
 CURVATURES = ("curvature", "yaw_rate")
 
@@ -35,6 +40,27 @@ class Shift:
     stretch: float  # change per metre [1]
     correlation: float  # median over the windows that count [1]
     windows: int  # that count
+    share: float  # of all windows that count and lie near the line
+
+
+def common_shift(
+    signals: Iterable[tuple[Floats, Floats, Floats, Floats]], *, most: float
+) -> Shift | None:
+    """Return the shift of a run with several signals: the median of those that are most alike.
+
+    `signals`: arguments of `shift_of` of each; `most`: largest shift that is looked for [m]. One
+    signal that lags, however clear it is, so does not move the others. Returns: None where no
+    signal has one shift in half of its windows, or the others do not share it.
+    """
+    every = [shift_of(*signal, most=most) for signal in signals]
+    found = [one for one in every if one is not None and one.share >= AGREEING]
+    best = max((one.correlation for one in found), default=0.0)
+    alike = sorted(
+        (one for one in found if one.correlation >= best - AS_ALIKE), key=lambda one: one.shift
+    )
+    middle = alike[len(alike) // 2] if alike else None
+    near = [one for one in found if middle is not None and abs(one.shift - middle.shift) < NEAR]
+    return middle if len(near) >= TOGETHER * len(every) else None
 
 
 def shift_of(
@@ -58,7 +84,8 @@ def shift_of(
     a, b = np.interp(grid, s[known], x[known]), np.interp(grid, s_reference, reference)
     size, reach = int(length / STEP), int(most / STEP)
     clear = []  # middle, shift and correlation of windows
-    for begin in range(reach, len(grid) - size - reach + 1, max(1, size // 2)):
+    begins = range(reach, len(grid) - size - reach + 1, max(1, size // 2))
+    for begin in begins:
         rows = slice(begin, begin + size)
         place, correlation = _lag(a[rows], b[begin - reach : begin + size + reach])
         if correlation > CLEAR:
@@ -70,7 +97,9 @@ def shift_of(
     if len(shifts) > 2:
         near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
         stretch, at_zero = np.polyfit(middles[near], shifts[near], 1)
-    return Shift(float(at_zero), float(stretch), float(np.median(correlations)), len(shifts))
+    share = float(np.sum(np.abs(shifts - at_zero - stretch * middles) < NEAR)) / len(begins)
+    alike = float(np.median(correlations))
+    return Shift(float(at_zero), float(stretch), alike, len(shifts), share)
 
 
 def _lag(a: Floats, b: Floats) -> tuple[float, float]:

@@ -43,7 +43,8 @@ class Likeness:
         if abs(self.drift) > APART * step:
             return f"{name}: its clock runs apart by {1e3 * self.drift:.3g} ms over the record."
         if self.correlation > SURE and abs(self.lag) > APART * step:
-            return f"{name} comes {1e3 * self.lag:.3g} ms later than simulated: 'delay'?"
+            late = f"{1e3 * abs(self.lag):.3g} ms {'later' if self.lag > 0.0 else 'earlier'}"
+            return f"{name} comes {late} than simulated: 'delay'?"
         return ""
 
 

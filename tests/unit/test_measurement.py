@@ -217,7 +217,7 @@ def test_clipped_signals_are_said_and_left_out(tmp_path):
         ({"b": {"factor": 1e3}}, ["b is 1000 times the simulated one"]),
         ({"b": {"factor": 1.0 / 9.81}}, ["b is 1/9.81 (g) times"]),
         ({"c": {"late": 0.1}}, ["c comes 100 ms later"]),
-        ({"c": {"late": -0.1}}, ["c comes -100 ms later"]),
+        ({"c": {"late": -0.1}}, ["c comes 100 ms earlier"]),
         ({name: {"late": 0.1} for name in "abc"}, []),  # of the place, not of the channels
         ({"a": {"drift": 0.2}}, ["a: its clock runs apart by "]),
         (

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import railsim
-from railsim.assessment.model_comparison import QUANTITIES, Comparison, Pair
+from railsim.assessment.model_comparison import QUANTITIES, Comparison, ModelValidation, Pair
 from railsim.assessment.model_validation import matching
 from railsim.cli import railsim as command_line
 
@@ -54,6 +55,8 @@ def test_mean_and_deviation_decide_each_and_eleven_sections_do_not():
         comparison(measured, measured + scatter).deviation
     )
     assert comparison(measured[:11], measured[:11]).verdict == "incomplete"
+    one = replace(comparison(measured[:1], measured[:1]), least=1)  # no standard deviation
+    assert one.verdict == "incomplete"
 
 
 def simulated(vehicle, until=None, **outputs):
@@ -112,6 +115,40 @@ def test_missing_vertical_dampers_fail_in_the_vertical(measured):
     assert found["body_z_rms"].verdict == "fail"
     lateral = ("Y_qst", "sum_Y_qst", "Q_qst", "body_y_qst")
     assert {found[name].verdict for name in lateral} == {"pass"}
+
+
+def test_one_late_channel_does_not_move_the_others(measured, right):
+    """Its shift is as clear as theirs; the run stays where most channels are."""
+    channels = {n: x for n, x in measured.channels.items() if n != "frame1z"}
+    late = np.roll(channels["floor1y"], 20)  # 0.2 s, 5.2 m
+    found = railsim.validate_model(replace(measured, channels={**channels, "floor1y": late}), right)
+    (moved,) = [remark for remark in found.remarks if "arc length" in remark]
+    assert float(moved.split("by ")[1].split(" m")[0]) == pytest.approx(-make.SHIFT, abs=0.3)
+    assert "floor1y comes 200 ms later" in "\n".join(found.remarks)
+    early = replace(measured, channels={**channels, "floor1y": np.roll(channels["floor1y"], -20)})
+    assert "floor1y comes 200 ms earlier" in "\n".join(railsim.validate_model(early, right).remarks)
+
+
+def test_a_place_beyond_what_is_looked_for_is_not_taken_for_another(measured, right):
+    """45 m off: windows that happen to be alike give no shift of their own."""
+    found = railsim.validate_model(measured.moved(45.0), right)
+    assert "no channel is like the simulated one at places within 30 m" in "".join(found.remarks)
+    assert "arc length moved" not in "".join(found.remarks)
+
+
+def test_a_section_with_a_wheel_without_load_is_left_out_and_named(measured, right):
+    """Y/Q has no value there: it must not spoil mean and deviation of the other sections."""
+    whole = railsim.validate_model(measured, right)["Y_over_Q_qst"]
+    load = measured["Q1L"].copy()
+    load[(measured.distance > 640.0) & (measured.distance < 700.0)] = -500.0
+    channels = {name: x for name, x in measured.channels.items() if name != "frame1z"}
+    found = railsim.validate_model(replace(measured, channels={**channels, "Q1L": load}), right)
+    own = found["Y_over_Q_qst"]
+    assert 0 < len(whole.pairs) - len(own.pairs) <= 2
+    assert own.verdict == "pass"
+    assert own.deviation == pytest.approx(whole.deviation, rel=0.5)
+    assert any("no Y_over_Q_qst of wheelset 1 outer from" in words for words in found.remarks)
+    assert ModelValidation.of(found.record())["Y_over_Q_qst"].mean == own.mean
 
 
 @pytest.mark.further
