@@ -88,18 +88,21 @@ def series(result: Result, selection: str) -> Floats:
     return result.series(name, **given)
 
 
-def amplified(x: Floats, rate: float, channel: Channel) -> Floats:
-    """Return a series as an amplifier with the filters of a channel shows it: with its phase."""
+def amplifier(channel: Channel, f: Floats) -> Complexes:
+    """Return the response of the filters of a channel at frequencies [Hz]."""
     from scipy import signal
 
+    found, s = np.ones(len(f), complex), 2j * np.pi * f
     for corner, kind in ((channel.low_pass, "lowpass"), (channel.high_pass, "highpass")):
-        if corner is None:
-            continue
-        b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)  # type: ignore[call-overload]
+        if corner is not None:
+            b, a = signal.butter(4, 2.0 * np.pi * corner, kind, analog=True)  # type: ignore[call-overload]
+            found *= np.polyval(b, s) / np.polyval(a, s)
+    return found
 
-        def response(f: Floats, b: Floats = b, a: Floats = a) -> Complexes:
-            s = 2j * np.pi * f
-            return np.asarray(np.polyval(b, s) / np.polyval(a, s))
 
-        x = filtered(x, rate, response, 6.0 / corner)
-    return x
+def amplified(x: Floats, rate: float, channel: Channel) -> Floats:
+    """Return a series as an amplifier with the filters of a channel shows it: with its phase."""
+    corners = [corner for corner in (channel.low_pass, channel.high_pass) if corner is not None]
+    if not corners:
+        return x
+    return filtered(x, rate, lambda f: amplifier(channel, f), 6.0 / min(corners))

@@ -28,6 +28,7 @@ from railsim.errors import Faults, ModelError, input_error, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
+from railsim.measurement.counterpart import amplifier
 from railsim.observation import innovations
 from railsim.observation.contact import Noise, in_the_mean
 from railsim.observation.estimate import Estimate, Irregularity, estimate_of, joined, rms
@@ -167,6 +168,7 @@ class _Smooth:
         begin, end = measurement.distance[[0, -1]].tolist()
         self.linear = LinearVehicle(vehicle, track, at=0.5 * (begin + end))
         self.channels, self.used, self.known = list(used), list(used.values()), all_sensors(vehicle)
+        self.filters = [measurement.channel(name) for name in used]
         kinds = [measurement.quantities[name].split(":")[0] for name in used]
         default = {**NOISE, "sensor_acceleration": assumed.noise}
         self.noise = np.array(
@@ -225,8 +227,13 @@ class _Smooth:
         white = np.tile(self.noise**2 * piece.speed / piece.rate / STEP, (len(k), 1))
         white[0] += points * self.bias**2
         unknown = np.tile(noise.at(k, STEP), len(response.offsets))
-        powers = Powers(points, self.assumed.power(k, points), unknown, whole[:, chosen], white)
-        run = SimulatedRun(self.vehicle, self.track, piece, self.used, list(names))
+        frequencies = k * piece.speed / (2.0 * np.pi)
+        filters = np.stack([amplifier(channel, frequencies) for channel in self.filters], axis=1)
+        seen = whole[:, chosen] * filters[:, :, None]
+        seen[-1] = seen[-1].real
+        powers = Powers(points, self.assumed.power(k, points), unknown, seen, white)
+        outputs = dict(zip(self.used, self.filters, strict=True))
+        run = SimulatedRun(self.vehicle, self.track, piece, outputs, list(names))
         read = piece.signals
         if self.simulations and not run.is_steady:
             smooth = run(np.zeros((len(QUANTITIES), n)))

@@ -13,18 +13,20 @@ before, such that the mixture of the residuals is least (Anderson 1965; Walker a
 do.  Values that do not exist are those of H r.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from railsim.arrays import Flags, Floats
+from railsim.definitions.measurement import Channel
 from railsim.definitions.settings import Drive, Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import is_uniform
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.track_response import RAILS
+from railsim.measurement.counterpart import amplified
 from railsim.observation.pieces import STEP, Piece, on_grid
 from railsim.result import Result
 from railsim.simulation.remarks import silent
@@ -67,12 +69,14 @@ class SimulatedRun:
     """A vehicle that runs over irregularities as it did in a piece of a measured run.
 
     `vehicle`, `track`: The track with its plan, without irregularities. `outputs`: Readings, such
-    as ``axlebox_1_left.z``. `forces`: Such as ``Q.1.left``, ``sum_Y.1``.
+    as ``axlebox_1_left.z``, and the channel of each, with the filters that it has been through.
+    `forces`: Such as ``Q.1.left``, ``sum_Y.1``.
     """
 
     def __init__(
-        self, vehicle: Vehicle, track: Track, piece: Piece, outputs: list[str], forces: list[str]
-    ) -> None:
+        self, vehicle: Vehicle, track: Track, piece: Piece, outputs: Mapping[str, Channel],
+        forces: list[str],
+    ) -> None:  # fmt: skip
         self.vehicle, self.piece, self.outputs, self.forces = vehicle, piece, outputs, forces
         s = piece.grid
         # where the track is the same everywhere the run begins at its beginning
@@ -113,7 +117,13 @@ class SimulatedRun:
             )  # fmt: skip
         if result.status != "complete":
             return f"{result.status}: {result.status_reason}"
-        return Reading(*(self._read(result, names) for names in (self.outputs, self.forces)))
+        rate = (len(result["time"]) - 1) / float(result["time"][-1] - result["time"][0])
+        channels = [
+            amplified(_series(result, name), rate, channel)
+            for name, channel in self.outputs.items()
+        ]
+        forces = [_series(result, name) for name in self.forces]
+        return Reading(*(self._on_grid(result, rows) for rows in (channels, forces)))
 
     def _settings(self, s: Floats) -> Settings:
         if self._constant:
@@ -124,9 +134,9 @@ class SimulatedRun:
         drive = Drive(mode="table", speed_table=table)
         return Settings(output_rate=rate, outputs=OUTPUTS, drive=drive)
 
-    def _read(self, result: Result, names: list[str]) -> Floats:
+    def _on_grid(self, result: Result, series: list[Floats]) -> Floats:
         s = result["distance"] + self._moved
-        return np.array([on_grid(s, _series(result, name), self.piece.grid) for name in names])
+        return np.array([on_grid(s, x, self.piece.grid) for x in series])
 
 
 def _series(result: Result, name: str) -> Floats:

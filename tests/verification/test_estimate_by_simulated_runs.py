@@ -127,8 +127,8 @@ def test_a_run_on_track_that_differs_from_place_to_place_begins_at_its_place(cha
     track, grid = railsim.load_track("straight"), 500.0 + STEP * np.arange(N)
     piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 40.0), 500.0)
     coach = railsim.load_vehicle("coach_manchester")
-    assert SimulatedRun(coach, track, piece, [], []).is_steady
-    run = SimulatedRun(coach, track.replace(**changes), piece, [], [])
+    assert SimulatedRun(coach, track, piece, {}, []).is_steady
+    run = SimulatedRun(coach, track.replace(**changes), piece, {}, [])
     assert not run.is_steady
     assert run._start == pytest.approx(400.0)
 
@@ -146,7 +146,7 @@ def test_a_run_goes_from_100_m_ahead_of_its_piece_to_15_m_beyond(monkeypatch, wi
     track, grid = railsim.load_track("straight"), 500.0 + STEP * np.arange(N)
     track = track.replace(gauge_widening=widening) if widening else track
     piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 40.0), 500.0)
-    run = SimulatedRun(railsim.load_vehicle("coach_manchester"), track, piece, [], [])
+    run = SimulatedRun(railsim.load_vehicle("coach_manchester"), track, piece, {}, [])
     with pytest.raises(LookupError):
         run(np.zeros((4, N)))
     end = begin + STEP * (N - 1)

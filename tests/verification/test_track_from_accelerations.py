@@ -8,16 +8,18 @@ import pytest
 import railsim
 from railsim.cli import main
 from railsim.definitions.excitations.recording import band_passed
-from railsim.definitions.measurement import MeasurementFile
+from railsim.definitions.measurement import Channel, MeasurementFile
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.linear.track_response import QUANTITIES, RAILS, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
+from railsim.measurement.counterpart import amplified, amplifier
 from railsim.observation import Assumed, irregularity
 from railsim.observation.estimate import BANDS, Estimate, joined
 from railsim.observation.estimate import rms as deviation
-from railsim.observation.pieces import on_grid
+from railsim.observation.pieces import Piece, on_grid
+from railsim.observation.simulated import SimulatedRun
 from railsim.plot.observation import irregularity_figure
 from railsim.result.sensors import all_sensors
 from railsim.track.irregularity import displacement
@@ -25,6 +27,9 @@ from railsim.track.irregularity import displacement
 pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")
 COACH = "coach_25t"
 V, RATE, NOISE, BIAS = 50.0, 1000.0, 0.05, 0.02
+BOX_QUANTITY = "sensor_acceleration:axlebox_1_left:z"
+BOX, BOX_Z = "axlebox_1_left.z", "axlebox_1_left_z"
+PIECE = Piece(np.arange(100.0, 400.0, 0.25), *[np.zeros(0)] * 2, np.full(1200, V), RATE)
 ERRI = {"type": "random", "spectrum": "erri_b176_low", "seed": 7}
 
 
@@ -201,6 +206,33 @@ def test_level_cross_level_and_wheel_forces_of_a_twin(short):
     assert rms(error) < 0.02 * true.mean()
     true, error, _ = force_errors(found, result, "sum_Y", "sum_Y")
     assert rms(error) < 0.3 * true.std()
+
+
+@pytest.mark.parametrize("filters", [{"low_pass": 40.0}, {"high_pass": 0.5}])
+def test_filters_of_the_amplifier_do_not_move_the_track(short, coach, filters):
+    """40 Hz lags by 0.5 m at 50 m/s, 0.5 Hz turns waves of 60 m round: both are in the model."""
+    _, track, measurement, plain = short
+    how = {n: c.model_copy(update=filters) for n, c in measurement.definition.channels.items()}
+    read = replace(
+        measurement,
+        definition=measurement.definition.model_copy(update={"channels": how}),
+        channels={n: amplified(x, RATE, how[n]) for n, x in measurement.channels.items()},
+    )
+    found = irregularity(read, coach, track, simulations=0)
+    own, whole = errors(found, track), errors(plain, track)
+    for name in ("level", "cross_level"):
+        assert rms(own[name, "D1"][1]) < 1.2 * rms(whole[name, "D1"][1])
+        assert rms(own[name, "D2"][1]) < 3.0 * rms(whole[name, "D2"][1])  # less is seen of them
+    run = SimulatedRun(coach, track.replace(irregularities=[]), PIECE, {BOX: how[BOX_Z]}, [])
+    unfiltered = SimulatedRun(
+        coach, track.replace(irregularities=[]), PIECE, {BOX: Channel(quantity=BOX_QUANTITY)}, []
+    )
+    fields = np.zeros((4, len(PIECE.grid)))
+    fields[1] = 1e-3 * np.sin(2.0 * np.pi * PIECE.grid / 10.0)  # 5 Hz
+    turned = amplifier(how[BOX_Z], np.array([V / 10.0]))[0]
+    x, y = (one(fields).channels[0][400:800] for one in (unfiltered, run))
+    wave = np.exp(-2j * np.pi * PIECE.grid[400:800] / 10.0)
+    assert (y @ wave) / (x @ wave) == pytest.approx(turned, abs=0.02)
 
 
 def test_what_is_not_seen_is_named_and_left_out(short):
