@@ -9,6 +9,8 @@ import numpy as np
 
 from railsim.arrays import Complexes, Floats, stretches
 from railsim.definitions.excitations.recording import ORDER
+from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import is_uniform
 from railsim.files.access import make_folder, whole_file, write_text
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation.pieces import STEP, Piece
@@ -69,6 +71,7 @@ class Irregularity(Estimated):
     pieces: tuple[Estimate, ...]  # what was put together
     flanges: tuple[tuple[int, float, float], ...]
     remarks: tuple[str, ...]
+    track: Track  # that was run over, without irregularities
 
     def force(self, name: str) -> Floats:
         """Return a force over the arc length, such as ``Q.1.left`` or ``sum_Y.2`` [N]."""
@@ -182,15 +185,14 @@ class Irregularity(Estimated):
         return [path / name for name in FILES]
 
     def _track(self) -> str:
-        """Return a straight track with the recording."""
-        length = float(np.ceil(self.s[-1]))
-        return (
-            'format = "railsim-track/1"\n'
-            f'name = "Track under {self.vehicle}"\n\n'
-            f'[[plan]]\ntype = "STR"\nlength = {length:.1f}\n\n'
-            f'[[cant]]\ntype = "CST"\nlength = {length:.1f}\ncant = 0.0\n\n'
-            f'[[irregularities]]\ntype = "measured"\nfile = "{FILES[0]}"\n'
-        )
+        """Return the track that was run over, with the recording for its irregularities."""
+        changes: dict[str, Any] = {"name": f"Track under {self.vehicle}", "irregularities": []}
+        if is_uniform(self.track):
+            length = float(np.ceil(self.s[-1]))
+            changes["plan"] = [{"type": "STR", "length": length}]
+            changes["cant"] = [{"type": "CST", "length": length, "cant": 0.0}]
+        recording = f'irregularities = [{{ type = "measured", file = "{FILES[0]}" }}]\n'
+        return self.track.replace(**changes).to_toml().replace("irregularities = []\n", recording)
 
 
 Forces = tuple[tuple[str, ...], Complexes, Floats]
@@ -248,8 +250,9 @@ def rms(power: Floats, points: int) -> Floats:
 
 
 def joined(
-    name: str, vehicle: str, pieces: Sequence[Estimate], clearances: Floats, remarks: Sequence[str]
-) -> Irregularity:
+    name: str, vehicle: str, pieces: Sequence[Estimate], clearances: Floats, remarks: Sequence[str],
+    track: Track,
+) -> Irregularity:  # fmt: skip
     """Return pieces put together, from one to the next over the length on which both exist."""
     step = pieces[0].s[1] - pieces[0].s[0]
     begin, end = pieces[0].s[0], pieces[-1].s[-1]
@@ -286,7 +289,7 @@ def joined(
         touching += [(w + 1, float(s[a]), float(s[b - 1])) for a, b in places]
     return Irregularity(
         **vars(whole), name=name, vehicle=vehicle, pieces=tuple(pieces), flanges=tuple(touching),
-        remarks=tuple(dict.fromkeys(remarks)),
+        remarks=tuple(dict.fromkeys(remarks)), track=track,
     )  # fmt: skip
 
 

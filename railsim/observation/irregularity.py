@@ -138,7 +138,7 @@ def irregularity(
     remarks += [*smooth.linear.remarks, *smooth.said]
     if not simulations:
         remarks += _curves(track, measurement)
-    return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks)
+    return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks, bare)
 
 
 def _curves(track: Track, measurement: Measurement) -> list[str]:

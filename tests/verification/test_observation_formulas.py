@@ -236,7 +236,7 @@ def made_irregularity(random):
         wave_numbers=k, seen=seen, power=power, outputs=names, forces=forces,
         force_deviations=np.array([300.0, 200.0, 1e-4]),
     )  # fmt: skip
-    return piece, joined("run", "coach", [piece], np.array([1.0]), ())
+    return piece, joined("run", "coach", [piece], np.array([1.0]), (), load_track("straight"))
 
 
 def test_tables_of_an_estimate_are_its_rms_values_and_largest_forces():

@@ -33,6 +33,9 @@ PIECE = Piece(np.arange(100.0, 400.0, 0.25), *[np.zeros(0)] * 2, np.full(1200, V
 ERRI = {"type": "random", "spectrum": "erri_b176_low", "seed": 7}
 
 
+STRAIGHT = railsim.load_track("straight")
+
+
 @pytest.fixture(scope="module")
 def coach():
     return railsim.load_vehicle(COACH)
@@ -260,6 +263,19 @@ def test_recording_is_read_as_a_track(short, tmp_path):
     assert rows[:, 4] - rows[:, 2] == pytest.approx(found.values[2], abs=1e-8)
 
 
+def test_the_track_written_is_the_one_that_was_run_over(short, tmp_path):
+    """Plan, gauge, rails and friction of the track given, not those of a straight by default."""
+    curve = canted_curve(600.0, 0.1).replace(gauge=1.52, friction=0.3, irregularities=[])
+    replace(short[3], track=curve).write(tmp_path)
+    track = railsim.load_track(tmp_path / "track.toml")
+    assert (track.plan, track.cant, track.gauge) == (curve.plan, curve.cant, 1.52)
+    assert track.friction == curve.friction
+    assert [part.type for part in track.irregularities] == ["measured"]
+    short[3].write(tmp_path)
+    straight = railsim.load_track(tmp_path / "track.toml")
+    assert straight.length == np.ceil(short[3].s[-1])
+
+
 def test_files_hold_all_estimates_and_forces_in_their_units(short, tmp_path):
     found = short[3]
     found.write(tmp_path)
@@ -449,7 +465,9 @@ def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_
             outputs=("lateral.1",), forces=aside, force_deviations=np.zeros(1),
         )  # fmt: skip
 
-    found = joined("run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), ())
+    found = joined(
+        "run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), (), STRAIGHT
+    )
     assert found.flanges == ((1, 40.0, 50.0),)
     expected = np.interp(found.s, [80.0, 100.0], [1.0, 3.0])
     np.testing.assert_allclose(found.values[0], expected, atol=1e-12)
@@ -473,7 +491,7 @@ def test_picture_shades_the_95_per_cent_interval_of_each_quantity():
         band_deviations=dict.fromkeys(BANDS, deviations), wave_numbers=none[0], seen=none,
         power=none, outputs=("lateral.1",), forces=rows[:1], force_deviations=np.zeros(1),
     )  # fmt: skip
-    figure = irregularity_figure(joined("run", "coach", [piece], np.array([0.1]), ()))
+    figure = irregularity_figure(joined("run", "coach", [piece], np.array([0.1]), (), STRAIGHT))
     for q, axes in enumerate(figure.axes[:3]):
         for shaded in axes.collections:
             corners = shaded.get_paths()[0].vertices
