@@ -214,7 +214,7 @@ def assess_track(
         for record in outcome.records
         if record["status"] != "complete"
     ]
-    remarks += _hunting(outcome.records) + measured_remarks(track)
+    remarks += _left_out(track) + _hunting(outcome.records) + measured_remarks(track)
     return _judged(track, runs, share, outcome, remarks)
 
 
@@ -270,10 +270,27 @@ def _behind(vehicle: Vehicle) -> float:
     return -min(0.0, *wheelsets, *(placed[point].along for point in POINTS))
 
 
+def _recorded_from_to(track: Track) -> tuple[float, float]:
+    """Where the recordings begin and end, on the track or beyond it [m]."""
+    found = [p.extent(track.length) for p in track.irregularities if isinstance(p, Measured)]
+    return min(a for a, _ in found), max(b for _, b in found)
+
+
+def _left_out(track: Track) -> list[str]:
+    """Remark on what of a recording lies beyond the track and is not judged."""
+    (low, high), (begin, end) = _recorded_from_to(track), _extent(track)
+    if low > begin - 1.0 and high < end + 1.0:
+        return []
+    return [
+        f"The recording goes from s = {low:.0f} to {high:.0f} m, the track from 0 to "
+        f"{track.length:.0f} m: what lies beyond it is not judged ('shift' of the irregularity?)."
+    ]
+
+
 def _extent(track: Track) -> tuple[float, float]:
     """Where a recording begins and ends on its track [m]."""
-    found = [p.extent(track.length) for p in track.irregularities if isinstance(p, Measured)]
-    begin, end = max(0.0, min(a for a, _ in found)), min(track.length, max(b for _, b in found))
+    low, high = _recorded_from_to(track)
+    begin, end = max(0.0, low), min(track.length, high)
     if end - begin < 2.0 * SECTION:
         found_words, allowed = f"{end - begin:.0f} m", f"{2.0 * SECTION:g} m at least"
         raise input_error(track.name, found_words, allowed, key="irregularities")

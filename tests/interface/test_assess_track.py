@@ -67,6 +67,10 @@ def test_the_defect_is_found_and_named(judged):
     assert found.flagged[3] >= 2
 
 
+def test_a_recording_on_its_track_leaves_nothing_out(judged):
+    assert not any("recording goes from" in words for words in judged[0].remarks)
+
+
 def test_nothing_is_computed_again(judged):
     found, again, _ = judged
     assert found.computed == 2
@@ -138,6 +142,18 @@ def test_vehicles_that_hunt_are_said():
     hunts = {"labels": labels, "remarks": ["The vehicle hunts at 5.7 Hz, 7.4 mm, ..."]}
     (words,) = module._hunting([hunts, {"labels": labels, "remarks": []}, other])
     assert words.startswith("wagon hunts at 144 km/h in 1 of 2 pieces")
+
+
+def test_what_lies_beyond_the_track_is_said(recording, tmp_path):
+    """A recording whose mileage begins 300 m before zero: 300 m of it are not judged."""
+    rows = np.loadtxt(recording, delimiter=",", skiprows=1)
+    rows[:, 0] -= 300.0
+    head = recording.read_text().split("\n")[0]
+    path = tmp_path / "early.csv"
+    np.savetxt(path, rows, delimiter=",", header=head, comments="", fmt="%.6g")
+    found = assess_track(path, ["coach_manchester"], [SPEED], out=tmp_path / "x", workers=1)
+    (said,) = [words for words in found.remarks if "recording goes from" in words]
+    assert "s = -300 to 700 m, the track from 0 to 700 m" in said
 
 
 def test_wrong_input(recording, tmp_path, capsys):
