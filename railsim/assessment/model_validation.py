@@ -86,6 +86,9 @@ def validate_model(
     if len(found) != len(runs) or not runs:
         words = f"{len(found)} results for {len(runs)} measured runs"
         raise argument_error("results", words, "one for each")
+    names = [run.name for run in runs]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise argument_error("measured", f"two runs named '{twice[0]}'", "a name for each run")
     if not isinstance(limits, ValidationLimits):
         limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))
@@ -114,8 +117,8 @@ def validate_model(
             comparisons.append(Comparison(quantity, own, limit, mean, least))
     if not all(one.checked for one in limits.limits.values()):
         remarks.append(f"limits of {limits.edition} not checked against the printed standard")
-    names, said = tuple(run.name for run in runs), tuple(dict.fromkeys(remarks))
-    results_of = found[0].vehicle().name, names, tuple(comparisons), tuple(overlays)
+    said = tuple(dict.fromkeys(remarks))
+    results_of = found[0].vehicle().name, tuple(names), tuple(comparisons), tuple(overlays)
     return ModelValidation(*results_of, limits.edition, said)
 
 

@@ -245,6 +245,10 @@ def test_bad_input_is_one_line(measured, right, tmp_path):
     manchester = simulated(railsim.load_vehicle("coach_manchester"), 60.0, quantities=["Q"])
     cases = [
         (lambda: railsim.validate_model([measured, measured], right), "1 results for 2 measured"),
+        (
+            lambda: railsim.validate_model([measured, measured], [right, right]),
+            f"two runs named '{measured.name}'",
+        ),
         (lambda: railsim.validate_model(measured, manchester), "no quantity 'Y'"),
         (lambda: railsim.validate_model(measured.part(0.0, 100.0), right), "no section"),
         (lambda: railsim.validate_model(measured, right, limits="en14363"), "railsim-validation"),
