@@ -27,6 +27,7 @@ LARGEST = {
 """Values [SI] that no vehicle on a track reaches."""
 SMALLEST = {"Q": 500.0, "speed": 0.1}
 """Largest values [SI] that are too small for any run."""
+SINGLE = 1e-7  # share by which a number of single precision may differ from what is written
 EQUAL_ENDS, OFTEN = 3, 3  # values in a row at the largest or smallest one, and how often
 
 
@@ -144,9 +145,10 @@ def _channel(
     channel = how.channels[name]
     x = np.where(np.isinf(x), np.nan, x)
     for value in how.missing:
-        x[x == value] = np.nan
+        x[np.abs(x - value) <= SINGLE * abs(value)] = np.nan
     if channel.range is not None:
-        outside = (x <= channel.range[0]) | (x >= channel.range[1])
+        low, high = channel.range
+        outside = (x <= low + SINGLE * abs(low)) | (x >= high - SINGLE * abs(high))
         if outside.any():
             remarks.append(f"{name}: {outside.sum()} values at the ends of its range left out.")
             x[outside] = np.nan

@@ -421,3 +421,22 @@ def test_two_columns_of_one_name_are_refused(tmp_path):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(railsim.InputError, match="2 columns 'load'"):
         railsim.load_measurement(path, ["channels.box.column=t"])
+
+
+def test_single_precision_has_the_same_gaps_as_text(tmp_path):
+    """-999.9 and 9.99 of a file in single precision are -999.9000244 and 9.9899998."""
+    load = LOAD / 1e4 + 1.5
+    load[[20, 21]], load[70:80] = -999.9, 9.99
+    path = written(
+        tmp_path, cell=lambda row, name, text: f"{load[row]:.9f}" if name == "load" else text
+    )
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"], file["box"], file["load"] = t, -BOX / 9.81, load.astype(np.float32)
+    how = ["missing=[-999.9]", "channels.load.range=[-5.0, 9.99]"]
+    text, single = (
+        railsim.load_measurement(path, [f"file={tmp_path / name}", *how])
+        for name in ("a.csv", "a.h5")
+    )
+    gaps = [20, 21, *range(70, 80)]
+    for run in (text, single):
+        assert np.flatnonzero(np.isnan(run["load"])).tolist() == gaps
