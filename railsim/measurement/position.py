@@ -13,6 +13,7 @@ from railsim.errors import input_error
 Origin = tuple[float, bool]  # mileage of s = 0 [m], and whether it falls
 BACKWARDS = 1.0  # m, by which a counter may step back
 APART = 0.002  # of the distance: remarked on
+SPEEDS = 0.1, 170.0  # m/s, of a run in the mean
 WRONG = 0.5  # of the distance: refused
 
 
@@ -57,6 +58,11 @@ def position(
         return how.start + driven, speed, remarks
     s = _rising(file, time, counter, remarks)
     if driven is None or speed is None:
+        mean = float((s[-1] - s[0]) / (time[-1] - time[0]))
+        if not SPEEDS[0] <= mean <= SPEEDS[1]:
+            found = f"{mean:.3g} m/s from {s[-1] - s[0]:.6g} m in {time[-1] - time[0]:.6g} s"
+            allowed = f"{SPEEDS[0]:g} to {SPEEDS[1]:g} m/s; the 'unit' of distance or time?"
+            raise input_error(file, found, allowed, key="distance")
         return s, np.gradient(s, step), remarks
     share = (s[-1] - s[0]) / driven[-1] - 1.0 if driven[-1] > 0.0 else np.inf
     if not abs(share) < WRONG:

@@ -27,6 +27,7 @@ LARGEST = {
 """Values [SI] that no vehicle on a track reaches."""
 SMALLEST = {"Q": 500.0, "speed": 0.1}
 """Largest values [SI] that are too small for any run."""
+SLOWEST = 1.0  # values per second
 SINGLE = 1e-7  # share by which a number of single precision may differ from what is written
 EQUAL_ENDS, OFTEN = 3, 3  # values in a row at the largest or smallest one, and how often
 
@@ -75,6 +76,10 @@ def load_measurement(
         count = sum(map(len, parts[wanted[0]]))
         assert how.rate is not None  # by the definition
         clock = Clock(np.arange(count) / how.rate, how.rate, np.arange(count), np.empty(0))
+    if clock.rate < SLOWEST:
+        found = f"{clock.rate:.3g} values per second"
+        allowed = f"{SLOWEST:g} at least; the 'unit' of the time?"
+        raise input_error(how.file[0], found, allowed, key="rate" if how.rate else "time")
     remarks += clock.remarks
     values, faults = {}, Faults()
     for name in wanted:

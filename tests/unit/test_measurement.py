@@ -440,3 +440,25 @@ def test_single_precision_has_the_same_gaps_as_text(tmp_path):
     gaps = [20, 21, *range(70, 80)]
     for run in (text, single):
         assert np.flatnonzero(np.isnan(run["load"])).tolist() == gaps
+
+
+@pytest.mark.parametrize(
+    ("time", "distance", "words"),
+    [(1e3, None, "0.5 values per second"), (1.0, 1e-3, "0.05 m/s from"), (1.0, 1e3, "5e+04 m/s")],
+)
+def test_a_clock_in_ms_and_a_distance_in_km_taken_for_si_are_refused(
+    tmp_path, time, distance, words
+):
+    """No speed is measured: only distance over time says that a unit is wrong."""
+    text = CHANNELS + ("" if distance is None else 's = { quantity = "distance" }\n')
+    path = written(tmp_path, text=text)
+    columns = [time * t, -BOX / 9.81, LOAD / 1e3 + 1.5]
+    names = ["t", "box", "load"]
+    if distance is not None:
+        columns, names = [*columns, distance * 50.0 * t], [*names, "s"]
+        path.write_text(path.read_text().replace("speed = 50.0\n", ""))
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, x in zip(names, columns, strict=True):
+            file[name] = x
+    with pytest.raises(railsim.InputError, match=re.escape(words)):
+        railsim.load_measurement(path, [f"file={tmp_path / 'a.h5'}"])
