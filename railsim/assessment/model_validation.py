@@ -229,6 +229,12 @@ class _Run:
             raise InputError(faults)
         moved, remarks = _placed(run, distance, simulated_there)
         on = run.definition.track
+        ended = f"{result.status}, {result.attributes.get('status_reason', '')}".rstrip(", ")
+        if result.status == "derailed":
+            allowed = "a model with which the run goes on as the measured one"
+            raise input_error(run.name, f"the simulated run: {ended}", allowed)
+        if result.status != "complete":
+            remarks.append(f"simulated up to {distance[-1]:.0f} m only ({ended})")
         remarks += _contradictions(run, result, None if on is None else load_track(on))
         begin = float(np.interp(time[0] + START, time, distance))
         part = moved.part(begin, float(distance[-1]))

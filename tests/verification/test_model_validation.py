@@ -229,6 +229,20 @@ def test_a_study_gives_the_result_on_the_same_track_in_the_same_load(measured, r
     assert json.loads(done.output)["verdict"] == "pass"
 
 
+@pytest.mark.parametrize("status", ["derailed", "stopped"])
+def test_a_simulated_run_that_ended_early_does_not_pass_in_silence(
+    measured, right, status, monkeypatch
+):
+    attributes = {**right.attributes, "status": status, "status_reason": "a wheel climbs"}
+    monkeypatch.setattr(right, "_attributes", attributes)
+    if status == "derailed":
+        with pytest.raises(railsim.InputError, match="simulated run: derailed, a wheel climbs"):
+            railsim.validate_model(measured, right)
+    else:
+        said = "\n".join(railsim.validate_model(measured, right).remarks)
+        assert f"simulated up to {right.distance[-1]:.0f} m only (stopped, a wheel climbs)" in said
+
+
 def test_a_result_of_another_speed_load_or_track_is_said(measured, right):
     measured = measured.part(0.0, 1300.0)
     definition = measured.definition.replace(load="laden", track="curve_r500")
