@@ -22,7 +22,7 @@ from railsim.constants import CANT_BASE
 from railsim.contact.geometry import geometry_of
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.layout import curvature_sections
+from railsim.definitions.track.layout import curvature_sections, is_uniform
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, ModelError, input_error, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
@@ -33,7 +33,7 @@ from railsim.observation import innovations
 from railsim.observation.contact import Noise, in_the_mean
 from railsim.observation.estimate import Estimate, Irregularity, estimate_of, joined, rms
 from railsim.observation.innovations import KINDS, Powers, Sizes, likely_sizes, spectra_of
-from railsim.observation.pieces import READ, STEP, Piece, pieces_of, used_channels
+from railsim.observation.pieces import MARGIN, READ, STEP, Piece, pieces_of, used_channels
 from railsim.observation.simulated import CHANGE, SimulatedRun, refined
 from railsim.observation.smoother import filtered
 from railsim.result.sensors import all_sensors
@@ -128,6 +128,11 @@ def irregularity(
     if left := [name for name in measurement.channels if name not in used]:
         remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")
     pieces = pieces_of(measurement, list(used))
+    begin, end = measurement.distance[[0, -1]].tolist()
+    if simulations and not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
+        found_words, allowed = f"{begin:.0f} to {end:.0f} m", f"0 to {track.length:.0f} m"
+        allowed += f" as track '{track.name}' has it, on which the run is simulated"
+        raise input_error(measurement.name, found_words, allowed, "distance")
     bare = track.replace(irregularities=[])
     smooth = _Smooth(vehicle, bare, assumed, measurement, used, simulations)
     found = []

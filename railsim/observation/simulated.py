@@ -109,6 +109,8 @@ class SimulatedRun:
         if self._uniform:
             changes["plan"] = [{"type": "STR", "length": end + AFTER}]
             changes["cant"] = [{"type": "CST", "length": end + AFTER, "cant": 0.0}]
+        else:
+            end = min(end, self._track.length)
         with silent():
             speed = float(np.mean(self.piece.speeds)) if self._constant else None
             result = simulate(

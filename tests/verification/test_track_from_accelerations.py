@@ -385,6 +385,10 @@ def test_wrong_input(short, coach):
     )
     with pytest.raises(InputError, match="no sensor 'axlebox_9_left'"):
         irregularity(wrong, other, track)
+    curve = canted_curve(600.0, 0.1, 1000.0)
+    for shift, words in ((900.0, "900 to 1600 m"), (-100.0, "-100 to 600 m")):
+        with pytest.raises(InputError, match=f"{words}; 0 to 1000 m as track"):
+            irregularity(measurement.moved(shift), coach, curve)
 
 
 def test_command(short, coach, tmp_path, capsys, monkeypatch):
