@@ -111,7 +111,7 @@ class Run:
         return simulate(
             model.vehicle,
             model.track,
-            speed=self.speed,
+            speed=self.speed if self.settings.drive.mode == "constant" else None,
             start=self.start,
             until=self.until,
             settings=self.settings,

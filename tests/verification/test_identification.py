@@ -17,7 +17,7 @@ from railsim.identification import Identified
 from railsim.identification.fit import _at_best_shares, _covariance
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
 from railsim.identification.residuals import Form, whiteness
-from railsim.identification.runs import model_of, prepared
+from railsim.identification.runs import model_of, prepared, simulated_run
 from railsim.profiles import load_profile
 
 SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
@@ -85,7 +85,8 @@ def measured(folder, vehicle, factors=None, *, seed=1, noise=0.02, stated=True, 
         del outputs["low_pass"]
     settings = railsim.Settings.model_validate(how)
     loaded = true.vehicle.with_values({"load": load}) if load else true.vehicle
-    run = railsim.simulate(loaded, TRACK, speed=SPEED, until=LENGTH, settings=settings)
+    speed = None if drive else SPEED
+    run = railsim.simulate(loaded, TRACK, speed=speed, until=LENGTH, settings=settings)
     rng = np.random.default_rng(seed)
     columns, lines = {"t": run.time, "s": run.distance}, []
     columns["v"] = np.gradient(run.distance, run.time)
@@ -162,6 +163,17 @@ def test_the_fitted_file_extends_the_original(found, tmp_path):
         one.save_vehicle(path)
     whole = one.save_vehicle(tmp_path / "whole.toml")
     assert railsim.load_vehicle(whole) == one.fitted
+
+
+def test_a_run_that_speeds_up_is_simulated_at_its_speeds(tmp_path):
+    """Not refused for its mean speed, which is not the one at its start."""
+    rising = [[0.0, 18.0], [60.0, 19.0], [120.0, 22.0], [200.0, 23.0]]
+    run = railsim.load_measurement(measured(tmp_path, quarter(), drive=rising))
+    result = simulated_run(run, quarter())
+    v = np.gradient(result["distance"], result["time"])
+    s, speeds = np.transpose(rising)
+    inside = (result["distance"] > 20.0) & (result["distance"] < 150.0)
+    assert v[inside] == pytest.approx(np.interp(result["distance"], s, speeds)[inside], rel=0.02)
 
 
 @pytest.mark.further
