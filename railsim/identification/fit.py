@@ -17,7 +17,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, argument_error
 from railsim.files.access import make_folder
-from railsim.identification.identified import Channel, Identified, Place
+from railsim.identification.identified import AT_BOUND, Channel, Identified, Place
 from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem
 from railsim.identification.residuals import FORMS, Form, banded, whiteness
@@ -367,7 +367,7 @@ def _at_bounds(parameters: Sequence[Parameter], x: Floats) -> list[str]:
         for bound, end in zip(one.bounds, (one.low, one.high), strict=True):
             if abs(coordinate - bound) < reach and not (one.is_share and end in (0.0, 1.0)):
                 remarks.append(
-                    f"{one.name} ends at its bound of {end:g}: the best value may lie beyond it, "
+                    f"{one.name} {AT_BOUND} of {end:g}: the best value may lie beyond it, "
                     "and the intervals do not hold."
                 )
     return remarks

@@ -25,6 +25,7 @@ NORMAL = 1.959964  # of a normal distribution: 95 % within
 UNKNOWN = 0.5  # standard deviation of a combination (as a share) from which the data do not tell it
 INFINITE = 1e3  # standard deviation, end of an interval from which nothing is known
 PART = 0.25  # share of the largest part of a combination that is named
+AT_BOUND = "ends at its bound"  # of a parameter, in remarks
 NOT_WHITE = 0.01  # probability
 
 

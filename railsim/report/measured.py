@@ -13,7 +13,12 @@ from railsim.assessment.verdict import FAIL, INCOMPLETE
 from railsim.errors import input_error
 from railsim.files.access import read_bytes
 from railsim.identification import Identified
-from railsim.identification.identified import correlation_table, parameter_table, residual_table
+from railsim.identification.identified import (
+    AT_BOUND,
+    correlation_table,
+    parameter_table,
+    residual_table,
+)
 from railsim.plot import validation as plots
 from railsim.report.document import Drawing, Section, as_png, document, of_values, pictures
 
@@ -120,9 +125,12 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
     coloured = [one["channel"] for one in record["channels"] if one["white"] is False]
+    bounded = [words for words in record["remarks"] if AT_BOUND in words]
     text = "All parameters are identified; the residuals are white."
     if unidentified:
         text = "Not all parameters can be told apart."
+    elif bounded:
+        text = " ".join(bounded)
     elif coloured:
         text = f"The residuals of {', '.join(coloured)} are not white: the model lacks something."
     parameters = [parameter_table(record), correlation_table(record)]
@@ -132,7 +140,7 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
         Section("Pictures", drawings=figures),
     ]
     title = f"{record['vehicle']}: identified parameters"
-    good = not coloured and not unidentified
+    good = not (coloured or unidentified or bounded)
     return Part(title, text, good, record["remarks"], sections, IDENTIFICATION)
 
 

@@ -19,6 +19,7 @@ from railsim.identification.parameters import Model, Parameter, blended, parsed,
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import model_of, prepared, simulated_run
 from railsim.profiles import load_profile
+from railsim.report.measured import of_identification
 
 SPEED, LENGTH, RATE = 20.0, 170.0, 200.0
 PRIMARY, DAMPER = "primary.stiffness.z", "primary.damping.z"
@@ -326,6 +327,9 @@ def test_a_bound_that_keeps_the_value_out_is_said(found, low):
                            workers=1)  # fmt: skip
     assert one.factors[0] == pytest.approx(low, rel=1e-3)
     assert one.remarks[0].startswith(f"{PRIMARY} ends at its bound of {low}")
+    part = of_identification({**one.record(), "channels": []}, [])
+    assert part.verdict == one.remarks[0]  # and not "All parameters are identified"
+    assert not part.ok
     assert not one.unidentified
 
 
