@@ -30,6 +30,7 @@ from railsim.simulation.remarks import silent
 OVERSAMPLED = 5.0  # simulated values for the shortest period of the band
 MOST_SAMPLED = 25.0  # measured ones; more are low-passed and left out
 STEADY = 0.01  # change of the speed over its mean up to which it is constant
+SLOWEST = 1.0  # m/s
 FORGET = 2.0  # s, after which the start of a run is forgotten
 LEAD = 100.0  # m, that a run begins ahead, as far as the track is there
 SHORTEST = 4.0  # s
@@ -182,6 +183,7 @@ def prepared(
     """
     track = track or track_of(measurement)
     check_channels(measurement.name, measurement, model.vehicle)
+    measurement = _moving(measurement)
     high = band[1]
     if measurement.rate < 2.5 * high:
         found = f"{measurement.rate:.4g} values per second"
@@ -226,13 +228,37 @@ def prepared(
     return Prepared(run, values, names, noise, step, measurement)
 
 
+def _moving(measurement: Measurement) -> Measurement:
+    """Return a run without standstill at its ends; raises InputError: it stands in between."""
+    s = measurement.distance
+    slower = np.minimum(measurement.speed, _smooth_speed(measurement))
+    moving = s[slower >= SLOWEST]
+    part = measurement
+    if len(moving) and slower[[0, -1]].min() < SLOWEST:
+        stood = f"Stands before s = {moving[0]:.0f} m or behind {moving[-1]:.0f} m: left out."
+        begin = np.nextafter(moving[0], np.inf)  # its place is that of standstill before it
+        part = measurement.part(begin, moving[-1]).with_remarks(stood)
+    v = _smooth_speed(part)
+    k = int(np.argmin(v))
+    if v[k] < SLOWEST:
+        found = f"{max(0.0, v[k]):.2g} m/s at s = {part.distance[k]:.0f} m"
+        allowed = f"{SLOWEST:g} m/s at least; a file for what is before and one for what is behind"
+        raise input_error(measurement.name, found, allowed, key="speed")
+    return part
+
+
+def _smooth_speed(measurement: Measurement) -> Floats:
+    """Return the measured speed as mean over a second [m/s]."""
+    step = max(1, round(measurement.rate))
+    padded = np.pad(measurement.speed, (step // 2, step - 1 - step // 2), mode="edge")
+    return np.convolve(padded, np.ones(step) / step, "valid")
+
+
 def _profile(measurement: Measurement) -> Floats:
     """Return rows [s, v] of the measured speed, one for each second."""
     step = max(1, round(measurement.rate))
-    s, v = measurement.distance, measurement.speed
-    kernel = np.ones(step) / step
-    smooth = np.convolve(np.pad(v, (step // 2, step - 1 - step // 2), mode="edge"), kernel, "valid")
-    rows: Floats = np.stack([s, smooth], axis=1)[::step]
+    columns = [measurement.distance, _smooth_speed(measurement)]
+    rows: Floats = np.stack(columns, axis=1)[::step]
     return rows[np.diff(rows[:, 0], prepend=-np.inf) > 0.1]
 
 

@@ -177,6 +177,31 @@ def test_a_run_that_speeds_up_is_simulated_at_its_speeds(tmp_path):
     assert v[inside] == pytest.approx(np.interp(result["distance"], s, speeds)[inside], rel=0.02)
 
 
+def test_standstill_at_the_ends_is_left_out_and_in_between_refused(tmp_path):
+    run = railsim.load_measurement(measured(tmp_path, quarter()))
+    rows = np.r_[np.zeros(600, int), np.arange(len(run.time)), np.full(600, len(run.time) - 1)]
+
+    def standing(rows, still):
+        return replace(
+            run, time=np.arange(len(rows)) / run.rate, distance=run.distance[rows],
+            speed=np.where(still, 0.0, run.speed[rows]),
+            channels={name: x[rows] for name, x in run.channels.items()},
+        )  # fmt: skip
+
+    still = np.arange(len(rows))
+    ends = standing(rows, (still < 600) | (still >= len(rows) - 600))
+    result, own = (simulated_run(one, quarter()) for one in (ends, run))
+    assert result.status == "complete"
+    assert result.distance[-1] == pytest.approx(own.distance[-1], abs=0.1 * SPEED)
+    model = model_of(quarter(), [ends])
+    said = prepared(ends, model, (0.5, 14.0)).measurement.remarks
+    assert [words for words in said if words.startswith("Stands before s = ")]
+    middle = np.r_[np.arange(700), np.full(600, 700), np.arange(700, len(run.time))]
+    stop = standing(middle, (still[: len(middle)] >= 700) & (still[: len(middle)] < 1300))
+    with pytest.raises(railsim.InputError, match="run: speed: 0 m/s at s = 70 m; 1 m/s at least"):
+        prepared(stop, model, (0.5, 14.0))
+
+
 @pytest.mark.further
 def test_runs_of_other_speed_and_load_at_once_by_the_command(tmp_path):
     """Empty at constant speed, laden while it speeds up, with a hum that the model has not."""
