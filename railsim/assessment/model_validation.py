@@ -43,6 +43,7 @@ from railsim.result.sensors import all_sensors
 LIKE = 50.0  # 1/s, at which signs and clocks are compared
 START = 3.0  # s after the start of a run that are not compared
 UNKNOWN = 0.01  # share of a section that a gap may take
+MOST = 0.9  # of a measured run: what is compared is said below it
 ALONG = 30.0  # m
 SAME_SPEED = 0.02  # share by which the speeds of one run may differ
 RIGHT = {"sum_Y": -1, "bodyy": 1}
@@ -242,6 +243,11 @@ class _Run:
             found = f"{moved.distance[0]:.0f} to {moved.distance[-1]:.0f} m"
             allowed = f"measured between {begin:.0f} and {distance[-1]:.0f} m, as simulated"
             raise input_error(run.name, found, allowed, "distance")
+        (a, b), (c, d) = moved.distance[[0, -1]], part.distance[[0, -1]]
+        if d - c < MOST * (b - a):
+            remarks.append(
+                f"measured from {a:.0f} to {b:.0f} m, compared from {c:.0f} to {d:.0f} m"
+            )
         rising = np.concatenate([[True], np.diff(distance) > 0.0])
         row, channels = np.arange(len(part.time)), []
         for name, selection in selections.items():

@@ -229,6 +229,13 @@ def test_a_study_gives_the_result_on_the_same_track_in_the_same_load(measured, r
     assert json.loads(done.output)["verdict"] == "pass"
 
 
+def test_a_run_that_is_compared_in_part_only_is_said(measured):
+    """A simulated run up to 1000 m of 2900 m, such as on a track file that ends there."""
+    found = railsim.validate_model(measured, simulated(make.true_vehicle(), until=1000.0))
+    (said,) = [words for words in found.remarks if "compared from" in words]
+    assert said.endswith(("m, compared from 78 to 1000 m", "m, compared from 79 to 1000 m"))
+
+
 @pytest.mark.parametrize("status", ["derailed", "stopped"])
 def test_a_simulated_run_that_ended_early_does_not_pass_in_silence(
     measured, right, status, monkeypatch
