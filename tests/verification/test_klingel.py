@@ -18,6 +18,7 @@ def wavelength(slope, rolling):
     return 2.0 * np.pi * np.sqrt(RADIUS * half_base * (1.0 + RADIUS * rolling) / slope)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize("amplitude", [0.5e-3, 2e-3])
 def test_wavelength_of_a_conical_wheelset_is_klingels(amplitude):
     """L = 2 pi sqrt(r0 b0 / gamma) (Klingel 1883) with the roll of the wheelset, at 1 m/s.

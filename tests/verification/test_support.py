@@ -220,6 +220,7 @@ def test_support_that_varies_along_the_track():
     assert behind == pytest.approx(0.5 * before, rel=0.01)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize(
     ("vehicle", "speed", "support", "transient"),
     [
