@@ -22,7 +22,6 @@ from railsim.studies.summary import summary_row, unit_of
 
 DIGITS = 6  # of the values of variables, more where the range is narrow
 INPUTS = "optimise.toml"
-_END = ("smallest", "largest")
 
 Progress = Callable[[float], None]
 
@@ -244,7 +243,8 @@ def values_by_name(wanted: Optimise, designs: Sequence[Design]) -> dict[str, lis
 def _of_the_runs(one: Value) -> str:
     """Return which value over the runs of a design an objective or a constraint takes."""
     if isinstance(one, Objective):
-        return "mean" if one.over == "mean" else _END[one.goal == "minimise"]
+        return "mean" if one.over == "mean" else "largest" if one.goal == "minimise" else "smallest"
     assert isinstance(one, Constraint)
-    two_sided = one.low is not None and one.high is not None
-    return "worst of its limits" if two_sided else _END[one.low is None]
+    if one.low is not None and one.high is not None:
+        return "worst of its limits"
+    return "largest" if one.low is None else "smallest"
