@@ -2,7 +2,8 @@
 
 A clock that is written with few digits is a straight line over the number of the value, as long as
 it leaves this line by less than a quarter of a step, or by less than half a step where all steps
-are multiples of the shortest; where values are missing, the line begins anew on the same grid.
+are multiples of the shortest and one in 25 or more is twice as long (a seldom one is a value that
+was lost); where values are missing, the line begins anew on the same grid.
 Other records are interpolated linearly onto the median step.
 """
 
@@ -16,6 +17,7 @@ from railsim.errors import input_error
 JUMP = 1.5  # steps, from which on a time step is a gap
 ROUNDED = 0.25  # steps
 MOST_LOST = 50.0  # times the values that there are
+FEWEST_LONG = 0.04  # share of double steps in a clock of few digits; seldom ones are lost values
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,8 @@ def clock_of(file: str, written: Floats) -> Clock:
     line = written.mean() + first + slope * (count - count.mean())
     digits = steps / steps.min()
     if (
-        JUMP < digits.max() < 2.5
+        digits.max() < 2.5
+        and (digits > JUMP).sum() > max(2.0, FEWEST_LONG * len(steps))
         and np.abs(digits - np.round(digits)).max() < 0.01
         and np.abs(written - line).max() < 0.5 * slope  # a value that is lost leaves it by more
     ):
