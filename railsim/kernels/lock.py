@@ -1,4 +1,6 @@
-"""One process compiles a function, or builds a table: the others wait, and load what it stored."""
+"""One process compiles a function, builds a table or judges a step: the others wait, and load what
+it stored.
+"""
 
 import os
 import time
@@ -6,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-POLL = 0.1  # s between two tries, between which Ctrl-C is heard
+POLL = 0.02  # s between two tries, between which Ctrl-C is heard
 _held: set[Path] = set()
 
 

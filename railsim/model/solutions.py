@@ -19,20 +19,25 @@ import numpy as np
 
 from railsim import kernels
 from railsim.kernels.cache import own_folder, store, stored
+from railsim.kernels.lock import alone
 
 MOST_STORED = 1000
 """Solutions on disk; the older half of more goes."""
 MOST_NEW = 50
-"""Solutions of a kind that a process stores: the runs of a large study each have their own."""
+"""Solutions of a kind that a process stores, shared ones apart: the runs of a large study each have
+their own."""
 _SOURCES = ("contact", "definitions", "linear", "model", "profiles", "simulation", "track")
 _new: Counter[str] = Counter()
 
 
-def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+def solution(
+    kind: str, inputs: str, solve: Callable[[], dict[str, Any]], *, shared: bool = False
+) -> dict[str, Any]:
     """Return what was found for these inputs before, or what is found now.
 
     `kind`: what is sought; `inputs`: all that it depends on, the program apart; `solve`: finds it:
-    numbers, texts and lists of them by name. What it raises is not stored.
+    numbers, texts and lists of them by name. What it raises is not stored. `shared`: many runs of a
+    study have it in common: one process finds it, the others wait.
     """
     folder = solutions_folder(os.environ.get("RAILSIM_CACHE_DIR"))
     if folder is None:
@@ -41,14 +46,30 @@ def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dic
     path = folder / f"{key}.json"
     data = stored(path)
     if data is not None:
-        found: dict[str, Any] = json.loads(data)
+        return _read(data)
+    if not shared:
+        found = solve()
+        if _new[kind] < MOST_NEW:
+            _new[kind] += 1
+            _keep(path, found)
         return found
-    found = solve()
-    if _new[kind] < MOST_NEW:
-        _new[kind] += 1
-        _drop_old(folder)
-        store(path, json.dumps(found).encode())
+    with alone(path.with_suffix(".lock")):
+        data = stored(path)
+        if data is not None:
+            return _read(data)
+        found = solve()
+        _keep(path, found)
     return found
+
+
+def _read(data: bytes) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(data)
+    return found
+
+
+def _keep(path: Path, found: dict[str, Any]) -> None:
+    _drop_old(path.parent)
+    store(path, json.dumps(found).encode())
 
 
 @cache

@@ -124,6 +124,10 @@ def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats
         smooth = outward_quotient(passed("Y"), passed("Q"))
     elif np.isnan(result[name]).any():
         return None
+    elif name == "dQ_over_Q0" and {"Q", "Q0"} <= set(result):
+        smooth = passed("Q") / result["Q0"] - 1.0
+    elif name == "sum_Y" and "Y" in result:
+        smooth = passed("Y")[..., 0] + passed("Y")[..., 1]
     else:
         smooth = passed(name)
     return np.asarray(smooth[evaluated(result)])
@@ -243,44 +247,58 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
     begin, end = _full_curve(result, section)
     first, last = np.searchsorted(distance, begin), np.searchsorted(distance, end, "right")
     rows = slice(int(first), int(last))
-    medians: dict[str, Floats] = {}
-    scatter: dict[str, Floats] = {}
-    settling: list[Floats] = []
-    for name, array in values.items():
-        over = result.part(name, rows)
-        if len(over) < 2:
-            medians[name], scatter[name] = array, np.zeros_like(array)
-            continue
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # a wheel that never carries: NaN
-            # Y/Q is undefined for an unloaded wheel; where there is none, it takes half of the time
-            percentile = np.nanpercentile if np.isnan(over).any() else np.percentile
-            bounds = percentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
-        medians[name], scatter[name] = bounds[1], 0.5 * (bounds[2] - bounds[0])
-        settling.append(_settling(over, bounds[1]))
-    changes = np.concatenate(settling) if settling else np.zeros(0)
+    medians, scatter, changes = _over_curve(result, rows, values)
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
     found = values, tuple(largest), medians, scatter, steady, (begin, end)
     unsettled = bool(smooth and len(changes) and np.mean(changes) > 0.5)
     return MidCurve(radius, middle, time, *found, unsettled)
 
 
+def _over_curve(
+    result: Result, rows: slice, values: Mapping[str, Floats]
+) -> tuple[dict[str, Floats], dict[str, Floats], Floats]:
+    """Medians, scatter and what settles in a part of the run; with one instant those of `values`.
+
+    The quantities side by side, each component a row.
+    """
+    parts = {name: result.part(name, rows) for name in values}
+    if not parts or len(next(iter(parts.values()))) < 2:
+        return dict(values), {name: np.zeros_like(x) for name, x in values.items()}, np.zeros(0)
+    over = np.concatenate([part.reshape(len(part), -1).T for part in parts.values()])
+    wanted = DEVIATION[0], 50.0, DEVIATION[1]
+    gaps = np.isnan(over).any(axis=1)
+    bounds = np.empty((3, len(over)))
+    bounds[:, ~gaps] = np.percentile(over[~gaps], wanted, axis=1)
+    # Y/Q is undefined for an unloaded wheel; where there is none, it takes half of the time
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a wheel that never carries: NaN
+        bounds[:, gaps] = np.nanpercentile(over[gaps], wanted, axis=1)
+    deviation = 0.5 * (bounds[2] - bounds[0])
+    ends = np.cumsum([array.size for array in values.values()])[:-1]
+
+    def by_name(found: Floats) -> dict[str, Floats]:
+        each = zip(values.items(), np.split(found, ends), strict=True)
+        return {name: part.reshape(array.shape) for (name, array), part in each}
+
+    return by_name(bounds[1]), by_name(deviation), _settling(over, bounds[1])
+
+
 def _settling(values: Floats, medians: Floats) -> Floats:
-    """Which columns are in their way to steady values; not those that do not change or have gaps.
+    """Which rows are on their way to steady values; not those that do not change or have gaps.
 
     On smooth rails a vehicle in a full curve has a steady state: what changes so slowly that it
     crosses its median fewer than `CROSSINGS` times is on its way there, and so is what decays,
     by mean square distances from the last values in the two halves (a stationary vibration: 1,
     an even drift: 0.14).
     """
-    columns = values.reshape(len(values), -1)
-    varies = np.ptp(columns, axis=0) > 0.0
-    columns = columns[:, varies]
-    half, last = len(columns) // 2, columns[-max(1, len(columns) // 10) :].mean(axis=0)
-    square = (columns - last) ** 2
-    before, after = np.mean(square[:half], axis=0), np.mean(square[half:], axis=0)
-    above = columns > medians.ravel()[varies]
-    crossings = np.count_nonzero(above[1:] != above[:-1], axis=0)
+    varies = np.ptp(values, axis=1) > 0.0
+    rows, medians = values[varies], medians[varies]
+    length = rows.shape[1]
+    last = rows[:, -max(1, length // 10) :].mean(axis=1)
+    square = (rows - last[:, None]) ** 2
+    before, after = np.mean(square[:, : length // 2], axis=1), np.mean(square[:, length // 2 :], 1)
+    above = rows > medians[:, None]
+    crossings = np.count_nonzero(above[:, 1:] != above[:, :-1], axis=1)
     return np.asarray((after < SETTLES * before) | (crossings < CROSSINGS))
 
 

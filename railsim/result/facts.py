@@ -12,7 +12,7 @@ FACTS = (
 )  # fmt: skip
 
 
-OF_FACTS = frozenset({*PEAK_QUANTITIES, "time", "distance", "wheelset_distance"})
+OF_FACTS = frozenset({*PEAK_QUANTITIES, "Q0", "time", "distance", "wheelset_distance"})
 """Quantities that facts are taken from."""
 
 

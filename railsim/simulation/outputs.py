@@ -57,7 +57,8 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     Returns
     -------
     mapping of str to ndarray
-        By the names of `railsim.notation.QUANTITIES`, time first [SI].
+        By the names of `railsim.notation.QUANTITIES`, time first [SI]; those that are worked out
+        when asked for are not among them.
     """
     n = model.index.n_bodies
     state = recorder.state[:rows]
@@ -66,9 +67,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     axles = model.system.contact.body
     Q, Y = wheel[..., W_Q], wheel[..., W_Y]
     outwards = np.array([-1.0, 1.0])
-    # a wheel that carries nothing has no derailment quotient and no point of contact
-    loaded = np.where(Q > 0.0, Q, np.nan)
-    there = np.where(wheel[..., W_NORMAL] > 0.0, 1.0, np.nan)
+    loaded = np.where(Q > 0.0, Q, np.nan)  # a wheel that carries nothing has no Y/Q
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
     on_rails = against_rails(model.system, state)
     return {
@@ -87,8 +86,6 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "xi_x": wheel[..., W_XI_X],
         "xi_y": wheel[..., W_XI_Y],
         "phi": wheel[..., W_PHI],
-        "contact_y": there * wheel[..., W_C_Y],
-        "contact_z": there * wheel[..., W_C_Z],
         "T_gamma": wheel[..., W_T_GAMMA],
         "T_gamma_spin": wheel[..., W_T_GAMMA_SPIN],
         **(
@@ -103,6 +100,11 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
     }
+
+
+def _of_wheels_there(wheel: Floats, column: int) -> Floats:
+    """Column of the records of wheels, NaN where a wheel carries nothing: no point of contact."""
+    return np.where(wheel[..., W_NORMAL] > 0.0, wheel[..., column], np.nan)
 
 
 def _of_both(values: Floats) -> Floats:
@@ -333,8 +335,10 @@ class OutputPlan:
             }
         known = {**values, "speed": recorder.state[:rows, -1]}
         values |= {q.name: q.formula(known) for q in self.quantities if q.formula is not None}
-        distance = values["distance"]
+        distance, wheel = values["distance"], recorder.wheel[:rows]
         later = {
+            "contact_y": lambda: _of_wheels_there(wheel, W_C_Y),
+            "contact_z": lambda: _of_wheels_there(wheel, W_C_Z),
             "mileage": lambda: self._track_file.mileage_at(distance),
             "curvature": lambda: self._alignment.curvature(distance),
             "cant": lambda: self._alignment.cant(distance),

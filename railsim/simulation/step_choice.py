@@ -208,7 +208,7 @@ class StepChoice:
         if key not in _JUDGED:
             if len(_JUDGED) >= MOST_JUDGED:
                 _JUDGED.clear()
-            _JUDGED[key] = bool(solution("class", key, judgement)["holds"])
+            _JUDGED[key] = bool(solution("class", key, judgement, shared=True)["holds"])
         return _JUDGED[key]
 
     def _stability(

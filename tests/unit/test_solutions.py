@@ -1,6 +1,7 @@
 """Equilibria and stable steps on disk: found once, the same to the last bit, bounded."""
 
 from collections import Counter
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -87,3 +88,23 @@ def test_number_of_solutions_is_bounded(folder, monkeypatch):
         solutions.solution("test", str(number), lambda: {})
         assert len(list(folder.glob("*.json"))) <= 10
     assert solutions._new.total() == 25
+
+
+def test_shared_solution_is_found_by_one_process_while_others_wait(folder, monkeypatch):
+    @contextmanager
+    def waits(path):
+        """As if another process had found it and stored it meanwhile."""
+        cache.store(path.with_suffix(".json"), b'{"holds": true}')
+        yield
+
+    monkeypatch.setattr(solutions, "alone", waits)
+    found = solutions.solution("class", "inputs", lambda: pytest.fail("again"), shared=True)
+    assert found == {"holds": True}
+
+
+def test_all_shared_solutions_are_stored(folder, monkeypatch):
+    monkeypatch.setattr(solutions, "MOST_NEW", 2)
+    for number in range(5):
+        solutions.solution("class", str(number), lambda: {"holds": True}, shared=True)
+    assert len(list(folder.glob("*.json"))) == 5
+    assert not list(folder.glob("*.lock"))
