@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from railsim.constants import GRAVITY
+from railsim.constants import STANDARD_GRAVITY
 from railsim.definitions.base import (
     EMPTY_TABLE,
     Definition,
@@ -34,7 +34,7 @@ UNITS = {
     **{si: (si, 1.0) for si, _ in SHOWN_UNITS.values()},
     **{unit: (unit, 1.0) for unit in ("s", "m/s2", "rad/s", "rad/s2", "W")},
     "ms": ("s", 1e-3),
-    "g": ("m/s2", GRAVITY),
+    "g": ("m/s2", STANDARD_GRAVITY),
     "mm/s2": ("m/s2", 1e-3),
     "mm/s": ("m/s", 1e-3),
     "um": ("m", 1e-6),

@@ -241,7 +241,7 @@ def _mounted(
 
     A sensor turned by the small angles p reads f' = f - p x f in its own axes, f = a - g; so
     f' + p x f' is what it would read along those of the body.  Axes that are not measured count
-    as zero acceleration.
+    as zero acceleration; of gravity a high pass leaves nothing.
     """
     found = dict(values)
     for point, angles in how.mounting.items():
@@ -256,11 +256,13 @@ def _mounted(
             raise input_error(how.name, "no channel there", allowed, key=f"mounting.{point}")
         still = np.zeros(len(next(iter(values.values()))))
         read = [values[names[axis]] if axis in names else still for axis in "xyz"]
-        read[2] = read[2] - GRAVITY  # what is taken out of the reading at rest
         turned = np.cross(np.array(angles), np.stack(read, axis=-1))
+        # what is taken out of the reading at rest
+        at_rest = np.cross(np.array(angles), np.array([0.0, 0.0, -GRAVITY]))
         for k, axis in enumerate("xyz"):
             if axis in names:
-                found[names[axis]] = values[names[axis]] + turned[:, k]
+                constant = 0.0 if how.channels[names[axis]].high_pass else at_rest[k]
+                found[names[axis]] = values[names[axis]] + turned[:, k] + constant
         if missing := [axis for axis in "xyz" if axis not in names]:
             remarks.append(f"{point}: {', '.join(missing)} is not measured, taken as zero.")
     return found

@@ -34,7 +34,7 @@ LOAD = 60e3 + 5e3 * np.cos(2 * np.pi * 3.0 * t)  # N
 
 def written(folder: Path, *, cell=lambda row, name, text: text, delimiter=",", text=CHANNELS):
     """Write a CSV and its measurement file; `cell` may spoil cells."""
-    columns = {"t": t, "box": -BOX / 9.81, "load": LOAD / 1e3 + 1.5}
+    columns = {"t": t, "box": -BOX / 9.80665, "load": LOAD / 1e3 + 1.5}
     lines = [delimiter.join(columns)]
     for k in range(COUNT):
         cells = [cell(k, name, f"{column[k]:.9f}") for name, column in columns.items()]
@@ -58,9 +58,9 @@ def test_units_signs_and_offsets(tmp_path, delimiter):
 def test_binary_files_give_what_csv_gives(tmp_path):
     path = written(tmp_path)
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["t"], file["box"] = t, np.stack([BOX, -BOX / 9.81], axis=1)
+        file["t"], file["box"] = t, np.stack([BOX, -BOX / 9.80665], axis=1)
         file["load"] = (LOAD / 1e3 + 1.5)[None]
-    savemat(tmp_path / "a.mat", {"t": t, "box": -BOX[:, None] / 9.81, "load": LOAD / 1e3 + 1.5})
+    savemat(tmp_path / "a.mat", {"t": t, "box": -BOX[:, None] / 9.80665, "load": LOAD / 1e3 + 1.5})
     for name, index in (("a.h5", "[1]"), ("a.mat", "[]")):
         overrides = [f"file={tmp_path / name}", f"channels.box.index={index}"]
         run = railsim.load_measurement(path, overrides)
@@ -71,7 +71,7 @@ def test_binary_files_give_what_csv_gives(tmp_path):
 def test_parquet_in_pieces(tmp_path):
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
-    frame = pandas.DataFrame({"t": t, "box": -BOX / 9.81, "load": LOAD / 1e3 + 1.5, "note": "x"})
+    frame = pandas.DataFrame({"t": t, "box": -BOX / 9.80665, "load": LOAD / 1e3 + 1.5, "note": "x"})
     frame.loc[10, "box"] = None
     path = written(tmp_path)
     frame.to_parquet(tmp_path / "a.parquet", row_group_size=700)
@@ -174,16 +174,17 @@ def test_a_clock_0_3_per_cent_off_is_said_beside_distance_and_speed():
         assert all(w in s for w, s in zip(words, said, strict=True))
 
 
-def test_mounting_takes_gravity_back(tmp_path):
-    """A floor sensor rolled by 20 mrad reads -g p in y and turns the z motion into it."""
+@pytest.mark.parametrize(("gravity", "high_pass"), [(9.81, ""), (0.0, ", high_pass = 0.2")])
+def test_mounting_takes_gravity_back(tmp_path, gravity, high_pass):
+    """A floor sensor rolled by 20 mrad reads -g p in y, which a high pass keeps back, and z."""
     p = 0.02
     z, y = BOX, 0.3 * np.ones(COUNT)
-    read_y, read_z = y + p * (z - 9.81), z - p * y
+    read_y, read_z = y + p * (z - gravity), z - p * y
     rows = [f"{a:.9f},{b:.9f}" for a, b in zip(read_y, read_z, strict=True)]
     (tmp_path / "a.csv").write_text("\n".join(["y,z", *rows]))
     (tmp_path / "m.toml").write_text(
         HEAD + 'file = "a.csv"\nrate = 500.0\nmounting = { floor_front = [0.02, 0.0, 0.0] }\n'
-        '[channels]\ny = { quantity = "sensor_acceleration:floor_front:y" }\n'
+        f'[channels]\ny = {{ quantity = "sensor_acceleration:floor_front:y"{high_pass} }}\n'
         'z = { quantity = "sensor_acceleration:floor_front:z" }\n'
     )
     run = railsim.load_measurement(tmp_path / "m.toml")
@@ -397,7 +398,7 @@ def test_a_mileage_against_that_of_the_track_is_said(tmp_path):
 def test_an_array_of_matlab_7_3_is_that_of_the_older_format(tmp_path):
     """MATLAB's files of version 7.3 are HDF5 with the dimensions in the opposite order."""
     path = written(tmp_path)
-    columns = {"t": t[:, None], "box": np.stack([BOX, -BOX / 9.81, t], axis=1)}
+    columns = {"t": t[:, None], "box": np.stack([BOX, -BOX / 9.80665, t], axis=1)}
     columns["load"] = (LOAD / 1e3 + 1.5)[:, None]
     with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         for name, x in columns.items():
@@ -431,7 +432,7 @@ def test_single_precision_has_the_same_gaps_as_text(tmp_path):
         tmp_path, cell=lambda row, name, text: f"{load[row]:.9f}" if name == "load" else text
     )
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["t"], file["box"], file["load"] = t, -BOX / 9.81, load.astype(np.float32)
+        file["t"], file["box"], file["load"] = t, -BOX / 9.80665, load.astype(np.float32)
     how = ["missing=[-999.9]", "channels.load.range=[-5.0, 9.99]"]
     text, single = (
         railsim.load_measurement(path, [f"file={tmp_path / name}", *how])
@@ -452,7 +453,7 @@ def test_a_clock_in_ms_and_a_distance_in_km_taken_for_si_are_refused(
     """No speed is measured: only distance over time says that a unit is wrong."""
     text = CHANNELS + ("" if distance is None else 's = { quantity = "distance" }\n')
     path = written(tmp_path, text=text)
-    columns = [time * t, -BOX / 9.81, LOAD / 1e3 + 1.5]
+    columns = [time * t, -BOX / 9.80665, LOAD / 1e3 + 1.5]
     names = ["t", "box", "load"]
     if distance is not None:
         columns, names = [*columns, distance * 50.0 * t], [*names, "s"]
