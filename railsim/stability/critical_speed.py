@@ -47,6 +47,8 @@ SHARE = 0.75  # ... this share of them
 # Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
 # what is left to the end of hunting; the range may be narrow.
 ONWARDS, ABOVE = (0.5, 0.1), 0.1
+# damping of friction that slides, at least: with stuck friction sways of shipped wagons have -0.022
+SLIDING = 0.03
 AGAIN = 1.25  # ratio of speeds at which is looked whether rest is stable again
 AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
 OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
@@ -186,9 +188,16 @@ def _checked(
 
 
 def _hunts(prepared: LinearVehicle) -> Callable[[Eigenmodes], bool]:
-    """Whether a mode is hunting."""
+    """Whether a mode is hunting: by its name, or as it grows by more than sliding would damp.
+
+    Well above the critical speed the body moves with the bogies, and the mode is called after it.
+    """
     parts = parts_of(prepared.model, prepared.coordinates)
-    return lambda mode: mode_name(parts, mode).endswith("hunting")
+
+    def hunts(mode: Eigenmodes) -> bool:
+        return mode.damping_ratios[0] < -SLIDING or mode_name(parts, mode).endswith("hunting")
+
+    return hunts
 
 
 def _loss_of_hunting(
@@ -196,8 +205,8 @@ def _loss_of_hunting(
 ) -> LossOfStability:
     """Where steady rolling loses its stability; of vehicles whose friction sticks to hunting only.
 
-    Friction that sticks damps nothing: the sway of such a vehicle is undamped at speeds at which
-    friction, once it slides, damps it.
+    Friction that sticks damps nothing: the sway of such a vehicle is slightly undamped at speeds at
+    which friction, once it slides, damps it.
     """
     counts = _hunts(prepared) if prepared.sticking else None
     return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
@@ -221,8 +230,9 @@ def _linear(
     lost, stuck = _loss_of_hunting(prepared, low, high), None
     if prepared.sticking:
         other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
-        if (other.parameter is not None and other.parameter != lost.parameter) or other.already:
-            mode = other.modes[0]
+        mode = other.modes[0]
+        begins = other.parameter is not None and other.parameter != lost.parameter
+        if (begins or other.already) and not _hunts(prepared)(mode):
             stuck = float(mode.linearisation.parameter)
             found.remarks.append(
                 f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
@@ -249,7 +259,7 @@ def _stable_again(prepared: LinearVehicle, lost: float, high: float) -> list[str
     """Remark where rest is stable above the speed at which it is not: the sway of a body hunts."""
     speed = lost
     while (speed := AGAIN * speed) < high:
-        above = _loss_of_hunting(prepared, speed, high)
+        above = loss_of_stability(prepared.linearised, speed, high)  # all modes count
         if not above.already:
             to = high if above.parameter is None else above.parameter
             return [

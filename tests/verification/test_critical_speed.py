@@ -421,3 +421,22 @@ def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest
     assert len(found) == 4
     assert np.array_equal(found[:, :LEARNT], before[:, :LEARNT])
     assert np.array_equal(found[:, LEARNT:], known[:, LEARNT:])
+
+
+def test_rest_is_not_called_stable_where_hunting_is_named_after_the_body():
+    """The empty wagon at 90 m/s: the car body yaws with its bogies, damping -22 %.
+
+    A run from 10 nm reaches the flanges within two seconds.
+    """
+    wagon = load_vehicle("wagon_y25")
+    found = critical_speed(wagon, methods=("linear",), over_amplitude=False)
+    assert found.linear.speed == pytest.approx(32.3, abs=0.2)
+    assert not [words for words in found.remarks if "no longer" in words]
+    above = critical_speed(wagon, low=80.0, methods=("linear",), over_amplitude=False)
+    assert above.unstable_at_low
+    assert not [words for words in above.remarks if "not count" in words]
+    settings = railsim.Settings(initial={"front.outer.wheelset": {"y": 1e-8}})
+    run = railsim.simulate(
+        wagon, railsim.load_track("straight"), speed=90.0, duration=2.0, settings=settings
+    )
+    assert np.abs(run["wheelset_lateral"]).max() > 5e-3
