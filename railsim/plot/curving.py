@@ -44,7 +44,7 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     _steering(axes[1, 1], found, order)
     for one in axes.flat:
         if not found.converged.any():
-            say(one, "no steady state at any point")
+            say(one, "leaves the track at every point")
         one.set_xlabel("radius (m)")
         if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
             one.set_xscale("log")
@@ -105,7 +105,7 @@ def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: st
             label = f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm"
             colour, line = distinct(m), styles[i % len(styles)]
             axes.plot(radius, shown, ls=line, color=colour, marker=".", ms=4, label=label)
-            timed = found.converged[:, i, m][order] == 2
+            timed = found.converged[:, i, m][order] > 1
             how = "by time integration" if timed.any() else None
             axes.plot(radius[timed], shown[timed], "o", color=colour, ms=6, mfc="none", label=how)
     axes.set_title(words)
@@ -115,7 +115,7 @@ def _plan(axes: Axes, found: Curving) -> None:
     """Wheelsets on the unrolled track in the tightest curve, seen from above."""
     there = found.converged[:, 0, 0] > 0
     if not there.any():
-        say(axes, "no steady state at any radius for the first deficiency and friction")
+        say(axes, "leaves the track at every radius with the first deficiency and friction")
         return
     r = int(np.argmin(np.where(there, np.abs(found.radius), np.inf)))
     x = np.array(found.wheelset_position)

@@ -1,8 +1,10 @@
 """Quasi-static curving over radius, cant deficiency and friction.
 
 Each point is steady rolling on a circle by Newton's method (`railsim.linear.steady`), led from the
-neighbouring point.  Where that fails the vehicle runs on the circle in time until it is still;
-such points are marked, and those where it does not come to rest or leaves the track too.
+neighbouring point.  Where that fails, and with friction elements, which hold what the way leaves in
+them, the vehicle runs through a transition into the circle and on until it is still; such points
+are marked, and those where it leaves the track too.  Where it does not come to rest, values are
+means over time.
 
     V^2 = g R (h + I)/1.5 m        speed from radius R, cant h and cant deficiency I
 """
@@ -23,9 +25,8 @@ from railsim.errors import Faults, ModelError
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.state import ARC_LENGTH
-from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
-from railsim.kernels.time_loop import FAST, Chunk, time_loop
+from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import POSITION, circle, left_out, placed
 from railsim.linear.coordinates import coordinates
 from railsim.linear.modes import SPEED_RANGE
@@ -34,19 +35,23 @@ from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
 from railsim.model.assembly import assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
-from railsim.model.time_step import Stability, empty_recorder
-from railsim.model.work import CONSTANT_SPEED, against_rails, without_loads, work_arrays
+from railsim.model.time_step import Stability
+from railsim.model.work import CONSTANT_SPEED, against_rails, without_loads
 from railsim.notation import ROLL, YAW
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
+from railsim.simulation.auxiliary_track import advance, curve_to_settle_in
+from railsim.simulation.run_in import TIMES
 from railsim.table import Column, Table
 from railsim.track.tables import track_tables
 
 Progress = Callable[[float], None]
 
 SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m
-FAILED, NEWTON, TIME = range(3)
+FAILED, NEWTON, TIME, MEAN = range(4)
 SETTLING = 60.0  # s, longest time integration of a point
+SAMPLED, SAMPLES = 20.0, 400  # s, over which means are taken, and number of instants
+INTERVAL = 5e-3  # s, which steps divide
 COLUMNS = (
     Column("radius", unit="m", format="g"),
     Column("cant_deficiency", "I", "mm", "g"),
@@ -60,7 +65,7 @@ COLUMNS = (
     Column("T_gamma", unit="N", format=".0f"),
     Column("found", " "),
 )
-METHODS = ("no steady state", "", "by time integration")
+METHODS = ("leaves the track", "", "by time integration", "mean: does not come to rest")
 STILL = 1e-4  # share of the wheel loads by which forces still change after a second
 
 
@@ -71,8 +76,8 @@ class Curving(Plottable):
     - `radius`, `cant_deficiency`, `friction`: the grid [m], [m], [1]
     - `cant`: [m]
     - `speed`: [m/s]
-    - `converged`: 1 by Newton's method, 2 by time integration, 0 where there is no steady state;
-      values are NaN there
+    - `converged`: 1 by Newton's method, 2 by time integration, 3 by means of a motion that does not
+      come to rest, 0 where the vehicle leaves the track; values are NaN there
     - `Q`, `Y`, `Y_over_Q`, `dQ_over_Q0`, `T_gamma`, `contact_y`: see `railsim.notation`;
       `contact_y` is the lateral position of the most loaded patch [m]
     - `lateral`, `attack`: lateral displacement [m] and angle of attack, the yaw against the radial
@@ -277,7 +282,7 @@ def _speed(radius: float, cant: float, deficiency: float) -> float:
     return curve_speed(radius, cant + deficiency) or math.nan
 
 
-Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
+Point = tuple[SteadyRolling, list[Floats], int]  # solver, states to be averaged, how found
 
 
 class _Search:
@@ -298,10 +303,11 @@ class _Search:
         self.model = balance.model
         self.Q0 = balance.Q0
         self.remarks = balance.remarks
-        if pads := int(np.count_nonzero(self.model.system.internal.kind == PAD)):
+        self.pads = int(np.count_nonzero(self.model.system.internal.kind == PAD))
+        if self.pads:
             self.remarks += (
-                f"{pads} friction elements hold nothing: what the way into the curve leaves in "
-                "them, up to their limits, is left out",
+                f"{self.pads} friction elements hold what a transition of {TIMES[0]:g} s leaves in "
+                "them",
             )
         self.remarks += left_out(vehicle, track, settings, assembled)
         self.parts = parts_of(self.model, coordinates(self.model))
@@ -319,7 +325,7 @@ class _Search:
         """Steady state at one point of the grid."""
         speed = _speed(radius, self.cant, deficiency)
         goal = np.array([1.0 / radius, math.copysign(self.cant, radius), speed**2, friction])
-        for values, start in (self._last, self._rest):
+        for values, start in () if self.pads else (self._last, self._rest):
             if values[0] * radius < 0.0:
                 continue
 
@@ -330,38 +336,58 @@ class _Search:
             with suppress(NotConverged):
                 found, solver = led(self.model, along, start, smallest=1.0 / 16.0)
                 self._last = goal, found
-                return solver, found, NEWTON
-        system = self._system(goal[0], goal[1], friction)
-        return self._in_time(system, speed, self._system(0.0, 0.0, friction))
+                return solver, [found], NEWTON
+        return self._in_time(goal, speed)
 
-    def _in_time(self, system: System, speed: float, straight: System) -> Point:
-        """Run on the circle until nothing changes; failed where it does not come to that."""
-        solver = SteadyRolling(self.model, system)
-        state = self._last[1].copy()
-        state[-3:] = 0.0, POSITION, speed
+    def _in_time(self, goal: Floats, speed: float) -> Point:
+        """Run into the circle and on until nothing changes, else for means over time."""
+        curvature, cant, _, friction = goal.tolist()
+        solver = SteadyRolling(self.model, self._system(curvature, cant, friction))
+        straight = self._system(0.0, 0.0, friction)
+        rolling = SteadyRolling(self.model, straight).prepared(self._rest[1], speed)
         try:
-            state = solver.prepared(state, speed)
-            rolling = solver.prepared(self._rest[1], speed)
-            # the curve itself is where the run settles: judged with the state that Newton left
-            judged = Stability(self.model, straight, rolling, "fast", lambda _: [(system, state)])
-            step = judged.choose(5e-3)
-        except ModelError:
-            return solver, state, FAILED
-        work, derivative = work_arrays(system), np.zeros_like(state)
-        stages, recorder = np.zeros((3, len(state))), empty_recorder(self.model, 1)
-        arrays = work, state, derivative, stages, recorder
-        before = np.zeros_like(self.Q0)
-        for second in range(int(SETTLING)):
-            state[ARC_LENGTH] = POSITION
-            chunk = Chunk(1, round(1.0 / step), 1 << 40, fresh=int(second == 0))
-            status, *_ = time_loop(system, *arrays, FAST, step, chunk)
-            if status != RUNNING:
-                return solver, state, FAILED
-            now = work.wheel[:, :, W_Y].copy()
-            if np.max(np.abs(now - before)) < STILL * np.max(self.Q0):
-                return solver, state, TIME
-            before = now
-        return solver, state, FAILED
+            stable = Stability(self.model, straight, rolling, "fast", lambda _: ())
+            step = 0.5 * stable.choose(INTERVAL)  # half of it in flange contact
+            state = self._into(goal, speed, straight, rolling, step)
+            before = np.zeros_like(self.Q0)
+            for _ in range(int(SETTLING)):
+                state[ARC_LENGTH] = POSITION
+                self._advance(solver.system, state, step, 1.0)
+                solver.evaluate(state)
+                now = solver.work.wheel[:, :, W_Y].copy()
+                if np.max(np.abs(now - before)) < STILL * np.max(self.Q0):
+                    return solver, [state], TIME
+                before = now
+            states = []
+            for _ in range(SAMPLES):
+                state[ARC_LENGTH] = POSITION
+                self._advance(solver.system, state, step, SAMPLED / SAMPLES)
+                states.append(state.copy())
+            return solver, states, MEAN
+        except ModelError:  # no stable step, or it leaves the track
+            return solver, [], FAILED
+
+    def _advance(self, system: System, state: Floats, step: float, time: float) -> None:
+        """Advance a state; raises ModelError: the vehicle leaves the track."""
+        if advance(self.model, system, state, step, round(time / step), FAST):
+            raise ModelError("the vehicle leaves the track")
+
+    def _into(
+        self, goal: Floats, speed: float, straight: System, rolling: Floats, step: float
+    ) -> Floats:
+        """State of the vehicle that has come into the curve from straight track.
+
+        Raises ModelError: it leaves the track.
+        """
+        left, right = (goal[-1] * self.shares).tolist()
+        curvature, cant = goal[:2].tolist()
+        to = curvature, cant, (left, right), TIMES
+        way = curve_to_settle_in(self.model, self.track, speed, *to)
+        state = rolling.copy()
+        state[-3:] = 0.0, 0.0, speed
+        system = straight._replace(track=track_tables(way))
+        self._advance(system, state, step, way.length / speed - step)
+        return state
 
     def empty(
         self, radius: Sequence[float], deficiency: Sequence[float], friction: Sequence[float]
@@ -394,26 +420,34 @@ class _Search:
 
     def fill(self, found: Curving, index: tuple[int, int, int], point: Point) -> None:
         """Put the values of a point into the result; none where it failed."""
-        solver, state, how = point
+        solver, states, how = point
         found.converged[index] = how
-        if how == FAILED:
-            return
+        if how != FAILED:
+            values = [self._values(solver, state) for state in states]
+            for name in values[0]:
+                getattr(found, name)[index] = np.mean([each[name] for each in values], axis=0)
+
+    def _values(self, solver: SteadyRolling, state: Floats) -> dict[str, Any]:
+        """The values of `Curving` in one state."""
         solver.evaluate(state)
         wheelsets, frames = np.array(self.parts.wheelsets), list(self.parts.frames)
-        wheel = solver.work.wheel
+        wheel = solver.work.wheel.copy()
         Q, Y = wheel[:, :, W_Q], wheel[:, :, W_Y]
-        found.Q[index], found.Y[index] = Q, Y
         with np.errstate(divide="ignore", invalid="ignore"):
-            found.Y_over_Q[index] = Y / Q * np.array([-1.0, 1.0])
-        found.dQ_over_Q0[index] = (Q - self.Q0) / self.Q0
-        found.T_gamma[index] = wheel[:, :, W_T_GAMMA]
-        found.contact_y[index] = _contact_positions(solver, len(wheelsets))
-        found.lateral[index] = against_rails(self.model.system, state[None])[0, :, 0]
-        found.attack[index] = state[6 * wheelsets + YAW]
-        found.sum_Y[index] = Y.sum(axis=1)
-        found.steering[index] = state[[6 * b + YAW for b in frames]]
-        if self.parts.cars:
-            found.car_roll[index] = state[6 * self.parts.cars[0] + ROLL]
+            quotient = Y / Q * np.array([-1.0, 1.0])
+        return {
+            "Q": Q,
+            "Y": Y,
+            "Y_over_Q": quotient,
+            "dQ_over_Q0": (Q - self.Q0) / self.Q0,
+            "T_gamma": wheel[:, :, W_T_GAMMA],
+            "contact_y": _contact_positions(solver, len(wheelsets)),
+            "lateral": against_rails(self.model.system, state[None])[0, :, 0],
+            "attack": state[6 * wheelsets + YAW],
+            "sum_Y": Y.sum(axis=1),
+            "steering": state[[6 * b + YAW for b in frames]],
+            "car_roll": state[6 * self.parts.cars[0] + ROLL] if self.parts.cars else np.nan,
+        }
 
 
 def _contact_positions(solver: SteadyRolling, wheelsets: int) -> Floats:

@@ -151,7 +151,7 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Ou
         settings=case.settings,
     )
     if found.converged.item() == FAILED:
-        raise ModelError(f"no steady state on a radius of {analysis.radius:g} m")
+        raise ModelError(f"the vehicle leaves the track on a radius of {analysis.radius:g} m")
     numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in LARGEST}
     numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards: no derailment
     numbers["sum_abs_Y"] = float(np.max(np.abs(found.Y).sum(axis=-1)))

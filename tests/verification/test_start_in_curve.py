@@ -14,6 +14,7 @@ from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import work_arrays
 from railsim.simulation import run_in
+from railsim.stability import curving as stability_curving
 
 STEADY = Settings(start_state="steady")
 SPEED = 20.0
@@ -109,18 +110,49 @@ def test_friction_elements_need_their_run_in(monkeypatch):
     ]
 
 
-def test_curving_without_the_forces_of_friction_elements_says_so():
-    """Newton's method knows no way into the curve."""
-    found = railsim.curving(test_vehicle("two_axle_wagon"), radius=[600.0, -600.0])
-    assert any("friction elements hold nothing" in remark for remark in found.remarks)
-    # the table of the two is of the outer wheel on either hand
+def test_curving_has_what_the_way_leaves_in_friction_elements():
+    """Mean values of a run of 30 s in the curve; without these forces Y would be 3.5 kN, not 9.4.
+
+    The table of the two curves is of the outer wheel on either hand.
+    """
+    wagon, radius, cant = load_vehicle("wagon_y25"), 300.0, 0.1
+    found = railsim.curving(wagon, radius=[radius, -radius], cant=cant, cant_deficiency=[0.1])
+    assert any("friction elements hold" in remark for remark in found.remarks)
     right, left = found.table().records()
     for name in ("Q", "Y_over_Q", "T_gamma"):
-        assert left[name] == pytest.approx(right[name], rel=1e-6)
+        assert left[name] == pytest.approx(right[name], rel=1e-3)
     for name in ("Y", "lateral", "attack"):
-        assert left[name] == pytest.approx(-right[name], rel=1e-6)
-    assert right["Y"] < 0.0
+        assert left[name] == pytest.approx(-right[name], rel=1e-3)
     assert right["Y_over_Q"] == pytest.approx(-right["Y"] / right["Q"])
+    track = railsim.load_track("straight").replace(
+        plan=[
+            {"type": "STR", "length": 30.0},
+            {"type": "CLO", "length": 80.0},
+            {"type": "CIR", "length": 650.0, "radius": radius},
+        ],
+        cant=[
+            {"type": "CST", "length": 30.0, "cant": 0.0},
+            {"type": "LIR", "length": 80.0},
+            {"type": "CST", "length": 650.0, "cant": cant},
+        ],
+    )
+    run = railsim.simulate(wagon, track, speed=float(found.speed[0, 0]), until=720.0)
+    still = run["distance"] > 600.0
+    for name, values in (("Q", found.Q), ("Y", found.Y), ("T_gamma", found.T_gamma)):
+        size = np.abs(values[0, 0, 0]).max()
+        assert run[name][still].mean(axis=0) == pytest.approx(values[0, 0, 0], abs=0.03 * size)
+
+
+def test_mean_of_a_vehicle_that_does_not_come_to_rest_in_a_curve(monkeypatch):
+    """The sway of the two-axle wagon at 20 m/s lasts: all wheels hold what the cant does not."""
+    monkeypatch.setattr(stability_curving, "SETTLING", 5.0)
+    wagon, radius, cant = load_vehicle("wagon_uic_link"), 600.0, 0.1
+    found = railsim.curving(wagon, radius=[radius], cant=cant, cant_deficiency=[0.05])
+    assert found.converged.item() == stability_curving.MEAN
+    square, phi = float(found.speed[0, 0]) ** 2, np.arcsin(cant / 1.5)
+    beyond = square / radius * np.cos(phi) / 9.81 - np.sin(phi)
+    weight = railsim.static_loads(wagon).Q0.sum()
+    assert -found.sum_Y.sum() == pytest.approx(beyond * weight, rel=0.02)
 
 
 @pytest.mark.parametrize("start", ["run-in", "steady"])

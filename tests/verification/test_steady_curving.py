@@ -87,7 +87,7 @@ def test_positions_in_a_curve_are_those_of_the_steady_state():
     point = search.point(500.0, 0.03, 0.3)
     found = search.empty([500.0], [0.03], [0.3])
     search.fill(found, (0, 0, 0), point)
-    _, state, how = point
+    _, (state,), how = point
     index = search.model.index
     assert how == found.converged[0, 0, 0] == 1
 
