@@ -7,6 +7,7 @@ import pytest
 
 import railsim
 from railsim.errors import InputError
+from railsim.simulation import advance, stepping
 
 STEP = 1.0 / 600.0
 ACTUATOR = {
@@ -57,6 +58,20 @@ def test_the_bits_of_simulate(coach, track, dt):
     assert [n for n in peaks if not np.array_equal(peaks[n], others[n], equal_nan=True)] == []
     assert stepped.status == "complete"
     assert stepped.attributes["steps"] == whole.attributes["steps"]
+
+
+@pytest.mark.parametrize("dt", [3 * STEP, 5 * STEP, 11 * STEP])
+def test_the_bits_of_simulate_where_the_recorder_is_full_between_two_outputs(
+    coach, track, dt, monkeypatch
+):
+    way = {"speed": 20.0, "until": 4.0, "settings": DISTURBED}
+    whole = railsim.simulate(coach, track, **way)
+    for module in (advance, stepping):
+        monkeypatch.setattr(module, "ROWS", 4)
+    with railsim.Simulation(coach, track, **way) as sim:
+        while sim.step(dt):
+            pass
+        assert equal(whole, sim.result()) == []
 
 
 @pytest.mark.parametrize(
