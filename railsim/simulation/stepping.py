@@ -305,13 +305,11 @@ class Simulation:
         if steps:
             self._missing = 0.0
             self._phase = (self._phase + steps) % self._every
+            self._convoy.due = self._phase == 0
             if self._phase == 0:
-                self._convoy.due = True
                 self._convoy.begin_evaluation()
-                if self._rows >= ROWS:
-                    self._flush()
-            else:
-                self._convoy.due = False
+            if self._rows >= ROWS:
+                self._flush()
 
     def _call(self, length: float, first: int, steps: int, every: int) -> int:
         """Call the time loop; the number of steps that it has taken."""
