@@ -394,6 +394,12 @@ def _tolerance_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
 def spring_remarks(suspension: TrailingArmSuspension) -> list[Remark]:
     """What is allowed in a spring file but unusual."""
     remarks = []
+    if suspension.search is not None:
+        unlimited = "missing: the search does not limit the stress"
+        if suspension.material.tau_allowable is None:
+            remarks.append(Remark("material.tau_allowable", f"{unlimited} of the solid springs"))
+        if suspension.fatigue is None:
+            remarks.append(Remark("fatigue", f"{unlimited} in service"))
     for name, spring in suspension.springs.items():
         wire = spring.wire_diameter
         if wire is not None and not 3.0 <= (index := spring.mean_diameter / wire) <= 12.0:

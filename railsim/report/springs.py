@@ -125,7 +125,7 @@ def figures(results: Collected) -> dict[str, Figure]:
     if results.ride_heights is not None:
         tare = suspension.fatigue.tare if suspension.fatigue is not None else None
         made["ride_height"] = plots.ride_height_figure(results.ride_heights, tare)
-    if results.search is not None:
+    if results.search is not None and results.fatigue is not None:
         made["search"] = plots.search_figure(results.search)
     return made
 

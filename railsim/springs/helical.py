@@ -96,7 +96,8 @@ def beam_stiffnesses(
     remainder = _tangent_remainder(y)
     shear = (1.0 + y * remainder) * Hs / S
     bending = (1.0 + load_ratio) * Hs**3 * remainder / (4.0 * B)
-    C_q = 1.0 / (shear + bending)
+    with np.errstate(divide="ignore"):  # a pole, far beyond buckling
+        C_q = 1.0 / (shear + bending)
     return C_q, C_q * (B / S + (1.0 + load_ratio) * Hs**2 * _cotangent_remainder(4.0 * y))
 
 

@@ -15,6 +15,7 @@ Every limit is a slack, relative and positive when it is kept (`LIMITS` says wha
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.optimize import linprog
@@ -163,12 +164,11 @@ class _Optimum:
 
 
 def _merit(task: Task, found: Evaluation) -> Floats:
-    """The aim, to be made small; a limit broken by one percent costs ten percent."""
+    """The aim, to be made small, and the worst violation, which no small mass may outweigh."""
     slack = np.array(list(found.slack.values()))
-    violation = -np.sum(np.minimum(np.nan_to_num(slack, nan=-1.0), 0.0), axis=0)
-    aim = np.max(_aims(task, found), axis=0)
-    merit: Floats = np.nan_to_num(aim * (1.0 + 10.0 * violation), nan=np.inf)
-    return merit
+    violation = np.maximum(0.0, -np.min(np.nan_to_num(slack, nan=-1.0), axis=0))
+    merit: Floats = np.max(_aims(task, found), axis=0) + 3.0 * violation
+    return np.nan_to_num(merit, nan=np.inf)
 
 
 def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions, Floats]:
@@ -288,15 +288,22 @@ def _aims(task: Task, found: Evaluation) -> list[Floats]:
 
 
 def _built(task: Task, found: _Optimum) -> Nest | None:
-    """The best rounding of an optimum that keeps every limit, None where none does."""
+    """The best rounding near an optimum that keeps every limit, None where none does."""
     if found.worst < _NEARLY:
         return None
-    optimum = found.dimensions
+    nest, best, at = None, np.inf, np.array([*found.dimensions.D[:, 0], *found.dimensions.H0])
+    while (nearby := _rounded(task, found, at)) is not None and nearby[0] < best:
+        best, nest = nearby
+        at = np.array([nest.outer.mean_diameter, nest.inner.mean_diameter, nest.outer.free_height])
+    return nest
+
+
+def _rounded(task: Task, found: _Optimum, around: Floats) -> tuple[float, Nest] | None:
+    """The best nest of whole steps around (D_outer, D_inner, H0), with its merit."""
     step, coil_step = task.limits.diameter_step, task.limits.coil_step
-    sizes = (*optimum.D, optimum.H0)
-    axes = [[np.floor(v[0] / step) * step + k * step for k in (-1, 0, 1, 2)] for v in sizes]
-    *D, H0 = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
-    rounded = Dimensions(np.repeat(optimum.d, len(H0), axis=1), np.stack(D), H0)
+    near = np.array(list(product((-1, 0, 1, 2), repeat=3))).T
+    *D, H0 = (np.floor(around / step + 1e-6)[:, None] + near) * step
+    rounded = Dimensions(np.repeat(found.dimensions.d, len(H0), axis=1), np.stack(D), H0)
     exact = evaluate(task, rounded).n
     x = Dimensions(*(np.repeat(value, 4, axis=-1) for value in vars(rounded).values()))
     up = np.tile([[0, 0, 1, 1], [0, 1, 0, 1]], len(H0))
@@ -304,20 +311,18 @@ def _built(task: Task, found: _Optimum) -> Nest | None:
     result = evaluate(task, x, n)
     error = np.max(np.abs(result.deflection_error), axis=0)
     fits = result.feasible & (error <= task.limits.height_error_max)
-    if not np.any(fits):
+    # a third of a percent of the aim is worth less than a millimetre of ride height
+    merit = np.where(fits, np.max(_aims(task, result), axis=0) + 3.0 * error, np.inf)
+    best = int(np.argmin(merit))
+    if not fits[best]:
         return None
     margin = np.minimum(*result.margin)
-    # a third of a percent of the aim is worth less than a millimetre of ride height
-    aim = result.mass / np.min(result.mass[fits])
-    if task.limits.objective == "fatigue":
-        aim = -margin / np.max(margin[fits])
-    best = int(np.argmin(np.where(fits, aim + 3.0 * error, np.inf)))
 
     def spring(i: int, free_height: Floats) -> BuiltSpring:
         sizes = x.D[i], x.d[i], n[i], free_height
         return BuiltSpring(*(round(float(value[best]), 9) for value in sizes))
 
-    return Nest(
+    return float(merit[best]), Nest(
         outer=spring(0, x.H0), inner=spring(1, x.H0 - task.height_difference),
         mass=float(result.mass[best]), fatigue_margin=float(margin[best]),
         mounting_error=float(result.deflection_error[0][best]),

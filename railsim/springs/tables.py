@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.springs.datasheet import LATERAL, Sheet
 from railsim.springs.design import Design
@@ -172,4 +174,6 @@ def search_table(result: "SearchResult") -> Table:
         heights = "/".join(f"{s.free_height * 1e3:.6g}" for s in (nest.outer, nest.inner))
         active = ", ".join(nest.active) or "none"
         rows.append({**vars(nest), **springs, "rank": rank, "heights": heights, "active": active})
+        if not np.isfinite(nest.fatigue_margin):  # no table [fatigue]
+            rows[-1]["fatigue_margin"] = None
     return Table(SEARCH, rows)
