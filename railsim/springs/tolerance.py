@@ -40,7 +40,8 @@ class RideHeight:
 def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
     """Scatter of the ride height under every load of a suspension file.
 
-    Raises InputError: no table `[tolerances]`, or a load that the nominal nest cannot carry.
+    Raises InputError: no table `[tolerances]`, or a load that the nest cannot carry, as drawn or
+    with its springs at their limits.
     """
     limits = deviations(suspension)
     frame, cases = load_cases(suspension, suspension.loads)
@@ -57,6 +58,11 @@ def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
     alone = np.eye(len(limits))
     lower, upper = heights(-alone), heights(alone)
     worst = heights(np.array(list(product((-1.0, 1.0), repeat=len(limits)))))
+    lost = ~np.all(np.isfinite(np.vstack([lower, upper, worst])), axis=0)
+    if np.any(lost):
+        names = ", ".join(case.name for case, is_lost in zip(cases, lost, strict=True) if is_lost)
+        words = f"springs at their limits cannot carry {names}"
+        raise input_error(suspension.name, words, "smaller tolerances or loads", "tolerances")
     random = np.sqrt(np.sum((0.5 * (upper - lower)) ** 2, axis=0))
     found = []
     for i, case in enumerate(cases):

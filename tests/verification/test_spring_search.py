@@ -227,3 +227,10 @@ def test_no_scatter_no_range():
     exact = load_spring("turasas_axlebox", [f"tolerances.{key}=0.0" for key in keys])
     for result in ride_heights(exact):
         assert result.lowest == result.highest == result.random == 0.0
+
+
+def test_tolerances_with_which_a_load_cannot_be_carried_are_refused():
+    """A wire of 21 mm instead of 41 mm has a fourteenth of the stiffness."""
+    suspension = load_spring("turasas_axlebox", ["tolerances.wire_diameter=0.02"])
+    with pytest.raises(InputError, match="tolerances: springs at their limits cannot carry MOUNT"):
+        ride_heights(suspension)
