@@ -140,10 +140,13 @@ class Judge:
         grid = self.grid(model, extra)
         s = self._zone_drivers(model)
         both = np.concatenate((grid, s))
-        order = np.argsort(both, kind="stable")
-        if model.end < model.start:
-            order = order[::-1]
-        motion = tangents(solve(model, both[order]), moved, second=False)
+        later = np.repeat((0, 1), (len(grid), len(s)))
+        at_height = (later == 1) & (self.output is not None)  # whatever the ends of the range are
+        drift = np.where(at_height, 0.0, moved.drift(both))
+        later[len(grid) - 1] = 2  # of equal values the range's own are the first and the last
+        order = np.lexsort((later, model.sense * both))
+        positions = solve(model, both[order])
+        motion = tangents(positions, moved, drift=drift[..., order], second=False)
         rank = np.argsort(order, kind="stable")
         return self._judged(motion, model, rank[: len(grid)], rank[len(grid) :])
 

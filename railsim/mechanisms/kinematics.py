@@ -225,16 +225,20 @@ def _held(model: Model, s: float, pose: Floats, arcs: Integers) -> tuple[Any, in
     return left, int(np.sum(singular > 1e-9 * singular[0]))
 
 
-def tangents(motion: Motion, moved: Model, *, second: bool = True) -> Motion:
+def tangents(
+    motion: Motion, moved: Model, *, drift: Floats | float = 0.0, second: bool = True
+) -> Motion:
     """The same positions with derivatives by parameters in the imaginary parts.
 
     `motion`: Positions of a real model. `moved`: The model with a lane for each parameter
-    (`Model.lanes`); an imaginary part of a result is `STEP` times the derivative. `second`:
-    Whether the second derivatives by the driver are wanted too.
+    (`Model.lanes`); an imaginary part of a result is `STEP` times the derivative. `drift` (shape
+    (lane, position)): Derivatives of the driver's values themselves. `second`: Whether the second
+    derivatives by the driver are wanted too.
     """
     count = moved.linkage.point.shape[0]
     real = motion.s, motion.q, motion.q1, motion.q2
     s, q, q1, q2 = (np.repeat(array[None].astype(complex), count, axis=0) for array in real)
+    s += 1j * STEP * drift
     motion_kernel.tangents(motion.model.linkage, moved.linkage, s, q, q1, q2, motion.arcs, second)
     return Motion(moved, s, q, q1, q2, motion.arcs)
 

@@ -71,6 +71,13 @@ class Model:
         """The error that refuses the mechanism at a key of its file."""
         return input_error(self.definition.name, found, allowed, key)
 
+    def drift(self, s: Floats) -> Floats:
+        """Derivatives of values of the driver that stay at their share of the range, by lanes."""
+        driver, share = self.definition.driver, (s - self.start) / (self.end - self.start)
+        start, end = (np.imag(self.number(x)) / STEP for x in (driver.start, driver.end))
+        found: Floats = (1.0 - share) * start + share * end
+        return found
+
     @property
     def axis(self) -> int:
         """Coordinate along which the output is to move: 0 for x, 1 for y."""

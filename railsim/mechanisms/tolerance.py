@@ -42,7 +42,10 @@ def sensitivities(
     if definition.zone is not None:
         dense = solve(model, np.linspace(model.start, model.end, 401))
         at = {"start": model.start, "work": zone_drivers(dense)["work"], "end": model.end}
-    motion = tangents(solve(model, list(at.values())), model.lanes(list(names)))
+    s, moved = np.array(list(at.values())), model.lanes(list(names))
+    # the ends go with their parameters, the position of work stays
+    drift = np.isin(list(at), ("start", "end")) * moved.drift(s)
+    motion = tangents(solve(model, s), moved, drift=drift)
     found: dict[str, tuple[str, float, dict[str, float]]] = {}
 
     def add(name: str, unit: str, value: Any) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from railsim.definitions.loading import load_mechanism
 from railsim.mechanisms.analysis import analyse
@@ -10,6 +11,7 @@ from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
 from railsim.mechanisms.tables import optimum_sentences
+from railsim.mechanisms.tolerance import scatter
 
 # an arm against a torque; the rod's angle at the pin is largest, asin(d/r), within the travel
 ARM = """
@@ -92,6 +94,43 @@ def test_gradients_are_those_of_differences_where_parameters_move_the_output(
         for step in h * np.eye(2)
     ]
     assert judge(x, {}).gradient == pytest.approx(found, rel=1e-6)
+
+
+def moving_window(tmp_path, tail):
+    """The arm turns by 1.4 rad about the middle of its travel, a parameter."""
+    head = ARM.partition("[angles.mu]")[0].replace("[ground.points]", "mid = 1.2\n[ground.points]")
+    head = head.replace("start = 0.4", 'start = "mid - 0.7"').replace(
+        "end = 2.4", 'end = "mid + 0.7"'
+    )
+    path = tmp_path / "arm.toml"
+    path.write_text(head.replace('[output]\npoint = "arm.pin"\n', "") + tail)
+    return load_mechanism(path)
+
+
+def rod(angle, r=0.3, d=0.1):
+    """Length of the rod by the law of cosines, and its derivative by the arm's angle [m]."""
+    length = np.sqrt(r * r + d * d - 2.0 * r * d * np.cos(angle))
+    return length, r * d * np.sin(angle) / length
+
+
+def test_parameters_that_move_the_travel_are_searched_for_too(tmp_path):
+    """The largest force of a window is least where both of its ends need the same."""
+    search = '[optimise]\nobjective = "peak_force"\nrange = "travel"\nstarts = 1\n'
+    best = optimise(moving_window(tmp_path, search + "[optimise.bounds]\nmid = [0.8, 2.2]\n"))
+    alike = brentq(lambda mid: rod(mid - 0.7)[1] - rod(mid + 0.7)[1], 0.8, 2.2)
+    assert best.parameters["mid"] == pytest.approx(alike, abs=1e-5)  # was left at 1.2
+    assert best.objective == pytest.approx(100.0 / rod(alike - 0.7)[1], rel=1e-5)
+
+
+def test_tolerances_of_parameters_that_move_the_travel_count(tmp_path):
+    found = scatter(moving_window(tmp_path, "[tolerances]\nmid = 0.02\n"))
+    single = {one.name: one.single["mid"] for one in found}
+    (start, w0), (end, w1) = rod(0.5), rod(1.9)
+    assert single["length_start"] == pytest.approx(0.02 * w0)
+    assert single["stroke"] == pytest.approx(0.02 * (w1 - w0))  # was 0
+    w, h = 100.0 / np.array([rod(1.9 + h)[1] for h in (-1e-6, 1e-6)]), 1e-6
+    assert single["force_end"] == pytest.approx(0.02 * (w[1] - w[0]) / (2.0 * h), rel=1e-6)
+    assert (found[1].name, found[1].value) == ("stroke", pytest.approx(end - start))
 
 
 def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
