@@ -1,6 +1,7 @@
 """Choice of components: every row of a catalogue fits, or why not, and what it does."""
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -167,7 +168,8 @@ def _with_row(
     cold, hot = (n(x) for x in spring.service)
     for (low, high), corners in {
         ("force_least", "force_most"): [(F1, n(spring.temperature))],
-        ("force_lowest", "force_highest"): [(F1 - minus, cold), (F1 + plus, hot)],
+        # all corners: other springs, as warm as this one, may act against it
+        ("force_lowest", "force_highest"): [*product((F1 - minus, F1 + plus), (cold, hot))],
     }.items():
         forces = []
         for force, temperature in corners:

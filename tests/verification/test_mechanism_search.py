@@ -10,6 +10,7 @@ from railsim.mechanisms.checks import checks
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
+from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import optimum_sentences
 from railsim.mechanisms.tolerance import scatter
 
@@ -174,3 +175,51 @@ def test_least_breach_is_found_where_limits_exclude_each_other_or_one_cannot_be_
         u, found = _least_breach(problem, begin, problem(begin))
         assert 3.0 * u[0] == pytest.approx(x, abs=1e-3)
         assert found.violation == pytest.approx(breach, abs=1e-6)
+
+
+SPRINGS = """
+[actuators.hand]
+turn = "arm"
+[elements.on]
+gas_spring = ["ground.foot", "arm.pin"]
+F1 = 300.0
+progression = 1.3
+stroke = 0.2
+extended = 0.4
+[elements.back]
+gas_spring = ["ground.heel", "arm.pin"]
+F1 = 300.0
+progression = 1.3
+stroke = 0.2
+extended = 0.4
+[solve]
+unknown = "hand"
+[[selection]]
+element = "on"
+catalogue = "made"
+[catalogues]
+made = [{ name = "A", strokes = [0.2], F1 = [100, 900], F1_tolerance = [[900, 30, 30]] }]
+"""
+
+
+def test_springs_against_each_other_are_worst_at_a_mixed_corner(tmp_path):
+    """A weak spring is outdone most by the other one in the warmth; closed form."""
+    head = ARM.partition("[elements.load]")[0].replace("d = 0.1", "d = 0.1\n[derived]\nb = '-d'")
+    head = head.replace('foot = ["d", 0.0]', 'foot = ["d", 0.0]\nheel = ["b", 0.0]')
+    path = tmp_path / "two.toml"
+    head = head.replace("start = 0.4", "start = 1.5").replace("end = 2.4", "end = 1.6")
+    path.write_text(head + SPRINGS)
+    (row,) = selection(analyse(load_mechanism(path)))
+
+    def hand(F1, temperature, angle):
+        found = 0.0
+        for F, sense in ((F1, 1.0), (300.0, -1.0)):
+            length, rate = rod(angle, d=sense * 0.1)
+            warm = 1.0 + 0.0036 * (temperature - 20.0)
+            found = found - F * warm * (1.0 + 0.3 * (0.4 - length) / 0.2) * rate
+        return found
+
+    angles = np.linspace(1.5, 1.6, 1000)
+    corners = [hand(F, T, angles) for F in (270.0, 330.0) for T in (-30.0, 80.0)]
+    assert row.values["force_lowest"] == pytest.approx(np.min(corners), rel=1e-5)
+    assert row.values["force_highest"] == pytest.approx(np.max(corners), rel=1e-5)
