@@ -23,7 +23,7 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
 @cli.option("--starts", "Number of starting points of the search.", "N", cli.COUNT)
 @cli.option("--seed", "Seed of the starting points.", "S", cli.FROM_0)
 @cli.option("--case", "Case of the file instead of its base.", "NAME")
-@cli.repeated("--at", "Also print all results where one has a value (SI).", "NAME=VALUE")
+@cli.repeated("--at", "Also print all results wherever one has a value (SI).", "NAME=VALUE")
 @cli.set_option
 @cli.output_options(f"Folder for {REPORT}, pictures, animation, positions.csv.")
 def command(
@@ -103,7 +103,7 @@ def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
             equals = ""
         if not equals:
             raise input_error("--at", f"'{assignment}'", "NAME=VALUE, in SI units")
-        found.append({"where": assignment, **result.at(name.strip(), value)})
+        found += [{"where": assignment, **one} for one in result.everywhere(name.strip(), value)]
     return found
 
 

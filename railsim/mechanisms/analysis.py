@@ -114,7 +114,13 @@ class Analysis:
         return self.known[name]
 
     def at(self, quantity: str, value: float) -> dict[str, float]:
-        """All results where one of them has a value.
+        """All results at the first position where one of them has a value; see `everywhere`."""
+        return self.everywhere(quantity, value)[0]
+
+    def everywhere(self, quantity: str, value: float) -> list[dict[str, float]]:
+        """All results at every position, from start to end, where one of them has a value.
+
+        Of a stretch on which it keeps the value, the first position.
 
         Raises
         ------
@@ -125,17 +131,18 @@ class Analysis:
             found = f"no result '{quantity}'"
             raise argument_error("at", found, nearest(quantity, self.output), key=quantity)
         known = self.output[quantity]
-        gap = known - value
-        crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
-        if not len(crossed):
-            low, high = np.nanmin(known), np.nanmax(known)
+        low, high = np.nanmin(known), np.nanmax(known)
+        level = (known[1:] == value) & (known[:-1] == value)
+        s = zeros(self.motion, lambda motion: outputs(motion)[quantity] - value)
+        s = [x for x in s if x not in self.motion.s[1:][level]] or [self.model.start]
+        results = outputs(solve(self.model, s))
+        # where it jumps over the value it does not have it
+        near = 1e-6 * max(high - low, abs(value))
+        there = np.flatnonzero(np.abs(results[quantity] - value) <= near)
+        if not len(there):
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
             raise argument_error("at", found, allowed, key=quantity)
-        k = crossed[0]
-        near = solve(self.model, self.motion.s[k : k + 2])
-        s = zeros(near, lambda motion: outputs(motion)[quantity] - value)
-        motion = solve(self.model, s[:1])
-        return {name: float(array[0]) for name, array in outputs(motion).items()}
+        return [{name: float(array[k]) for name, array in results.items()} for k in there]
 
 
 def analyse(definition: Mechanism, case: str | None = None) -> Analysis:

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from railsim.definitions.loading import load_mechanism
+from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.judgement import Judge, Judgement
@@ -132,6 +133,21 @@ def test_tolerances_of_parameters_that_move_the_travel_count(tmp_path):
     w, h = 100.0 / np.array([rod(1.9 + h)[1] for h in (-1e-6, 1e-6)]), 1e-6
     assert single["force_end"] == pytest.approx(0.02 * (w[1] - w[0]) / (2.0 * h), rel=1e-6)
     assert (found[1].name, found[1].value) == ("stroke", pytest.approx(end - start))
+
+
+def test_every_position_with_a_value_is_found(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM)
+    result = analyse(load_mechanism(path))
+    wanted = 1300.0
+    found = [row["travel"] for row in result.everywhere("force", wanted)]
+    ends = (0.4, 1.2), (1.2, 2.4)  # least force in between
+    both = [brentq(lambda angle: 100.0 / rod(angle)[1] - wanted, *pair) for pair in ends]
+    assert found == pytest.approx(both)
+    assert result.at("force", wanted)["travel"] == found[0]
+    assert [row["travel"] for row in result.everywhere("travel", 0.4)] == [0.4]
+    with pytest.raises(InputError, match="never reached"):
+        result.everywhere("force", 900.0)
 
 
 def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
