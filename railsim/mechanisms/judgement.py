@@ -33,6 +33,7 @@ from railsim.mechanisms.targets import Positions, drivers_at_heights, positions
 
 GRID = 17  # positions over the whole travel at which constraints are held
 DENSE = 201  # positions from which the least values between them are looked for
+RIVAL = 1e-6  # share of the peak by which positions with as large a force may differ
 SLOWEST = 0.05
 """Smallest rate of the actuator against its mean: keeps a search away from dead points."""
 
@@ -47,6 +48,7 @@ class Judgement:
     peak_gradient: Floats  # (parameter,)
     margins: Floats  # in units of each constraint's scale; negative where broken, (constraint,)
     slopes: Floats  # (constraint, parameter)
+    rivals: Floats | None = None  # gradients of all positions with such a peak, (rival, parameter)
 
     @property
     def objective(self) -> float:
@@ -190,11 +192,14 @@ class Judge:
         whole = [force[..., grid]]
         if rubs(model):
             whole.append(self._force(motion, -1)[..., grid])
-        residuals, peak = self._objective(ratio, force_zone, np.concatenate(whole, axis=-1))
+        residuals, peaks = self._objective(ratio, force_zone, np.concatenate(whole, axis=-1))
         margins = self._margins(motion, grid)
-        peaks, kept = (float(np.real(peak)[0]), derivative(peak)), (np.real(margins)[0], margins)
-        slopes = derivative(residuals).T, derivative(kept[1]).T
-        return Judgement(np.real(residuals)[0], slopes[0], *peaks, kept[0], slopes[1])
+        sizes, rivals = np.real(peaks[0]), derivative(peaks).T
+        k = int(np.argmax(sizes))
+        return Judgement(
+            np.real(residuals)[0], derivative(residuals).T, float(sizes[k]), rivals[k],
+            np.real(margins)[0], derivative(margins).T, rivals[sizes >= (1.0 - RIVAL) * sizes[k]],
+        )  # fmt: skip
 
     def _at_height(
         self, motion: Motion, model: Model, zone: Any, ratio: Any, force: Any
@@ -229,8 +234,8 @@ class Judge:
         return -generalised_force(motion, rates) / unit_work(motion, self.unknown)
 
     def _objective(self, ratio: Any, force: Any, whole: Any) -> tuple[Any, Any]:
-        """Residuals, shape (lane, residual), and what is added to their squares, (lane,)."""
-        parts, peak = [], np.zeros(len(ratio), dtype=complex)
+        """Residuals, shape (lane, residual); amounts whose largest is added to their squares."""
+        parts, peaks = [], np.zeros((len(ratio), 1), dtype=complex)
         number_of = self.values
         for kind, weight in self.weights.items():
             root = np.sqrt(weight * (1.0 if kind == "peak_force" else self.every))
@@ -247,11 +252,10 @@ class Judge:
                 parts.append(root * (force / np.mean(force, axis=-1, keepdims=True) - 1.0))
             else:
                 both = np.concatenate((whole, force), axis=-1)
-                k = int(np.argmax(np.abs(np.real(both[0]))))
-                peak = peak + weight * np.sign(np.real(both[0, k])) * both[:, k]
+                peaks = weight * np.sign(np.real(both[0])) * both
         if not parts:
             parts = [np.zeros((len(ratio), 1), dtype=complex)]
-        return np.concatenate(parts, axis=-1), peak
+        return np.concatenate(parts, axis=-1), peaks
 
     def _margins(self, motion: Motion, grid: Any) -> Any:
         """Margins of all constraints, shape (lane, constraint), and their labels."""

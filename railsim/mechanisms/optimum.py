@@ -134,6 +134,12 @@ def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
     matrix = np.array([row[3] for row in rows]).T * span[:, None]
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0.0] = 1.0
-    weights, _ = nnls(matrix / norms, judged.gradient * span)
-    each = zip(rows, (weights / norms).tolist(), strict=True)
+    # where several positions have the largest force, a mean of their gradients is in balance
+    smooth, rivals = judged.gradient - judged.peak_gradient, judged.rivals
+    peaks = ((smooth if rivals is None else smooth + rivals) * span).reshape(-1, len(x)).T
+    large = 1e3 * float(np.linalg.norm(peaks)) or 1.0
+    sums = np.repeat((0.0, large), (len(rows), peaks.shape[1]))
+    both = np.vstack((np.hstack((matrix / norms, -peaks)), sums))
+    weights, _ = nnls(both, np.append(np.zeros(len(x)), large))
+    each = zip(rows, (weights[: len(rows)] / norms).tolist(), strict=True)
     return tuple(Active(*row[:3], weight) for row, weight in each)

@@ -124,6 +124,22 @@ def test_parameters_that_move_the_travel_are_searched_for_too(tmp_path):
     assert best.objective == pytest.approx(100.0 / rod(alike - 0.7)[1], rel=1e-5)
 
 
+def test_the_multiplier_of_a_peak_at_two_positions_is_that_of_both(tmp_path):
+    """What a longer bracket would be worth, when the window is placed anew for it."""
+
+    def least_peak(d):
+        rates = lambda mid: [rod(mid + half, d=d)[1] for half in (-0.7, 0.7)]  # noqa: E731
+        return 100.0 / rates(brentq(lambda mid: np.subtract(*rates(mid)), 0.8, 2.2))[0]
+
+    search = '[optimise]\nobjective = "peak_force"\nrange = "travel"\nstarts = 1\n'
+    bounds = "[optimise.bounds]\nmid = [0.8, 2.2]\nd = [0.05, 0.15]\n"
+    best = optimise(moving_window(tmp_path, search + bounds))
+    (limit,) = best.active
+    assert (limit.name, limit.side) == ("d", "upper")
+    worth = (least_peak(0.149) - least_peak(0.151)) / 0.002
+    assert limit.multiplier == pytest.approx(worth, rel=1e-4)
+
+
 def test_tolerances_of_parameters_that_move_the_travel_count(tmp_path):
     found = scatter(moving_window(tmp_path, "[tolerances]\nmid = 0.02\n"))
     single = {one.name: one.single["mid"] for one in found}
