@@ -35,7 +35,7 @@ GRID = 17  # positions over the whole travel at which constraints are held
 DENSE = 201  # positions from which the least values between them are looked for
 RIVAL = 1e-6  # share of the peak by which positions with as large a force may differ
 SLOWEST = 0.05
-"""Smallest rate of the actuator against its mean: keeps a search away from dead points."""
+"""Smallest rate of the actuator against its mean, and of the driver: away from dead points."""
 
 
 @dataclass(frozen=True)
@@ -286,6 +286,7 @@ class Judge:
                 yield "min_length", 1.0, length - n(wanted.min_length)
             mean = (length[..., -1:] - length[..., :1]) / (motion.s[..., -1:] - motion.s[..., :1])
             yield "dead_point", 1.0, rate / mean - SLOWEST
+            yield "dead_point", 1.0, 1.0 - SLOWEST * rate / mean  # of the driver
         if self.pair is None or ends(self.unknown) != self.pair:
             work = unit_work(motion, self.unknown)
             yield "dead_point", 1.0, work / np.mean(work, axis=-1, keepdims=True) - SLOWEST

@@ -39,7 +39,7 @@ class Effort:
 
 
 SEARCH = Effort(2, 20, 1e-2, 0)
-FINISH = Effort(4, 25, 1e-3, 7)
+FINISH = Effort(8, 60, 1e-3, 7)
 EVERY = 5  # share of the positions that every start is first judged at
 FINALISTS = 3  # starts that are followed to the end, at all positions
 MOST_STARTS = 10_000

@@ -151,6 +151,58 @@ def test_tolerances_of_parameters_that_move_the_travel_count(tmp_path):
     assert (found[1].name, found[1].value) == ("stroke", pytest.approx(end - start))
 
 
+FOUR_BAR = """
+format = "railsim-mechanism/1"
+name = "four-bar"
+[parameters]
+coupler = 0.5
+[ground.points]
+left = [0.0, 0.0]
+right = [0.9, 0.0]
+foot = [0.2, 0.6]
+[bodies.crank]
+points = { pin = [0.0, 0.0], end = [0.3, 0.0] }
+[bodies.rocker]
+points = { pin = [0.0, 0.0], end = [0.4, 0.0] }
+[start]
+crank = { angle = 2.0 }
+rocker = { angle = 2.9 }
+[joints.left]
+revolute = ["ground.left", "crank.pin"]
+[joints.right]
+revolute = ["ground.right", "rocker.pin"]
+[joints.coupler]
+link = ["crank.end", "rocker.end"]
+length = "coupler"
+[driver]
+angle = "crank"
+start = 1.2
+end = 0.6
+[output]
+point = "rocker.end"
+[actuators.lift]
+piston = ["ground.foot", "rocker.end"]
+[solve]
+unknown = "lift"
+[optimise]
+objective = "constant"
+target = 1.0
+range = "travel"
+[optimise.bounds]
+coupler = [0.4, 0.6]
+"""
+
+
+def test_a_search_keeps_away_from_a_limit_position_of_the_driver(tmp_path):
+    """Coupler and rocker in line: the actuator's rate has no end there, and no way back."""
+    path = tmp_path / "four_bar.toml"
+    path.write_text(FOUR_BAR)
+    judge = Judge(load_mechanism(path))
+    reach = np.sqrt(0.9**2 + 0.3**2 - 2.0 * 0.9 * 0.3 * np.cos(1.2))
+    for longer, kept in ((1e-3, True), (1e-6, False)):
+        assert bool(np.min(judge(np.array([reach - 0.4 + longer]), {}).margins) > 0.0) == kept
+
+
 def test_every_position_with_a_value_is_found(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(ARM)
