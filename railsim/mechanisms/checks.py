@@ -54,19 +54,26 @@ def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
     n, limits = result.model.number, result.definition.optimise
     least, most = force_range(result)
     acts = unknown.acts if isinstance(unknown, Cylinder) else "push"
+    wanted = limits.available_force if limits is not None else None
+    most_wanted = np.inf if wanted is None else n(wanted)
     if isinstance(unknown, Cylinder):
         pressure = n(unknown.supply_pressure)
         note = "largest force of the chamber under pressure against bore and supply pressure"
+        note = note if wanted is None else f"{note}, and [optimise]"
         acting = "pull" if acts == "pull" else "push"
-        available = pressure * chamber_area(result.model, unknown, acting)
+        available = min(pressure * chamber_area(result.model, unknown, acting), most_wanted)
         yield Check("available_force", max(most, 0.0), available, "below", "N", note)
         if acts == "both":
             note = "largest pull against bore less rod and supply pressure"
-            available = pressure * chamber_area(result.model, unknown, "pull")
+            available = min(pressure * chamber_area(result.model, unknown, "pull"), most_wanted)
             yield Check("available_pull", max(-least, 0.0), available, "below", "N", note)
-    elif limits is not None and limits.available_force is not None:
-        note, limit = "largest amount of the force", n(limits.available_force)
-        yield Check("available_force", result.peak_force, limit, "below", "N", note)
+    elif wanted is not None:
+        note = "largest amount of the force"
+        yield Check("available_force", result.peak_force, most_wanted, "below", "N", note)
+    if isinstance(unknown, AirSpring) and unknown.supply_pressure is not None:
+        found = [result.extremes(k) for k in ("pressure", "pressure_back") if k in result.output]
+        limit, note = n(unknown.supply_pressure), "largest pressure that is needed"
+        yield Check("available_pressure", max(f.most for f in found), limit, "below", "Pa", note)
     if isinstance(unknown, Cylinder | AirSpring) and acts != "both":
         name, words = ("pulls", "push") if acts == "push" else ("pushes", "pull")
         note = f"least force: it can only {words}"

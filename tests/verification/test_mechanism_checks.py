@@ -150,3 +150,25 @@ def test_arcs_of_a_cam_are_counted_from_one_where_the_roller_changes_between_the
     for change in (one, other):
         assert change.rate_before == pytest.approx(change.rate_after, rel=1e-6)
         assert change.gap < 1e-9
+
+
+def by_name(found, name):
+    (check,) = (one for one in checks(found) if one.name == name)
+    return check
+
+
+def test_the_supply_pressure_of_an_air_spring_is_a_limit():
+    """The largest pressure is that at the end: 0.48390 MPa (MECHANISMS, cam with R1)."""
+    for supply, ok in ((0.485e6, True), (0.480e6, False)):
+        changed = load_mechanism("atr95", [f"parameters.supply_pressure={supply}"])
+        check = by_name(analyse(changed), "available_pressure")
+        assert check.value == pytest.approx(0.48390e6, abs=50.0)
+        assert check.ok == ok
+
+
+def test_a_force_that_the_search_allows_is_a_limit_of_a_cylinder_too():
+    """9803 N are needed; bore and supply give 14074 N."""
+    for allowed, ok in ((9900.0, True), (9000.0, False)):
+        changed = load_mechanism("atr95_lift_5", [f"optimise.available_force={allowed}"])
+        check = by_name(analyse(changed), "available_force")
+        assert (check.limit, check.ok) == (allowed, ok)
