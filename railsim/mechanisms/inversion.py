@@ -71,10 +71,13 @@ def _refined(
 def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
     """All values of the driver at which a function of the motion, not always smooth, is zero."""
     known = np.asarray(function(motion))
-    found = []
+    # the known ones again, or rounding may give a zero at a position the sign of the other end
+    values, found = dict(zip(motion.s.tolist(), known.tolist(), strict=True)), []
 
     def at(s: float) -> float:
-        return float(np.ravel(function(solve(motion.model, [s])))[0])
+        if s not in values:
+            values[s] = float(np.ravel(function(solve(motion.model, [s])))[0])
+        return values[s]
 
     for k in range(len(known) - 1):
         a, b = known[k], known[k + 1]

@@ -203,6 +203,25 @@ def test_a_search_keeps_away_from_a_limit_position_of_the_driver(tmp_path):
         assert bool(np.min(judge(np.array([reach - 0.4 + longer]), {}).margins) > 0.0) == kept
 
 
+def test_a_zero_at_one_of_the_positions_is_found_whatever_its_rounding(tmp_path):
+    """With crank and base in line the rocker is upright, 3 : 4 : 5, and its mass highest."""
+    text = FOUR_BAR
+    for old, new in (
+        ("right = [0.9, 0.0]\nfoot = [0.2, 0.6]", "right = [0.6, 0.0]\nfoot = [0.1, -0.35]"),
+        ("[0.4, 0.0] }", "[0.4, 0.0] }\nmass = 12.0\ncentre = ['0.4 / 2', 0.0]"),
+        ("angle = 2.0", "angle = 0.6"),
+        ("angle = 2.9", "angle = 1.2"),
+        ("start = 1.2\nend = 0.6", "start = 0.6\nend = -1.0"),
+        ('piston = ["ground.foot", "rocker', 'piston = ["ground.foot", "crank'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "four_bar.toml"
+    path.write_text(text)
+    found = analyse(load_mechanism(path)).force_zeros  # was a traceback
+    assert found[-1] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_every_position_with_a_value_is_found(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(ARM)
