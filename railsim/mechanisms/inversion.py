@@ -72,7 +72,8 @@ def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
     """All values of the driver at which a function of the motion, not always smooth, is zero."""
     known = np.asarray(function(motion))
     # the known ones again, or rounding may give a zero at a position the sign of the other end
-    values, found = dict(zip(motion.s.tolist(), known.tolist(), strict=True)), []
+    values: dict[float, float] = dict(zip(motion.s.tolist(), known.tolist(), strict=True))
+    found = []
 
     def at(s: float) -> float:
         if s not in values:

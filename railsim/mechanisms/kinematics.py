@@ -76,6 +76,10 @@ class Motion:
         first, second = self.point(pair[0]), self.point(pair[1])
         d, d1, d2 = (b - a for a, b in zip(first, second, strict=True))
         length = np.sqrt(dot(d, d))
+        if len(met := np.argwhere(length == 0.0)):
+            at = driver_words(self.model, float(np.real(self.s[tuple(met[0])])))
+            found = f"driver at {at}: meets {pair[1]}, and what is between them has no direction"
+            raise self.model.refusal(pair[0], found, "points apart")
         rate = dot(d, d1) / length
         return length, rate, (dot(d1, d1) + dot(d, d2) - rate * rate) / length
 

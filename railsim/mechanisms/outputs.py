@@ -72,7 +72,9 @@ def outputs(motion: Motion) -> dict[str, Any]:
         closed = solve(model, [model.start]).point(definition.output.point)[0][0]
         found["height"], found["x"] = r[:, 1] - closed[1], r[:, 0] - closed[0]
         if pair is not None:
-            found["ratio"], found["ratio_x"] = (r1[:, k] / found["rate"] for k in (model.axis, 0))
+            with np.errstate(divide="ignore", invalid="ignore"):  # where the length stands still
+                ratios = (r1[:, k] / found["rate"] for k in (model.axis, 0))
+                found["ratio"], found["ratio_x"] = ratios
     if definition.solve is not None:
         found |= _forces(motion, definition.solve.unknown)
     for name, element in definition.elements.items():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_mechanism
+from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.cams import transitions
 from railsim.mechanisms.checks import checks
@@ -172,3 +173,9 @@ def test_a_force_that_the_search_allows_is_a_limit_of_a_cylinder_too():
         changed = load_mechanism("atr95_lift_5", [f"optimise.available_force={allowed}"])
         check = by_name(analyse(changed), "available_force")
         assert (check.limit, check.ok) == (allowed, ok)
+
+
+def test_an_actuator_whose_ends_meet_has_no_direction():
+    changed = load_mechanism("atr95_lift_4", ["parameters.shortest_length=0.0"])
+    with pytest.raises(InputError, match=r"ground\.foot: driver at 0\.0000 deg: meets slide\.pin"):
+        analyse(changed)  # was a traceback
