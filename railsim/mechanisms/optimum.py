@@ -53,7 +53,9 @@ class Optimum:
     before: Analysis | None  # results with the file's own parameters, if they can be assembled
     after: Analysis  # and with the best
     objective: float
-    objective_before: float  # NaN for parameters that cannot be assembled
+    own: dict[str, float]  # the file's own parameters
+    objective_before: float  # theirs; NaN for parameters that cannot be assembled
+    feasible_before: bool  # whether they keep all constraints
     feasible: bool  # all constraints kept; else the compromise with the smallest breach
     breaches: dict[str, float]  # broken constraints and by how much, SI
     active: tuple[Active, ...]
@@ -91,9 +93,11 @@ def optimum_of(
     after = analyse(better)
     try:
         before: Analysis | None = analyse(definition)
-        objective_before = Judge(definition)(*judge.point_of(judge.values)).objective
+        written = Judge(definition)(*judge.point_of(judge.values))
+        objective_before, kept_before = written.objective, written.violation <= FEASIBLE
     except InputError:
-        before, objective_before = None, float("nan")
+        before, objective_before, kept_before = None, float("nan"), False
+    own = {name: float(judge.values[name]) for name in best.end}
     scales = dict(judge.labels)
     breaches = {
         name: -margin * scales[name] for name, (margin, _) in least.items() if margin < -FEASIBLE
@@ -106,7 +110,7 @@ def optimum_of(
         for name in breaches.keys() & angles.keys():  # margins are of the squares of their sines
             breaches[name] = max(limit - angles[name], 0.0)
     kept, active = best.feasible and not breaches, _active(judge, judged, x)
-    values = judged.objective, objective_before
+    values = judged.objective, own, objective_before, kept_before
     return Optimum(better, before, after, *values, kept, breaches, active, starts, seed)
 
 

@@ -153,7 +153,8 @@ def optimum_data(optimum: "Optimum") -> Data:
     """A search as plain numbers, and everything about the optimum."""
     return {
         **analysis_data(optimum.after), "objective": optimum.objective,
-        "objective_before": optimum.objective_before, "feasible": optimum.feasible,
+        "objective_before": optimum.objective_before,
+        "feasible_before": optimum.feasible_before, "feasible": optimum.feasible,
         "breaches": dict(optimum.breaches), "active": [asdict(active) for active in optimum.active],
         "starts": [_start_data(start) for start in optimum.starts], "seed": optimum.seed,
     }  # fmt: skip

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from railsim.definitions.mechanism.faults import bounds_remarks
 from railsim.design_checks import shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.contact import Contact, moved
@@ -209,16 +210,17 @@ def comparison_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 def optimum_sentences(optimum: "Optimum") -> list[str]:
     """How the search went."""
     assembled = [start for start in optimum.starts if np.isfinite(start.objective)]
-    before = (
-        f"{optimum.objective_before:.6g}"
-        if np.isfinite(optimum.objective_before)
-        else "none: the file's own parameters cannot be assembled"
-    )
+    before = "none: the file's own parameters cannot be assembled"
+    if np.isfinite(optimum.objective_before):
+        broken = "" if optimum.feasible_before else ", which breaks constraints"
+        before = f"{optimum.objective_before:.6g}{broken}"
+    written = optimum.definition.with_parameters(optimum.own)
     found = [
         f"objective {optimum.objective:.6g}, before {before}",
         f"{len(optimum.starts)} starts with seed {optimum.seed}: "
         f"{sum(start.feasible for start in assembled)} keep all constraints, "
         f"{len(optimum.starts) - len(assembled)} could not be assembled",
+        *(f"{remark.key}: {remark.text}" for remark in bounds_remarks(written)),
     ]
     if not optimum.feasible:
         angles = optimum.after.min_angles
@@ -233,9 +235,8 @@ def optimum_sentences(optimum: "Optimum") -> list[str]:
 def optimum_tables(optimum: "Optimum") -> list[Table]:
     """Return parameters before and after, limits that hold the optimum, and the starts."""
     unit_of = optimum.definition.unit_of
-    own = next((start for start in optimum.starts if start.number == 0), optimum.starts[0])
     changed = [
-        [name, shown(own.begin[name], unit_of(name), 8), shown(value, unit_of(name), 8)]
+        [name, shown(optimum.own[name], unit_of(name), 8), shown(value, unit_of(name), 8)]
         for name, value in optimum.parameters.items()
     ]
     number = Column("slack", "slack (SI)", format=".3g")

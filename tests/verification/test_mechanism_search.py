@@ -12,7 +12,7 @@ from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
 from railsim.mechanisms.selection import selection
-from railsim.mechanisms.tables import optimum_sentences
+from railsim.mechanisms.tables import optimum_sentences, optimum_tables
 from railsim.mechanisms.tolerance import scatter
 
 # an arm against a torque; the rod's angle at the pin is largest, asin(d/r), within the travel
@@ -245,6 +245,24 @@ def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
     gap = np.arcsin(0.19287 / 0.3) - np.radians(40.0)
     assert best.breaches["mu"] == pytest.approx(gap, rel=1e-2)
     assert f"mu by {np.degrees(best.breaches['mu']):.6g} deg" in optimum_sentences(best)[-1]
+
+
+def test_before_is_the_file_also_where_it_is_out_of_bounds_or_breaks_a_constraint(tmp_path):
+    path = tmp_path / "arm.toml"
+    for bounds, low, limits in (
+        ("[0.15, 0.19]", 0.15, ""),
+        ("[0.05, 0.25]", 0.1, "min_length = 0.25"),
+    ):
+        path.write_text(
+            ARM.replace("[0.05, 0.25]", bounds).replace("starts = 1", f"starts = 1\n{limits}")
+        )
+        best = optimise(load_mechanism(path))
+        assert best.starts[0].begin["d"] == low
+        rows = str(optimum_tables(best)[0])
+        assert "100 mm" in rows  # was the bound
+        first, _, *more = optimum_sentences(best)
+        assert any("exclude the file's own 0.1;" in text for text in more) == (not limits)
+        assert first.endswith("which breaks constraints") == bool(limits)
 
 
 def test_the_least_angle_is_that_between_the_positions(tmp_path):
