@@ -61,7 +61,7 @@ class Fatigue:
     tau_max: float  # corrected stress under the highest load [Pa]
     tau_min: float  # and under the lowest
     limit: float  # allowable upper stress at `tau_min` [Pa]
-    margin: float  # limit over tau_max
+    margin: float  # limit over tau_max; inf where the spring does not touch
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,8 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     for name, spring in suspension.springs.items():
         tau_min, tau_max = sorted(stress(spring, case.springs[name]) for case in cases)
         limit = float(checks.goodman_limit(suspension.fatigue.goodman, tau_min))
-        results[name] = Fatigue(tau_max, tau_min, limit, limit / tau_max)
+        margin = limit / tau_max if tau_max > 0.0 else np.inf  # it does not touch
+        results[name] = Fatigue(tau_max, tau_min, limit, margin)
     return results
 
 

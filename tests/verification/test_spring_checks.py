@@ -184,3 +184,8 @@ def assert_alike(expected, found, path=""):
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-15), path
     elif path.rpartition(".")[2] != "note":
         assert found == expected, path
+
+
+def test_a_spring_that_never_touches_has_no_stress():
+    found = fatigue(load_spring("turasas_axlebox", ["inner.engagement=0.113"]))["inner"]
+    assert (found.tau_max, found.margin) == (0.0, np.inf)  # was a traceback
