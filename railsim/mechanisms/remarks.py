@@ -7,7 +7,7 @@ from railsim.definitions.mechanism.faults import bounds_remarks
 from railsim.definitions.mechanism.values import body_name
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
-from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.kinematics import driver_words, solve
 from railsim.mechanisms.quantities import force_unit
 
 GAS_PRESSURES = (20e5, 250e5)
@@ -18,9 +18,20 @@ NEAR = 0.05
 
 def remarks(result: Analysis) -> list[str]:
     """Remarks of the file, and on what its results are."""
-    own = [*_forces(result), *_rods(result), *_gas_springs(result), *_lid(result)]
+    own = [*_zone(result), *_forces(result), *_rods(result), *_gas_springs(result), *_lid(result)]
     bounds = [f"{r.key}: {r.text}" for r in bounds_remarks(result.definition)]
     return [*result.definition.remarks, *own, *bounds]
+
+
+def _zone(result: Analysis) -> list[str]:
+    """Heights that the output reaches more than once."""
+    along = "x" if result.model.axis == 0 else "height"
+    found = []
+    for name, values in result.zone.items():
+        if np.count_nonzero(np.diff(result.output[along] > values[along])) > 1:
+            at = driver_words(result.model, values["travel"])
+            found.append(f"the output reaches zone.{name} again; results are those at {at}")
+    return found
 
 
 def _forces(result: Analysis) -> list[str]:

@@ -18,6 +18,7 @@ from railsim.mechanisms.dynamics import law_of
 from railsim.mechanisms.forces import Rates, generalised_force
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
+from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.summary import analysis_data
 
@@ -179,3 +180,51 @@ def test_an_actuator_whose_ends_meet_has_no_direction():
     changed = load_mechanism("atr95_lift_4", ["parameters.shortest_length=0.0"])
     with pytest.raises(InputError, match=r"ground\.foot: driver at 0\.0000 deg: meets slide\.pin"):
         analyse(changed)  # was a traceback
+
+
+PENDULUM = """
+format = "railsim-mechanism/1"
+name = "arm"
+[ground.points]
+hinge = [0.0, 0.0]
+foot = [0.1, 0.0]
+[bodies.arm]
+points = { hinge = [0.0, 0.0], pin = [0.3, 0.0] }
+mass = 10.0
+[joints.hinge]
+revolute = ["ground.hinge", "arm.hinge"]
+[driver]
+angle = "arm"
+start = -0.7
+end = 2.4
+[output]
+point = "arm.pin"
+[actuators.lift]
+piston = ["ground.foot", "arm.pin"]
+[actuators.hand]
+turn = "arm"
+[solve]
+unknown = "hand"
+"""
+
+
+def test_a_motion_law_is_refused_where_its_length_turns_back(tmp_path):
+    """The pin is nearest to the foot at 0 degrees: the arm jumped from -0.7 to 0.7 rad."""
+    path = tmp_path / "arm.toml"
+    law = '[motion]\nactuator = "lift"\nunknown = "hand"\nduration = 2.0\n'
+    path.write_text(PENDULUM + law)
+    with pytest.raises(InputError, match=r"motion: driver at 0.* the length turns back"):
+        analyse(load_mechanism(path))
+    path.write_text(PENDULUM.replace("start = -0.7", "start = 0.1") + law)
+    assert np.all(np.diff(analyse(load_mechanism(path)).timed.motion.s) > 0.0)
+
+
+def test_it_is_said_that_a_height_is_reached_again(tmp_path):
+    """The pin is 0.25 m high before and after 90 degrees; it ends at 0.203 m."""
+    path = tmp_path / "arm.toml"
+    zone = "[zone]\nlow = 0.1\nwork = 0.25\nhigh = 0.25\n"
+    path.write_text(PENDULUM.replace("-0.7", "0.0") + zone)
+    found = [text for text in remarks(analyse(load_mechanism(path))) if "again" in text]
+    at = np.degrees(np.arcsin(0.25 / 0.3))
+    words = "the output reaches zone.{} again; results are those at {:.4f} deg"
+    assert found == [words.format(name, at) for name in ("work", "high")]
