@@ -9,7 +9,7 @@ from railsim.definitions.mechanism.faults import bounds_remarks
 from railsim.design_checks import shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.contact import Contact, moved
-from railsim.mechanisms.dynamics import driving
+from railsim.mechanisms.dynamics import NEAR, driving
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.mechanisms.selection import Choice
@@ -163,6 +163,10 @@ def sentences(result: Analysis) -> list[str]:
     if (released := result.release) is not None:
         end = "reaches" if released.reached else "is then at"
         where = f"{end} {driver(released.s[-1])} after {released.time[-1]:.5f} s"
+        first_end, last_end = sorted((result.model.start, result.model.end))
+        beyond = np.maximum(first_end - released.s, released.s - last_end)
+        if beyond.max() > NEAR:
+            where += f"; it leaves the travel, up to {driver(released.s[np.argmax(beyond)])}"
         found.append(f"let go at {driver(released.s[0])} it {where}")
     return found
 

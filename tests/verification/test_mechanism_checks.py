@@ -21,6 +21,7 @@ from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.summary import analysis_data
+from railsim.mechanisms.tables import sentences
 
 MASSES = {"boom": 22.68, "trapezoid": 16.17, "head": 14.58}
 CHANGES = [
@@ -217,6 +218,16 @@ def test_a_motion_law_is_refused_where_its_length_turns_back(tmp_path):
         analyse(load_mechanism(path))
     path.write_text(PENDULUM.replace("start = -0.7", "start = 0.1") + law)
     assert np.all(np.diff(analyse(load_mechanism(path)).timed.motion.s) > 0.0)
+
+
+def test_it_is_said_that_what_is_let_go_leaves_the_travel(tmp_path):
+    """Without friction the arm swings as high on the other side, -pi - 1."""
+    path = tmp_path / "arm.toml"
+    arm = PENDULUM.replace("mass = 10.0", "mass = 10.0\ncentre = [0.2, 0.0]")
+    for until, left in ((2.4, True), (-0.7, False)):
+        path.write_text(f"{arm}[release]\nstart = 1.0\nuntil = {until}\nduration = 3.0\n")
+        (said,) = (text for text in sentences(analyse(load_mechanism(path))) if "let go" in text)
+        assert ("leaves the travel, up to -237" in said) == left
 
 
 def test_it_is_said_that_a_height_is_reached_again(tmp_path):
