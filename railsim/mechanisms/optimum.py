@@ -8,6 +8,7 @@ from scipy.optimize import nnls
 
 from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
+from railsim.design_checks import ROUNDING
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis, analyse
 from railsim.mechanisms.judgement import Judge, Judgement
@@ -55,7 +56,7 @@ class Optimum:
     objective: float
     own: dict[str, float]  # the file's own parameters
     objective_before: float  # theirs; NaN for parameters that cannot be assembled
-    feasible_before: bool  # whether they keep all constraints
+    feasible_before: bool  # whether they keep all constraints, to their rounding
     feasible: bool  # all constraints kept; else the compromise with the smallest breach
     breaches: dict[str, float]  # broken constraints and by how much, SI
     active: tuple[Active, ...]
@@ -94,7 +95,7 @@ def optimum_of(
     try:
         before: Analysis | None = analyse(definition)
         written = Judge(definition)(*judge.point_of(judge.values))
-        objective_before, kept_before = written.objective, written.violation <= FEASIBLE
+        objective_before, kept_before = written.objective, written.violation <= ROUNDING
     except InputError:
         before, objective_before, kept_before = None, float("nan"), False
     own = {name: float(judge.values[name]) for name in best.end}

@@ -265,6 +265,12 @@ def test_before_is_the_file_also_where_it_is_out_of_bounds_or_breaks_a_constrain
         assert first.endswith("which breaks constraints") == bool(limits)
 
 
+def test_printed_parameters_keep_a_limit_to_their_rounding():
+    """Lift 4 as printed has 40.0000 degrees, 4e-5 degrees too little."""
+    first, *_ = optimum_sentences(optimise(load_mechanism("atr95_lift_4"), starts=1))
+    assert "breaks" not in first
+
+
 def test_the_least_angle_is_that_between_the_positions(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(ARM + "\n[sampling]\npoints = 5\n")
