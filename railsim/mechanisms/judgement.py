@@ -89,6 +89,9 @@ class Judge:
         self.output = definition.output.point if definition.output is not None else None
         kind = self.wanted.objective
         self.weights = {kind: 1.0} if isinstance(kind, str) else dict(kind)
+        # over the whole travel, wherever that takes the output, or at heights of the output
+        everywhere = self.wanted.range == "travel" and "follow" not in self.weights
+        self.by_share = self.output is None or everywhere
         self._check_length()
         full = positions(definition)
         self.every = every
@@ -143,7 +146,7 @@ class Judge:
         s = self._zone_drivers(model)
         both = np.concatenate((grid, s))
         later = np.repeat((0, 1), (len(grid), len(s)))
-        at_height = (later == 1) & (self.output is not None)  # whatever the ends of the range are
+        at_height = (later == 1) & (not self.by_share)  # whatever the ends of the range are
         drift = np.where(at_height, 0.0, moved.drift(both))
         later[len(grid) - 1] = 2  # of equal values the range's own are the first and the last
         order = np.lexsort((later, model.sense * both))
@@ -154,7 +157,7 @@ class Judge:
 
     def _zone_drivers(self, model: Model) -> Floats:
         """Values of the driver at the positions of the objective."""
-        if self.output is None:
+        if self.by_share:
             return model.start + (model.end - model.start) * self.positions.share
         return drivers_at_heights(model, self.positions.height, self.positions.s)
 
@@ -188,11 +191,17 @@ class Judge:
         if self.pair is not None and self.output is not None:
             along = motion.point(self.output)[1][..., model.axis]
             ratio = along / motion.length(self.pair)[1]
+        height: Any = self.positions.height
+        if self.by_share and self.output is not None:
+            along = motion.point(self.output)[0][..., model.axis]
+            height = along[..., zone] - along[..., :1]
         ratio, force_zone = self._at_height(motion, model, zone, ratio, force)
         whole = [force[..., grid]]
         if rubs(model):
             whole.append(self._force(motion, -1)[..., grid])
-        residuals, peaks = self._objective(ratio, force_zone, np.concatenate(whole, axis=-1))
+        residuals, peaks = self._objective(
+            height, ratio, force_zone, np.concatenate(whole, axis=-1)
+        )
         margins = self._margins(motion, grid)
         sizes, rivals = np.real(peaks[0]), derivative(peaks).T
         k = int(np.argmax(sizes))
@@ -208,7 +217,7 @@ class Judge:
 
         `d/dp at constant y = d/dp - (d/ds) (dy/dp)/y'`.
         """
-        if self.output is None:
+        if self.by_share or self.output is None:
             return ratio[..., zone], force[..., zone]
         r, _, _ = motion.point(self.output)
         k = model.axis
@@ -233,7 +242,7 @@ class Judge:
         rates = Rates(friction=way * motion.model.sense, trial=True)
         return -generalised_force(motion, rates) / unit_work(motion, self.unknown)
 
-    def _objective(self, ratio: Any, force: Any, whole: Any) -> tuple[Any, Any]:
+    def _objective(self, height: Any, ratio: Any, force: Any, whole: Any) -> tuple[Any, Any]:
         """Residuals, shape (lane, residual); amounts whose largest is added to their squares."""
         parts, peaks = [], np.zeros((len(ratio), 1), dtype=complex)
         number_of = self.values
@@ -246,7 +255,7 @@ class Judge:
                 target = number(self.wanted.target, number_of)
                 if kind == "linear":
                     slope = number(self.wanted.slope, number_of)
-                    target = target + slope * self.positions.height
+                    target = target + slope * height
                 parts.append(root * (ratio - target))
             elif kind == "constant_force":
                 parts.append(root * (force / np.mean(force, axis=-1, keepdims=True) - 1.0))

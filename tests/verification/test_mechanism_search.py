@@ -124,6 +124,17 @@ def test_parameters_that_move_the_travel_are_searched_for_too(tmp_path):
     assert best.objective == pytest.approx(100.0 / rod(alike - 0.7)[1], rel=1e-5)
 
 
+def test_a_search_over_the_whole_travel_may_change_how_far_the_output_goes(tmp_path):
+    """A shorter arm is better at the end, a longer one at the start; 0.4 m is too long."""
+    path = tmp_path / "arm.toml"
+    head = ARM.partition("min_transmission")[0].replace("r = 0.3", "r = 0.4")
+    path.write_text(head + "starts = 1\n[optimise.bounds]\nr = [0.2, 0.5]\n")
+    best = optimise(load_mechanism(path))
+    alike = brentq(lambda r: np.subtract(rod(0.4, r=r)[1], rod(2.4, r=r)[1]), 0.2, 0.5)
+    assert alike < 0.35
+    assert best.parameters["r"] == pytest.approx(alike, rel=1e-5)  # was left at 0.4
+
+
 def test_the_multiplier_of_a_peak_at_two_positions_is_that_of_both(tmp_path):
     """What a longer bracket would be worth, when the window is placed anew for it."""
 
