@@ -26,6 +26,16 @@ def test_list_as_json_has_name_title_trust_and_file(capsys):
     assert set(entries[0]) == {"kind", "name", "title", "trust", "file"}
 
 
+def test_springs_are_graded_by_most_of_their_numbers(capsys):
+    """Those of the reference study are printed, those of the example assumed."""
+    assert main(["list", "springs", "--json"]) == 0
+    entries = json.loads(capsys.readouterr().out)
+    assert {entry["name"]: entry["trust"][0] for entry in entries} == {
+        "tare_laden_example": "A",
+        "turasas_axlebox": "D",
+    }
+
+
 def test_unknown_kind_is_refused(capsys):
     assert main(["list", "vehicle"]) == 2
     assert "vehicles" in capsys.readouterr().err
