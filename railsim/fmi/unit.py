@@ -117,6 +117,9 @@ class Unit:
                 f"asked for a step at {current_time} s, the run is at {self._time} s", status.error
             )
             return outcome(status.error)
+        if not step_size > 0.0:
+            self.log(f"asked for a step of {step_size} s, allowed is more than 0", status.error)
+            return outcome(status.error)
         if not run.running:
             self.log(f"the run has ended before: {self._status}", status.error)
             return outcome(status.error)

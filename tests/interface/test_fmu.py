@@ -154,6 +154,10 @@ def test_steps_of_communication_may_be_a_little_longer_than_those_of_the_run(uni
     for k in range(20):
         assert called.do_step(3.0 + k * step, step).status.name == "ok", called.logged
     assert called._run.time == pytest.approx(20 * step, abs=0.001 * step)
+    for wrong in (0.0, -step, np.nan):  # an error, after which the run goes on
+        assert called.do_step(3.0 + 20 * step, wrong).status.name == "error"
+    assert "more than 0" in called.logged[-1][0]
+    assert called.do_step(3.0 + 20 * step, step).status.name == "ok"
 
 
 def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
