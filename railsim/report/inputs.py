@@ -25,6 +25,7 @@ Record = Mapping[str, Any]
 MOST_SHOWN = 12  # values of an input of a study
 MOST_AT_REST = 3  # vehicles
 MOST_ASSUMED = 4  # pairs of a vehicle and a track
+MOST_VALUES = 3  # of an assumption in runs of one vehicle on one track
 MOST_DIFFERENCES = 40  # keys in which the vehicles differ
 
 
@@ -58,19 +59,25 @@ def units_of(records: Sequence[Record], used: Sequence[Used]) -> dict[str, str]:
 
 def _assumed(used: Sequence[Used]) -> Table:
     """Return the assumptions of the runs, those of all once."""
-    columns: dict[str, dict[str, str]] = {}
+    found: dict[str, dict[str, dict[str, None]]] = {}
     for one in used:
         name = f"{one.vehicle_label} on {one.track_label}"
-        if name not in columns and len(columns) < MOST_ASSUMED:
-            lines = assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]
-            columns[name] = dict(line.split(None, 1) for line in lines)
-    if all(own == next(iter(columns.values())) for own in columns.values()):
-        columns = {"all runs": next(iter(columns.values()))}
-    keys = dict.fromkeys(key for own in columns.values() for key in own)
-    rows = [[key, *(own.get(key, "") for own in columns.values())] for key in keys]
-    note = "Of the first run of each vehicle on each track, without what was varied."
-    words = range(len(columns) + 1)
-    return Table(["", *map(printable, columns)], rows, "Assumptions", words, note=note)
+        if name in found or len(found) < MOST_ASSUMED:
+            own = found.setdefault(name, {})
+            for line in assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]:
+                key, words = line.split(None, 1)
+                own.setdefault(key, {})[words] = None
+    if all(own == next(iter(found.values())) for own in found.values()):
+        found = {"all runs": next(iter(found.values()))}
+    keys = dict.fromkeys(key for own in found.values() for key in own)
+    rows = [[key, *(_either(list(own.get(key, ()))) for own in found.values())] for key in keys]
+    return Table(["", *map(printable, found)], rows, "Assumptions", range(len(found) + 1))
+
+
+def _either(values: Sequence[str]) -> str:
+    """Return the values that runs have."""
+    more = len(values) - MOST_VALUES
+    return "; or ".join(values[:MOST_VALUES]) + (f"; and {more} more" if more > 0 else "")
 
 
 def what_was_run(

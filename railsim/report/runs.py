@@ -32,8 +32,8 @@ from railsim.version import __version__
 
 Record = Mapping[str, Any]
 PEAKS = (
-    "Largest magnitudes over all steps after the start of the run, with their signs; wheelsets are "
-    "numbered from the leading end."
+    "Largest magnitudes over all {instants} after the start of the run, with their signs; "
+    "wheelsets are numbered from the leading end."
 )
 MOST_ROWS = 300  # of a table on the page
 MOST_UNITS = 4  # runs whose inputs say the units of what was varied
@@ -150,7 +150,12 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Sect
         ["", *(printable(str(record["name"])) for record in shown)],
         [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
     )
-    texts, done = [PEAKS], len(_done(records))
+    # results with a low pass hold the peaks of their outputs alone
+    of_steps = ["peaks" in results[record["name"]].groups for record in shown]
+    kinds = {(True, True): "steps", (False, False): "outputs"}
+    mixed = "outputs, and over all steps where a result holds these,"
+    instants = kinds.get((any(of_steps), all(of_steps)), mixed)
+    texts, done = [PEAKS.format(instants=instants)], len(_done(records))
     if not shown:
         texts = ["The study kept no results of its runs (`--keep summary`); their values follow."]
     elif len(shown) < done:

@@ -280,7 +280,10 @@ def _exchange(node: Any, wheels: dict[str, str]) -> bool:
 
 
 def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
-    """Track whose radii give the cant deficiency asked for at the speed asked for."""
+    """Track whose radii give the cant deficiency asked for at the speed asked for.
+
+    Its permitted speed changes with them: at equal cant deficiency with the root of the radius.
+    """
     if speed.admissible is None or speed.cant_deficiency is None:
         return track
     as_drawn = _speed_in_curve(speed, service)
@@ -289,7 +292,8 @@ def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
     for k, element in enumerate(plan):
         if isinstance(element, Circle):
             plan[k] = element.model_copy(update={"radius": factor * element.radius})
-    return track.model_copy(update={"plan": tuple(plan)})
+    permitted = track.speed and track.speed * math.sqrt(factor)
+    return track.model_copy(update={"plan": tuple(plan), "speed": permitted})
 
 
 def repeated(case: Case, limits: RunningLimits, service: Service, condition: int) -> list[Case]:

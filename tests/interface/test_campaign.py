@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import h5py
@@ -17,6 +18,7 @@ from railsim.assessment.sections import track_sections
 from railsim.assessment.track_quality import TrackQuality
 from railsim.cli import main
 from railsim.definitions.loading import load_running_limits, load_scenario
+from railsim.definitions.track.layout import track_remarks
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.profiles import load_profile
@@ -38,6 +40,10 @@ def test_campaign_meets_the_conditions_of_the_standard(vehicle):
         counted = {zone: [] for zone in "1234"}
         for case in own:
             assert case.vehicle.service.condition == state.replace("_", " ")
+            # the permitted speed is that of 150 mm in the middle radius, also of scaled ones
+            remarks = [r for r in track_remarks(case.track) if "a cant deficiency of" in str(r)]
+            deficiencies = [int(re.search(r"deficiency of (\d+) mm", str(r))[1]) for r in remarks]
+            assert max(deficiencies, default=0) <= 1.1 * 150.0
             wheels |= set(flatten(case.vehicle).of_kind("wheelset")[0].wheelset.profile)
             loads.add(case.vehicle.load)
             seeds.append(case.labels["seed"])

@@ -337,6 +337,41 @@ def test_remarks_on_a_track_stand_beside_its_drawing_and_names_once():
     assert not coach.words.startswith(coach.title)
 
 
+def test_assumptions_are_those_of_all_runs_of_a_vehicle_on_a_track():
+    result = example_result()
+    (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": result})
+    runs = [used] + [
+        used._replace(track=used.track.model_copy(update={"friction": (mu, mu)}))
+        for mu in (0.3, 0.35, 0.45)
+    ]
+    (table,) = (t for t in what_was_run(runs, {}, {}).tables if t.caption == "Assumptions")
+    cells = {row[0]: row[1] for row in table.rows}
+    assert table.header == ["", "all runs"]
+    for mu in ("0.4", "0.3", "0.35"):
+        assert f"friction {mu}" in cells["contact"]
+    assert cells["contact"].endswith("; and 1 more")
+    assert "; or" not in cells["forces"]
+
+
+def test_peaks_of_low_passed_outputs_are_not_said_to_be_of_all_steps():
+    """The low pass at 2 Hz takes off what the steps have: the page shows the outputs'."""
+    coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    how = {"speed": 20.0, "start": 290.0, "duration": 2.0}
+    settings = railsim.Settings(outputs={"low_pass": {"frequency": 20.0}}, output_rate=100.0)
+    runs = {
+        "all": railsim.simulate(coach, track, **how),
+        "low": railsim.simulate(coach, track, settings=settings, **how),
+    }
+    for names, words in (
+        (["all"], "over all steps after"),
+        (["low"], "over all outputs after"),
+        (["all", "low"], "over all outputs, and over all steps where a result holds these, after"),
+    ):
+        shown = {name: runs[name] for name in names}
+        records = [{"name": name, "labels": {}, **run_facts(one)} for name, one in shown.items()]
+        assert words in page("page", records, shown)
+
+
 def test_reasons_of_all_verdicts_are_told_once_and_points_below_a_body_are_below():
     found = assessed({"run": example_result()})[1]
     verdicts = next(table for table in found.tables if table.caption.startswith("Verdicts"))

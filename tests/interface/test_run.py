@@ -126,10 +126,13 @@ def test_continuation_of_no_result_is_refused(tmp_path, capsys):
 
 def test_irregular_rails_are_told(tmp_path, capsys):
     dips = ", ".join(f'{{type="dip", s={s}.0, length=2.0, depth=0.001}}' for s in (2, 5, 8))
-    rails = f'track.irregularities=[{{type="random", spectrum="erri_b176_low", seed=7}}, {dips}]'
+    more = 'scale=1.5, channels=["lateral", "gauge"], mirror=true'
+    rails = f'[{{type="random", spectrum="erri_b176_low", seed=7, {more}}}, {dips}]'
+    rails = f"track.irregularities={rails}"
     given = [*SHORT, "--set", rails, "--out", str(tmp_path / "run.h5")]
     assert main(given) == 0
-    expected = "rails     erri_b176_low, seed 7, 3 to 70 m; dip at 2 m; 2 more"
+    random = "erri_b176_low of lateral and gauge, seed 7, 3 to 70 m, times 1.5, mirrored"
+    expected = f"rails     {random}; dip at 2 m; 2 more"
     assert expected in capsys.readouterr().out
 
 

@@ -92,8 +92,9 @@ class Measured(Irregular):
         return max(0.05, 0.5 * min(b - a for a, b in pairwise(s)))
 
     def summary(self) -> str:
-        """Return that it is measured, and its number of rows."""
-        return f"measured, {len(self.rows or ())} rows"
+        """Return that it is measured, its number of rows and its scale."""
+        times = "" if self.scale == 1.0 else f", times {self.scale:g}"
+        return f"measured, {len(self.rows or ())} rows{times}"
 
     def interpolation(self) -> tuple[Floats, Floats, Floats]:
         """Positions of the rows [m], and displacements [m] and slopes [1] there by columns."""

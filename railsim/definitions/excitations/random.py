@@ -78,9 +78,12 @@ class Random(Stretch):
         return self.wavelengths[0] / 16.0
 
     def summary(self) -> str:
-        """Return spectrum, seed and band."""
+        """Return spectrum, channels, seed, band and scale."""
         low, high = self.wavelengths
-        return f"{self.spectrum}, seed {self.seed}, {low:g} to {high:g} m"
+        of = f" of {' and '.join(self.channels)}" if self.channels else ""
+        times = "" if self.scale == 1.0 else f", times {self.scale:g}"
+        mirrored = ", mirrored" if self.mirror else ""
+        return f"{self.spectrum}{of}, seed {self.seed}, {low:g} to {high:g} m{times}{mirrored}"
 
     def displacement(self, length: float) -> Displacement:
         """Return the sum of cosines of all channels, by interpolation on a periodic lattice."""
