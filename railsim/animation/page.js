@@ -210,17 +210,17 @@ function drawBeside() {
   write(g, ["from the right side", "ahead of the axle (mm):", ahead.join(", ")], h);
 }
 const SERIES = scene.forces ? [
-  [scene.words.Q, i => scene.forces.Q[i][chosen]],
-  [scene.words.Y, i => scene.forces.Y[i][chosen]],
-  [scene.words.wheelset_lateral, i => [scene.pose[i][first + chosen][1] * 1e3]],
+  [scene.words.Q, scene.curves.Q],
+  [scene.words.Y, scene.curves.Y],
+  [scene.words.wheelset_lateral, scene.curves.lateral],
 ] : [];
 function drawPlots() {
-  const [g, w, h] = fit($("plots")), axis = scene.distance;
-  const low = axis[0], high = axis[n - 1], left = 44, each = (h - 18) / SERIES.length;
+  const [g, w, h] = fit($("plots")), axis = scene.curves.distance;
+  const low = axis[0], high = axis[axis.length - 1], left = 44, each = (h - 18) / SERIES.length;
   const X = v => left + (w - left - 8) * (v - low) / (high - low);
   g.font = "11px system-ui, sans-serif"; g.lineWidth = 1.2;
   SERIES.forEach(([name, values], row) => {
-    const all = Array.from({ length: n }, (_, i) => values(i)), flat = all.flat();
+    const all = values.map(v => v[chosen]), flat = all.flat();
     let a = Math.min(...flat), b = Math.max(...flat);
     if (b - a < 1e-9) { a -= 1; b += 1; }
     const top = row * each + 16, Y = v => top + (each - 24) * (b - v) / (b - a);
@@ -234,7 +234,7 @@ function drawPlots() {
     });
     g.setLineDash([]);
   });
-  g.strokeStyle = ink.now; g.beginPath(); g.moveTo(X(axis[frame]), 16); g.lineTo(X(axis[frame]), h - 16); g.stroke();
+  g.strokeStyle = ink.now; g.beginPath(); g.moveTo(X(scene.distance[frame]), 16); g.lineTo(X(scene.distance[frame]), h - 16); g.stroke();
   g.fillStyle = ink.soft; g.textAlign = "left"; g.fillText(low.toFixed(0), left, h - 4);
   g.textAlign = "right"; g.fillText(high.toFixed(0), w - 8, h - 4);
   g.textAlign = "center"; g.fillText("distance (m)", (left + w) / 2, h - 4);

@@ -35,9 +35,12 @@ def write_page(
 
 def scene_data(scene: Scene) -> dict[str, Any]:
     """Return a scene as plain lists, rounded to what a screen shows (0.01 mm, 0.01 mrad)."""
-    forces = patches = None
+    forces = patches = curves = None
     if scene.Q is not None and scene.Y is not None:
         forces = {"Q": _list(scene.Q * 1e-3, 2), "Y": _list(scene.Y * 1e-3, 2)}
+    if scene.curves is not None:
+        scales = {"distance": (1.0, 2), "Q": (1e-3, 2), "Y": (1e-3, 2), "lateral": (1e3, 3)}
+        curves = {name: _list(scene.curves[name] * a, n) for name, (a, n) in scales.items()}
     if scene.patches is not None:
         patches = {name: _list(scene.patches[name], 5) for name in "yz"}
         patches["N"] = _list(scene.patches["N"] * 1e-3, 2)
@@ -55,7 +58,7 @@ def scene_data(scene: Scene) -> dict[str, Any]:
         "contact": _list(scene.contact, 5),
         "sections": [[{k: _list(v, 5) for k, v in section.items()} for section in pair]
                      for pair in scene.sections],
-        "seats": _list(scene.seats, 5), "patches": patches,
+        "seats": _list(scene.seats, 5), "patches": patches, "curves": curves,
     }  # fmt: skip
 
 

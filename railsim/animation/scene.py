@@ -60,7 +60,8 @@ class Scene:
     right, see `sections`. `seats` (float64[frame, wheelset, 2]): Height of the
     wheelsets' centres, z, at which their wheels touch the drawn rails, and by how much these stand
     further apart than the gauge [m]. `patches`: ``y``, ``z`` [m] and ``N`` [N] of all patches,
-    [frame, wheelset, side, patch].
+    [frame, wheelset, side, patch]. `curves`: ``distance`` [m], ``Q``, ``Y`` [N] and ``lateral``
+    [m] for plots, smallest and largest values between frames, [2 frames, wheelset, side].
     """
 
     title: str
@@ -75,6 +76,7 @@ class Scene:
     sections: tuple[tuple[Mapping[str, Floats], ...], ...]
     seats: Floats | None
     patches: Mapping[str, Floats] | None
+    curves: Mapping[str, Floats] | None = None
 
 
 def result_scene(
@@ -95,7 +97,8 @@ def result_scene(
         found = f"{len(distance)} instants: {result.status}"
         raise input_error("result", found, "a run of some length", "time")
     low, high = between or (float(distance[0]), float(distance[-1]))
-    first, last = np.searchsorted(distance, [low, high])
+    first = int(np.searchsorted(distance, low))
+    last = int(np.searchsorted(distance, high, side="right"))
     if last - first < 2:
         found = f"nothing between {low:g} and {high:g} m"
         allowed = f"the run goes from {distance[0]:.6g} to {distance[-1]:.6g} m"
@@ -117,7 +120,25 @@ def result_scene(
         track=_track(Alignment(result.track()), distance[rows]), Q=result["Q"][rows],
         Y=result["Y"][rows], contact=contact_points(result, rows, profiles), sections=profiles,
         seats=seats(result, rows, profiles, poses[:, wheelsets]), patches=patches,
+        curves=_curves(result, np.append(rows, last)),
     )  # fmt: skip
+
+
+def _curves(result: Result, rows: Floats) -> dict[str, Floats]:
+    """Smallest and largest value from each of some rows to the next, in the order of the ends."""
+    starts, ends = rows[:-1] - rows[0], rows[1:] - 1 - rows[0]
+    if "wheelset_lateral" in result:
+        lateral = result["wheelset_lateral"]
+    else:
+        lateral = result["body_position"][:, [result.bodies.index(w) for w in result.wheelsets], 1]
+    found = {"distance": np.repeat(result["distance"][rows[:-1]], 2)}
+    for name, values in (("Q", result["Q"]), ("Y", result["Y"]), ("lateral", lateral[..., None])):
+        own = values[rows[0] : rows[-1]]
+        low, high = (extreme.reduceat(own, starts) for extreme in (np.fmin, np.fmax))
+        rising = own[ends] >= own[starts]
+        pair = np.where(rising, low, high), np.where(rising, high, low)
+        found[name] = np.stack(pair, axis=1).reshape(-1, *own.shape[1:])
+    return found
 
 
 def _poses(result: Result, rows: Floats) -> Floats:
@@ -283,7 +304,8 @@ def contact_points(
     A wheel that yaws touches ahead of its axle or behind it by -z dz/dy psi, with the slope of its
     profile at the point of contact; its axle is there at -y psi (to first order in the yaw psi).
 
-    Returns float64[frame, wheelset, side, 3]: NaN where a wheel does not touch; the nominal
+    They turn with the wheelset from its roll on the track to that on its rails, which are drawn
+    level.  Returns float64[frame, wheelset, side, 3]: NaN where a wheel does not touch; the nominal
     rolling circles where the result does not have `contact_y` and `contact_z` [m].
     """
     found = np.zeros((len(rows), len(profiles), 2, 3))
@@ -291,6 +313,11 @@ def contact_points(
     if known:
         found[..., 1] = result["contact_y"][rows]
         found[..., 2] = result["contact_z"][rows]
+        if "wheelset_roll" in result:
+            bodies = [result.bodies.index(name) for name in result.wheelsets]
+            roll = result["body_position"][rows][:, bodies, 3] - result["wheelset_roll"][rows]
+            y, z = found[..., 1].copy(), found[..., 2].copy()
+            found[..., 1], found[..., 2] = y + roll[..., None] * z, z - roll[..., None] * y
     for w, pair in enumerate(profiles):
         for side, section in enumerate(pair):
             y, z = section["wheel_y"], section["wheel_z"]

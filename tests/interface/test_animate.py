@@ -83,6 +83,26 @@ def test_wheelsets_are_drawn_where_they_are_on_irregular_rails():
     assert np.max(np.abs(poses[..., 2])) < 2e-3
 
 
+def test_contacts_lie_on_the_drawn_wheels_and_rails_on_tracks_with_cross_level():
+    """The wheelset is drawn level with its rails: its contacts turn with it, by up to 3 mm."""
+    rows = "{type='random', spectrum='erri_b176_high', seed=3}"
+    track = railsim.load_track("straight", [f"irregularities=[{rows}]"])
+    coach = railsim.load_vehicle("coach_manchester")
+    result = railsim.simulate(coach, track, speed=30.0, start=60.0, duration=6.0)
+    scene = result_scene(result, frames=200)
+    first = next(k for k, body in enumerate(scene.bodies) if body.kind == "wheelset")
+    _, y_rolled, _, roll, _, _ = scene.pose[:, first].T
+    for side, section in enumerate(scene.sections[0]):
+        y, z = scene.contact[:, 0, side, 1:].T
+        order = np.argsort(section["wheel_y"])
+        wheel = np.interp(y + roll * z, section["wheel_y"][order], section["wheel_z"][order])
+        height, wider = scene.seats[:, 0].T
+        across = y_rolled + y - (side - 0.5) * wider
+        rail = np.interp(across, section["rail_y"], section["rail_z"])
+        assert np.max(np.abs(z - roll * y - wheel)) < 2e-4
+        assert np.max(np.abs(height + z - rail)) < 2e-4
+
+
 def test_page_needs_nothing_from_elsewhere(result, tmp_path):
     page = write_page(result_scene(result, frames=40), tmp_path / "run.html").read_text()
     assert not re.search(r"(src|href)=|https?://|@import|url\(", page)
@@ -124,7 +144,10 @@ def test_arrows_begin_at_the_contact_and_wheels_without_contact_have_none(result
     np.testing.assert_allclose(old.contact[..., 1], [[[-0.75, 0.75]] * 4] * 5)
     np.testing.assert_allclose(old.contact[..., 2], 0.46, atol=2e-4)
     assert np.isnan(new.contact[0, ..., 1]).all()
-    np.testing.assert_array_equal(new.contact[1:, ..., 2], result["contact_z"][612::612][:4])
+    rows = np.searchsorted(result["time"], new.time)[1:]
+    roll = result["body_position"][rows][:, 3:, 3] - result["wheelset_roll"][rows]
+    turned = result["contact_z"][rows] - roll[..., None] * result["contact_y"][rows]
+    np.testing.assert_array_equal(new.contact[1:, ..., 2], turned)
     data = scene_data(new)
     assert data["contact"][0][0][0][1] == 0.0
     assert data["words"]["Q"] == "Q (kN): vertical wheel force"  # as in the tables
@@ -163,6 +186,22 @@ def test_a_wheelset_beside_its_rails_is_drawn_on_its_flanges(result):
     flange = max(section["wheel_z"].max() for section in scene.sections[0])
     np.testing.assert_allclose(scene.seats[..., 0], -flange)
     json.dumps(scene_data(scene), allow_nan=False)
+
+
+def test_curves_keep_the_peaks_between_frames(result):
+    """Also with few frames, and the last instant of the run is the last frame."""
+    scene = result_scene(result, frames=7)
+    assert scene.time[-1] == result["time"][-1]
+    assert scene.curves["distance"].shape == (14,)
+    for name, values in (
+        ("Q", result["Q"]),
+        ("Y", result["Y"]),
+        ("lateral", result["wheelset_lateral"][..., None]),
+    ):
+        for extreme in (np.max, np.min):
+            np.testing.assert_array_equal(extreme(scene.curves[name], 0), extreme(values, 0))
+    data = scene_data(scene)["curves"]
+    assert data["Q"][0][0][1] == pytest.approx(1e-3 * scene.curves["Q"][0, 0, 1], abs=5e-3)
 
 
 def test_part_of_a_run(result):
