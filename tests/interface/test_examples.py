@@ -3,10 +3,15 @@
 import json
 import linecache
 import re
+import runpy
 
+import h5py
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 from generators import examples as GALLERY
+
+import railsim
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
@@ -46,6 +51,27 @@ def test_example_runs_and_draws_its_picture(script, tmp_path, monkeypatch, capsy
     assert all(axes.lines or axes.patches for axes in names["figure"].axes)
     printed, written = capsys.readouterr().out, GALLERY.output(GALLERY.PAGES / f"{script.stem}.md")
     assert NUMBER.sub("", printed).split() == NUMBER.sub("", written).split()
+
+
+@pytest.mark.slow
+def test_measured_run_is_that_of_today_but_for_its_noise():
+    """2 % of the standard deviation; of an older state of railsim 2.2 % at the axlebox."""
+    folder = GALLERY.ROOT / "examples" / "measured_run"
+    make = runpy.run_path(str(folder / "make.py"))
+    settings = {"output_rate": make["RATE"], "outputs": make["OUTPUTS"]}
+    track = railsim.load_track(folder / "track.toml")
+    result = railsim.simulate(
+        make["true_vehicle"](), track, speed=make["SPEED"],
+        settings=railsim.Settings.model_validate(settings),
+    )  # fmt: skip
+    with h5py.File(folder / "run.h5") as file:
+        for channel, point, unit in (
+            ("box1y", "axlebox_1_left", make["GRAVITY"]),
+            ("frame1y", "frame_1", 1.0),
+        ):
+            own = result.series("sensor_acceleration", sensor=point, axis="y") / unit
+            share = np.std(file[channel][:] - own) / np.std(own)
+            assert share == pytest.approx(0.02, rel=0.03)
 
 
 def test_gallery_is_up_to_date():
