@@ -141,7 +141,8 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
     ]
     title = f"{record['vehicle']}: identified parameters"
     good = not (coloured or unidentified or bounded)
-    return Part(title, text, good, record["remarks"], sections, IDENTIFICATION)
+    remarks = [words for words in record["remarks"] if words not in text]
+    return Part(title, text, good, remarks, sections, IDENTIFICATION)
 
 
 def is_measured(file: str | Path) -> bool:

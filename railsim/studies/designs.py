@@ -225,22 +225,24 @@ def with_unit(one: Value) -> str:
     return f"{name_of(one)} ({unit})" if unit else name_of(one)
 
 
-def values_by_name(wanted: Optimise, designs: Sequence[Design]) -> dict[str, list[float]]:
-    """Return objectives and constraints of designs by name with unit.
+def values_by_name(
+    wanted: Optimise, designs: Sequence[Design], named: Callable[[Value], str] = with_unit
+) -> dict[str, list[float]]:
+    """Return objectives and constraints of designs by name, with unit unless `named` otherwise.
 
     A quantity that is several of them stands once, and again where its values differ, as the mean
     over the runs, the smallest and the largest of them do.
     """
     found: dict[str, list[float]] = {}
     for number, one in enumerate((*wanted.objectives, *wanted.constraints)):
-        name, values = with_unit(one), [design.values[number] for design in designs]
+        name, values = named(one), [design.values[number] for design in designs]
         if not np.array_equal(found.get(name, values), values, equal_nan=True):
-            name = f"{name}, {_of_the_runs(one)}"
+            name = f"{name}, {of_the_runs(one)}"
         found[name] = values
     return found
 
 
-def _of_the_runs(one: Value) -> str:
+def of_the_runs(one: Value) -> str:
     """Return which value over the runs of a design an objective or a constraint takes."""
     if isinstance(one, Objective):
         return "mean" if one.over == "mean" else "largest" if one.goal == "minimise" else "smallest"

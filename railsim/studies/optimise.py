@@ -30,6 +30,7 @@ from railsim.studies.designs import (
     Evaluation,
     Progress,
     name_of,
+    of_the_runs,
     share_of,
     signs_of,
     values_by_name,
@@ -240,16 +241,13 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
 
 def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivity]:
     wanted = evaluation.wanted
-    names = [name_of(one) for one in (*wanted.objectives, *wanted.constraints)]
     variables = wanted.variables.items()
     shares = np.array(
         [[share_of(v, d.variables[path]) for path, v in variables] for d in evaluation.designs]
     )  # designs as points of the unit cube
-    values = np.array([design.values for design in evaluation.designs])
-    unique = list(dict.fromkeys(names))
-    values = values[:, [names.index(name) for name in unique]]
-    middle = shares[chosen.number - 1]
-    return sensitivities(shares, values, middle, list(wanted.variables), unique)
+    values = values_by_name(wanted, evaluation.designs, name_of)
+    columns, middle = np.transpose(list(values.values())), shares[chosen.number - 1]
+    return sensitivities(shares, columns, middle, list(wanted.variables), list(values))
 
 
 def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
@@ -278,7 +276,10 @@ def _write(found: Optimisation) -> None:
     text = json.dumps(plain(found.record()), indent=1, allow_nan=False)
     write_text(found.folder / "optimise.json", text + "\n")
     write_text(found.folder / "designs.csv", found.table().csv())
-    labels = [with_unit(one) for one in found.definition.objectives]
+    objectives = found.definition.objectives
+    labels = [with_unit(one) for one in objectives]
+    if len({*labels}) < len(labels):
+        labels = [f"{with_unit(one)}, {of_the_runs(one)}" for one in objectives]
     values = np.array([design.objectives for design in found.designs])
     feasible = np.array([design.feasible for design in found.designs])
     front = [design.number - 1 for design in found.front]
@@ -286,9 +287,7 @@ def _write(found: Optimisation) -> None:
     figure = front_figure(values, labels, feasible, front, chosen)
     save(figure, found.folder / "front.png", overwrite=True)
     if found.sensitivities and found.chosen is not None:
-        ones = (*found.definition.objectives, *found.definition.constraints)
-        units = {name_of(one): with_unit(one) for one in ones}
-        names = [units[one.quantity] for one in found.sensitivities]
+        names = list(values_by_name(found.definition, found.designs))
         figure = sensitivity_figure([one.record() for one in found.sensitivities], names)
         save(figure, found.folder / "sensitivities.png", overwrite=True)
 

@@ -277,7 +277,14 @@ def test_the_values_that_decide_are_in_the_table(tmp_path):
     text = text.replace('curve.attack"', 'curve.damping"\nover = "mean"')
     text = text.replace("curve.Y_over_Q", "curve.damping").replace("high = 0.9", "low = 0.0")
     text += '[[optimise.constraints]]\nquantity = "curve.damping"\nhigh = 0.9\n'
-    found = railsim.optimise(written(tmp_path, text), out=tmp_path / "o", evaluations=2, workers=1)
+    found = railsim.optimise(written(tmp_path, text), out=tmp_path / "o", evaluations=3, workers=1)
+    assert [one.quantity for one in found.sensitivities] == [
+        "curve.damping",
+        "curve.damping, mean",
+        "curve.damping, smallest",
+    ]
+    largest, mean, smallest = (one.low[X] for one in found.sensitivities)
+    assert smallest < mean < largest
     with open(tmp_path / "o" / "designs.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     for row, design in zip(rows, found.designs, strict=True):

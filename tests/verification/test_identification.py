@@ -355,6 +355,7 @@ def test_a_bound_that_keeps_the_value_out_is_said(found, low):
     part = of_identification({**one.record(), "channels": []}, [])
     assert part.verdict == one.remarks[0]  # and not "All parameters are identified"
     assert not part.ok
+    assert one.remarks[0] not in part.remarks  # said once
     assert not one.unidentified
 
 
