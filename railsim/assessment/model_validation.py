@@ -85,11 +85,12 @@ def validate_model(
     runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
     found = [results] if isinstance(results, Result) else list(results)
     if len(found) != len(runs) or not runs:
-        words = f"{len(found)} results for {len(runs)} measured runs"
-        raise argument_error("results", words, "one for each")
+        words = f"{len(found)} results for {len(runs)} measured run{'s' * (len(runs) != 1)}"
+        raise argument_error("results", words, "one for each", option="RESULT.h5")
     names = [run.name for run in runs]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        raise argument_error("measured", f"two runs named '{twice[0]}'", "a name for each run")
+        words, allowed = f"two runs named '{twice[0]}'", "a name for each run"
+        raise argument_error("measured", words, allowed, option="MEASURED.toml")
     if not isinstance(limits, ValidationLimits):
         limits = load(ValidationLimits, limits)
     unknown = sorted(set(limits.limits) - set(QUANTITIES))

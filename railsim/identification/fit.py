@@ -101,7 +101,8 @@ def identify(
     files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
     places = [Path(one).resolve() for one in files if not isinstance(one, Measurement)]
     for twice in {one.name for one in places if places.count(one) > 1}:
-        raise argument_error("measured", f"{twice} is given twice", "each run once")
+        words = f"{twice} is given twice"
+        raise argument_error("measured", words, "each run once", option="MEASURED.toml")
     runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
     if not runs:
         raise argument_error("measured", "none", "one measured run at least")

@@ -4,6 +4,7 @@ Every case is one wrong value in a file that is right otherwise; nothing is comp
 """
 
 import pytest
+from example_result import example_result
 
 from railsim.cli import main
 
@@ -252,3 +253,19 @@ def test_run_without_speed_is_told(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "coach_manchester", "straight"]) == 2
     assert "--speed: no speed is given; a speed in m/s" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["validate-model", "coach_25t_run", "coach_25t_run"], "MEASURED.toml: two runs named"),
+        (["validate-model", "coach_25t_run", "a.h5", "b.h5"], "RESULT.h5: 2 results for 1 "),
+        (["identify", "coach_25t", *2 * ["coach_25t_run"], "-p", "x"], "MEASURED.toml: coach_25t"),
+    ],
+)
+def test_files_without_an_option_are_not_called_by_one(given, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.h5", "b.h5"):
+        example_result().to_hdf5(name)
+    assert main(given) == 2
+    assert words in capsys.readouterr().err
