@@ -24,6 +24,7 @@ PEAK_QUANTITIES = (*FORCES, "wheelset_lateral", "wheelset_roll", "wheelset_yaw",
 LOW_PASS = 20.0  # low pass of forces in EN 14363 [Hz]
 
 LEAST_RATE = 2.5  # outputs per period of the low pass at least
+LOADED = 0.05  # of the static load; below it the low pass's ringing decides on Y/Q
 DEVIATION = (15.87, 84.13)
 """Percentiles that are one standard deviation from the median of a normal distribution."""
 SETTLING = 1.0 / 3.0  # share of a full curve in which the vehicle settles
@@ -110,7 +111,8 @@ def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
     Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
-    has lifted does not spoil the rest.  None where there are gaps.
+    has lifted does not spoil the rest, where `LOADED` of the static load are left.  None where
+    there are gaps.
 
     `rate`: outputs per second; `known` keeps what has been filtered of this result, and is filled.
     """
@@ -121,7 +123,8 @@ def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats
         return known[part]
 
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
-        smooth = outward_quotient(passed("Y"), passed("Q"))
+        loaded = passed("Q") > (LOADED * result["Q0"] if "Q0" in result else 0.0)
+        smooth = np.where(loaded, outward_quotient(passed("Y"), passed("Q")), np.nan)
     elif np.isnan(result[name]).any():
         return None
     elif name == "dQ_over_Q0" and {"Q", "Q0"} <= set(result):
