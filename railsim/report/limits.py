@@ -24,8 +24,9 @@ from railsim.text import printable
 KINDS = {PASS: PASSED, FAIL: FAILED, DERAILED: FAILED}
 NADAL = (
     "Nadal's limit (tan γ - μ)/(1 + μ tan γ), γ the flange angle of the profile, μ the friction of "
-    "the track; Y/Q unfiltered at the outputs. The climb is the longest stretch above the limit. "
-    "Overturning is (ΣQ left - ΣQ right)/ΣQ of a bogie; 1: a side without load."
+    "the track; Y/Q unfiltered at the outputs. The climb is the longest stretch of any wheel above "
+    "the limit or without load. Overturning is the largest magnitude of (ΣQ left - ΣQ right)/ΣQ of "
+    "a bogie; 1: a side without load."
 )
 NOTE = (
     "Estimate from the sections within the standard's conditions, below it the share of the limit, "
