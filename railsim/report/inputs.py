@@ -61,17 +61,17 @@ def _assumed(used: Sequence[Used]) -> Table:
     """Return the assumptions of the runs, those of all once."""
     found: dict[str, dict[str, dict[str, None]]] = {}
     for one in used:
-        name = f"{one.vehicle_label} on {one.track_label}"
-        if name in found or len(found) < MOST_ASSUMED:
-            own = found.setdefault(name, {})
-            for line in assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]:
-                key, words = line.split(None, 1)
-                own.setdefault(key, {})[words] = None
+        own = found.setdefault(f"{one.vehicle_label} on {one.track_label}", {})
+        for line in assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]:
+            key, words = line.split(None, 1)
+            own.setdefault(key, {})[words] = None
     if all(own == next(iter(found.values())) for own in found.values()):
         found = {"all runs": next(iter(found.values()))}
     keys = dict.fromkeys(key for own in found.values() for key in own)
-    rows = [[key, *(_either(list(own.get(key, ()))) for own in found.values())] for key in keys]
-    return Table(["", *map(printable, found)], rows, "Assumptions", range(len(found) + 1))
+    shown, more = dict(list(found.items())[:MOST_ASSUMED]), len(found) - MOST_ASSUMED
+    rows = [[key, *(_either(list(own.get(key, ()))) for own in shown.values())] for key in keys]
+    header, note = ["", *map(printable, shown)], f"{more} more vehicles on tracks." * (more > 0)
+    return Table(header, rows, "Assumptions", range(len(shown) + 1), note=note)
 
 
 def _either(values: Sequence[str]) -> str:
@@ -127,10 +127,12 @@ def _at_rest(results: Mapping[str, Result]) -> list[Table]:
     """Return how the vehicles of the results stand at rest, each in its load case."""
     vehicles: list[tuple[Vehicle, Mapping[str, Profile]]] = []
     for result in results.values():
+        if len(vehicles) == MOST_AT_REST:
+            break
         if all(result.vehicle() != known for known, _ in vehicles):
             vehicles.append((result.vehicle(), result.profiles))
     found = []
-    for vehicle, profiles in vehicles[:MOST_AT_REST]:
+    for vehicle, profiles in vehicles:
         with suppress(InputError, ModelError):
             loads = static_loads(vehicle, profiles=profiles)
             subject = f"{vehicle.name}, load '{loads.load}' at rest"

@@ -55,7 +55,8 @@ def page(
     `title`: Title of the page. `records`: One for each run, as `railsim.result.facts.run_facts`
     with ``name`` and ``labels``, including runs that failed or have not been done. `results`:
     Results, by the names of their runs, whose curves are shown. `remarks`: Further notes for the
-    reader. `assessable`: All results, which are assessed together; by default `results`. `inputs`:
+    reader. `assessable`: All results, which are assessed together and whose inputs are told; by
+    default `results`. `inputs`:
     Inputs of the study whose runs these are, as in its ``study.json``. `used`: What runs without
     results used, as the files are now. `assessments`: Those of a scenario; comfort, wear and
     safety are shown in sections of their own. `measured`: Comparisons with tests and
@@ -66,9 +67,10 @@ def page(
     cells = cells_of(found)
     curves = [curve_data(group, cells) for group in found]
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
-    verdicts, limits = assessed(results if assessable is None else assessable)
+    every = results if assessable is None else assessable
+    verdicts, limits = assessed(every)
     peaks = any(record["name"] in results for record in _done(records))
-    used = inputs_of(records, results) or list(used)
+    used = inputs_of(records, every) or list(used)
     units = units_of(records, used[:MOST_UNITS])
     sections = [_peaks(records, results)] if peaks or len(records) < spread.LEAST else []
     sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
@@ -81,7 +83,7 @@ def page(
     if len(records) >= spread.LEAST:
         sections.append(_spread(records, data, inputs, units))
     sections += [*_published(results), *measured]
-    sections.append(what_was_run(used, results, inputs))
+    sections.append(what_was_run(used, every, inputs))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report", "templates/runs.html", title=title,

@@ -353,6 +353,33 @@ def test_assumptions_are_those_of_all_runs_of_a_vehicle_on_a_track():
     assert "; or" not in cells["forces"]
 
 
+def test_inputs_are_those_of_all_runs_also_without_curves():
+    """Of eight runs of 36 curves are shown: the page told the inputs of these alone."""
+    shown = example_result()
+    track = railsim.load_track("straight", ["friction=0.25"])
+    other = railsim.simulate(
+        railsim.load_vehicle("coach_flexicoil"), track, speed=20.0, duration=0.1
+    )
+    every = {"a": shown, "b": other}
+    records = [{"name": name, "labels": {}, **run_facts(one)} for name, one in every.items()]
+    text = unescape(page("page", records, {"a": shown}, assessable=every))
+    inputs = text[text.index('id="inputs"') :]
+    for words in (other.vehicle().name, track.name, "Differences between the vehicles"):
+        assert words in inputs
+    assert "friction 0.25" in inputs
+    assert inputs.count("flexicoil primary suspension, load 'design' at rest") > 0
+
+
+def test_assumptions_of_more_vehicles_on_tracks_than_are_shown_are_counted():
+    result = example_result()
+    (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": result})
+    runs = [used._replace(track_label=f"track {k}") for k in range(6)]
+    runs[5] = runs[5]._replace(track=used.track.model_copy(update={"friction": (0.1, 0.1)}))
+    (table,) = (t for t in what_was_run(runs, {}, {}).tables if t.caption == "Assumptions")
+    assert len(table.header) == 5  # not "all runs"
+    assert table.note == "2 more vehicles on tracks."
+
+
 def test_peaks_of_low_passed_outputs_are_not_said_to_be_of_all_steps():
     """The low pass at 2 Hz takes off what the steps have: the page shows the outputs'."""
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
