@@ -14,7 +14,7 @@ import railsim
 
 HERE = Path(__file__).parent
 TRUE = {"coil_spring.stiffness.z": 0.80, "secondary_vertical_damper.damper_table": 0.85}
-SPEED, RATE, GRAVITY = 26.0, 100.0, 9.81
+SPEED, RATE, GRAVITY, G = 26.0, 100.0, 9.81, 9.80665  # G: the unit
 ROLL = 0.010  # rad, of the floor's sensors
 SHIFT, DRIFT = 3.0, 8e-4  # m, 1: of the counter
 
@@ -57,7 +57,7 @@ def main() -> None:
             force = run.series(name, wheelset=0, side=side)
             data[f"{name}1{letter}"] = noisy(force / 1e3, 2)
     for axis in "zy":
-        data[f"box1{axis}"] = noisy(reading("axlebox_1_left", axis) / GRAVITY, 4)
+        data[f"box1{axis}"] = noisy(reading("axlebox_1_left", axis) / G, 4)
         data[f"frame1{axis}"] = noisy(reading("frame_1", axis), 3)
     for k, point in ((1, "floor_front"), (2, "floor_rear")):
         y, z = reading(point, "y"), reading(point, "z")

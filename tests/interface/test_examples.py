@@ -66,7 +66,7 @@ def test_measured_run_is_that_of_today_but_for_its_noise():
     )  # fmt: skip
     with h5py.File(folder / "run.h5") as file:
         for channel, point, unit in (
-            ("box1y", "axlebox_1_left", make["GRAVITY"]),
+            ("box1y", "axlebox_1_left", make["G"]),
             ("frame1y", "frame_1", 1.0),
         ):
             own = result.series("sensor_acceleration", sensor=point, axis="y") / unit

@@ -151,23 +151,6 @@ def test_a_section_with_a_wheel_without_load_is_left_out_and_named(measured, rig
     assert ModelValidation.of(found.record())["Y_over_Q_qst"].mean == own.mean
 
 
-@pytest.mark.further
-def test_load_stiffness_and_small_faults(measured, right):
-    """Laden for empty: wheel loads; secondary springs x 3: the ride; primary + 30 %: seen."""
-    true = make.true_vehicle()
-    laden = railsim.validate_model(measured, simulated(true.with_values({"load": "laden"})))
-    assert laden["Q_qst"].verdict == laden["Q_max"].verdict == "fail"
-    hard = scaled(true, "bogie", "secondary_spring", "stiffness", 3.0)
-    hard = railsim.validate_model(measured, simulated(hard))
-    assert {hard[name].verdict for name in ("body_z_max", "body_z_rms")} == {"fail"}
-    own = railsim.validate_model(measured, right)
-    primary = scaled(true, "axle", "coil_spring", "stiffness", 1.3)
-    primary = railsim.validate_model(measured, simulated(primary))
-    assert primary.verdict == "pass"
-    assert primary["Q_max"].deviation > 2.0 * own["Q_max"].deviation
-    assert abs(primary["Y_qst"].mean) > 5.0 * abs(own["Y_qst"].mean)
-
-
 def test_swapped_signs_wrong_units_and_late_channels_are_said(measured, right):
     measured = measured.part(0.0, 1300.0)
     definition = measured.definition
