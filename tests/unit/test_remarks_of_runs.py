@@ -8,7 +8,13 @@ import pytest
 import railsim
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
-from railsim.simulation.remarks import creep_range, stability, unsettled_rails, vibration
+from railsim.simulation.remarks import (
+    beyond_experience,
+    creep_range,
+    stability,
+    unsettled_rails,
+    vibration,
+)
 
 
 def test_nothing_counted_is_nothing_said():
@@ -21,6 +27,24 @@ def test_all_corrections_used_are_told_with_their_number_and_a_way_to_check():
     assert f"all {MOST_CORRECTIONS} iterations" in remark
     assert "0.02%" in remark
     assert "--check-step" in remark
+
+
+def test_sums_of_Y_count_against_three_times_their_limit():
+    """2 wheels of 60 kN: 10 kN + 120 kN/3 = 50 kN, of the lighter axle 10 + 60/3 = 30 kN."""
+    Q0 = np.array([[60e3, 60e3], [30e3, 30e3]])
+
+    def said(sum_Y):
+        values = {"Q": np.zeros((2, 2, 2)), "sum_Y": np.array([[0.0, 0.0], sum_Y])}
+        places = {name + end: np.ones_like(x) for name, x in values.items()
+                  for end in ("_time", "_distance")}  # fmt: skip
+        return beyond_experience(values | places, Q0, ("leading", "trailing"))
+
+    assert said([-149e3, -89e3]) == ()
+    (words,) = said([-151e3, -89e3])
+    assert words.startswith("The largest sum_Y is 151 kN (leading, ")
+    assert "3.02 times" in words
+    (words,) = said([-149e3, -91e3])
+    assert words.startswith("The largest sum_Y is 91 kN (trailing, ")
 
 
 def test_patches_outside_the_creep_law_are_a_share_of_all():
