@@ -101,7 +101,7 @@ def _gas_spring(
     if not low <= F1 <= high:
         why.append(f"F1 {F1:g} N is not within {low:g} to {high:g} N")
     if not strokes:
-        largest = n(row.stroke[1]) if row.stroke is not None else n((row.strokes or (0.0,))[-1])
+        largest = n(row.stroke[1]) if row.stroke is not None else max(map(n, row.strokes or (0.0,)))
         why.append(f"stroke {needed * 1e3:.1f} mm is needed, {largest * 1e3:g} mm the largest")
     stroke = strokes[0] if strokes else None
     extended = n(spring.extended)
@@ -133,7 +133,7 @@ def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
     """Strokes of a row that are long enough, the shortest first; of a range some more."""
     n, enough = result.model.number, needed * (1.0 - ROUNDING)
     if row.strokes is not None:
-        return [n(s) for s in row.strokes if n(s) >= enough]
+        return sorted(n(s) for s in row.strokes if n(s) >= enough)
     assert row.stroke is not None
     low, high = n(row.stroke[0]), n(row.stroke[1])
     return [] if enough > high else list(np.linspace(np.clip(needed, low, high), high, 101))
@@ -184,9 +184,9 @@ def _with_row(
 def F1_band(result: Analysis, row: CatalogueRow, F1: float) -> tuple[float, float]:
     """Tolerance of the force F1 that a row states: minus and plus [N]."""
     n = result.model.number
-    for limit, minus, plus in row.F1_tolerance or ():
-        if n(limit) >= F1:
-            return float(n(minus)), float(n(plus))
+    for limit, minus, plus in sorted([n(x) for x in band] for band in row.F1_tolerance or ()):
+        if limit >= F1:
+            return float(minus), float(plus)
     return 0.0, 0.0
 
 

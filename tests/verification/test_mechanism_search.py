@@ -361,3 +361,14 @@ def test_springs_against_each_other_are_worst_at_a_mixed_corner(tmp_path):
     corners = [hand(F, T, angles) for F in (270.0, 330.0) for T in (-30.0, 80.0)]
     assert row.values["force_lowest"] == pytest.approx(np.min(corners), rel=1e-5)
     assert row.values["force_highest"] == pytest.approx(np.max(corners), rel=1e-5)
+
+
+def test_the_order_of_strokes_and_tolerances_in_a_row_does_not_matter(tmp_path):
+    head = ARM.partition("[elements.load]")[0].replace("d = 0.1", "d = 0.1\n[derived]\nb = '-d'")
+    head = head.replace('foot = ["d", 0.0]', 'foot = ["d", 0.0]\nheel = ["b", 0.0]')
+    springs = SPRINGS.replace("[0.2]", "[0.3, 0.2, 0.25]")
+    springs = springs.replace("[[900, 30, 30]]", "[[900, 40, 40], [350, 30, 30]]")
+    path = tmp_path / "two.toml"
+    path.write_text(head.replace("start = 0.4", "start = 1.5").replace("2.4", "1.6") + springs)
+    (row,) = selection(analyse(load_mechanism(path)))
+    assert (row.values["stroke"], row.values["F1_low"]) == (0.2, 270.0)
