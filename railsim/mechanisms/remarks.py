@@ -19,6 +19,7 @@ NEAR = 0.05
 def remarks(result: Analysis) -> list[str]:
     """Remarks of the file, and on what its results are."""
     own = [*_zone(result), *_forces(result), *_rods(result), *_gas_springs(result), *_lid(result)]
+    own += _torsion_springs(result)
     bounds = [f"{r.key}: {r.text}" for r in bounds_remarks(result.definition)]
     return [*result.definition.remarks, *own, *bounds]
 
@@ -90,6 +91,19 @@ def _gas_springs(result: Analysis) -> list[str]:
         if part.rod_end is None and (drop := rod_drop(result, name)):
             lower = part.gas_spring[0] if drop > 0.0 else part.gas_spring[1]
             found.append(f"'{name}' belongs with its rod at {lower}, the lower end when compressed")
+    return found
+
+
+def _torsion_springs(result: Analysis) -> list[str]:
+    """Torsion springs wound by more than half a turn, maybe by a turn too many in [start]."""
+    found, motion = [], result.motion
+    for name, part in result.definition.elements.items():
+        if isinstance(part, parts.TorsionSpring) and part.free_angle is not None:
+            first, second = (motion.q[:, result.model.bodies[b], 2] for b in part.torsion_spring)
+            most = float(np.max(np.abs(first - second - result.model.number(part.free_angle))))
+            if most > np.pi:
+                turned = f"torsion spring '{name}' is wound by up to {np.degrees(most):.1f} deg"
+                found.append(f"{turned}: angles are counted from those in [start] and [driver]")
     return found
 
 

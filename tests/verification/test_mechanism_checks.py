@@ -220,6 +220,22 @@ def test_a_motion_law_is_refused_where_its_length_turns_back(tmp_path):
     assert np.all(np.diff(analyse(load_mechanism(path)).timed.motion.s) > 0.0)
 
 
+@pytest.mark.parametrize("turns", [0, -1])
+def test_it_is_said_that_a_torsion_spring_is_wound_by_a_turn_too_many(tmp_path, turns):
+    """The same rocker with its angle in [start] written as 69 or as -291 degrees."""
+    path = tmp_path / "arm.toml"
+    rocker = (
+        "[bodies.rod]\npoints = { pin = [0.0, 0.0], end = [0.5, 0.0] }\n"
+        f"[start]\nrod = {{ angle = {1.2 + turns * 2.0 * np.pi} }}\n"
+        '[joints.end]\nrevolute = ["arm.pin", "rod.pin"]\n'
+        '[joints.guide]\nslot = ["rod.end", "ground.hinge"]\nangle = "pi / 2"\n'
+        '[elements.coil]\ntorsion_spring = ["rod", "ground"]\nstiffness = 2.0\nfree_angle = 1.0\n'
+    )
+    path.write_text(PENDULUM.replace("-0.7", "0.1").replace("2.4", "1.2") + rocker)
+    said = [text for text in remarks(analyse(load_mechanism(path))) if "wound" in text]
+    assert len(said) == abs(turns)
+
+
 def test_it_is_said_that_what_is_let_go_leaves_the_travel(tmp_path):
     """Without friction the arm swings as high on the other side, -pi - 1."""
     path = tmp_path / "arm.toml"
