@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import click
 from railsim.cli import common as cli
 
 if TYPE_CHECKING:
+    from railsim.definitions.mechanism.definition import Mechanism
     from railsim.mechanisms.analysis import Analysis
     from railsim.mechanisms.optimum import Optimum
     from railsim.table import Table
@@ -69,7 +71,7 @@ def command(
             results.append(optimum.after if optimum else analyse(mechanism, case))
             at_values.append(_values_at(results[-1], at))
             if len(results) == 1 and mechanism.cases and case is None and not searched:
-                cases = {name: analyse(mechanism, name) for name in mechanism.cases}
+                cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
     if output.out is not None:
         from railsim.report.mechanisms import Collected
@@ -88,6 +90,18 @@ def command(
         [] if output.as_json else _parts(results, at_values, optimum),
         dict.fromkeys(r for result in results for r in remarks(result)),
     )
+
+
+def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
+    """Results of a case that was not asked for; what is wrong with it names it."""
+    from railsim.errors import InputError
+    from railsim.mechanisms.analysis import analyse
+
+    try:
+        return analyse(mechanism, case)
+    except InputError as error:
+        named = (replace(f, found=f"case '{case}': {f.found}") for f in error.faults)
+        raise InputError(named) from None
 
 
 def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:

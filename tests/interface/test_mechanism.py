@@ -423,6 +423,13 @@ def test_pressure_in_a_gas_spring_is_its_force_over_its_rod(capsys):
     assert output["front_pressure"] == pytest.approx(np.array(output["front_force"]) / area)
 
 
+def test_a_case_that_cannot_be_computed_is_named(capsys):
+    """The spring's bracket at 200 mm is out of its stroke; the base itself is right."""
+    bad = "cases.bad={r_E=0.2}"
+    (line,) = refused(capsys, "tilting_one_spring", "--set", bad, *FEW)
+    assert "elements.front: case 'bad': driver at -35" in line
+
+
 def test_scatter_says_which_dimension_matters(capsys):
     data = answer(capsys, "atr95_lift_5", *FEW)
     stroke = next(one for one in data["scatter"] if one["name"] == "stroke")
