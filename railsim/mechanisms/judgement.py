@@ -24,7 +24,7 @@ from railsim.definitions.mechanism.definition import Mechanism, Optimise
 from railsim.definitions.mechanism.parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism.values import ends, number, parameter_values
 from railsim.errors import Fault, Faults
-from railsim.mechanisms.forces import Rates, generalised_force, rubs, unit_work
+from railsim.mechanisms.forces import Rates, generalised_force, unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents
 from railsim.mechanisms.model import Model, build, with_lanes
@@ -97,6 +97,11 @@ class Judge:
         self.every = every
         self.positions = Positions(full.s[::every], full.height[::every], full.ratio[::every])
         self.labels: list[tuple[str, float]] = []
+        # whatever the parameters are: a friction of 0 may be a bound
+        sizes = [
+            getattr(e, "friction", getattr(e, "moment", 0.0)) for e in definition.elements.values()
+        ]
+        self.rubs = any(size != 0.0 for size in sizes)
         given = [n for n, text in definition.parameters.items() if not isinstance(text, str)]
         self.fixed = {n: self.values[n] for n in given if n not in self.names}
 
@@ -197,7 +202,7 @@ class Judge:
             height = along[..., zone] - along[..., :1]
         ratio, force_zone = self._at_height(motion, model, zone, ratio, force)
         whole = [force[..., grid]]
-        if rubs(model):
+        if self.rubs:
             whole.append(self._force(motion, -1)[..., grid])
         residuals, peaks = self._objective(
             height, ratio, force_zone, np.concatenate(whole, axis=-1)
@@ -320,7 +325,7 @@ class Judge:
             return
         available = motion.model.number(limit)
         scale = float(np.ravel(np.real(available))[0])
-        for way in (1, -1) if rubs(motion.model) else (1,):
+        for way in (1, -1) if self.rubs else (1,):
             force = self._force(motion, way)
             yield "available_force", scale, (available - force) / scale
             if one_sided:

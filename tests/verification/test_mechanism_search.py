@@ -135,6 +135,17 @@ def test_a_search_over_the_whole_travel_may_change_how_far_the_output_goes(tmp_p
     assert best.parameters["r"] == pytest.approx(alike, rel=1e-5)  # was left at 0.4
 
 
+def test_a_search_may_begin_without_friction(tmp_path):
+    """The number of constraints does not depend on it; was a traceback."""
+    search = 'objective="constant_force",range="travel",points=21,starts=1,available_force=300'
+    bounds = "front_F1=[20.0,100.0],rear_friction=[0.0,50.0]"
+    definition = load_mechanism(
+        "tilting_two_springs", [f"optimise={{{search},bounds={{{bounds}}}}}"]
+    )
+    best = optimise(definition).parameters
+    assert best == pytest.approx({"front_F1": 100.0, "rear_friction": 0.0}, abs=1e-9)
+
+
 def test_the_multiplier_of_a_peak_at_two_positions_is_that_of_both(tmp_path):
     """What a longer bracket would be worth, when the window is placed anew for it."""
 
