@@ -330,7 +330,7 @@ def test_bounds_that_exclude_every_assembly(capsys):
         (["--at", "height=9"], "never reached"),
         (["--at", "hight=0.5"], "did you mean 'height'"),
         (["--at", "height"], "NAME=VALUE"),
-        (["--case", "x"], "no cases"),
+        (["--case", "x"], "lift 5' has no cases"),
         (["--starts", "3"], "--optimise"),
         (["--out", "page.html"], "is the name of a file"),
     ],

@@ -381,7 +381,7 @@ class Mechanism(FileDefinition):
         if case is None:
             return self
         if case not in self.cases:
-            allowed = nearest(case, self.cases) if self.cases else "the file has no cases"
+            allowed = nearest(case, self.cases) if self.cases else f"'{self.name}' has no cases"
             raise argument_error("case", f"no case '{case}'", allowed)
         return self.with_parameters(self.cases[case])
 
