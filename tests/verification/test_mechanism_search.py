@@ -383,3 +383,6 @@ def test_the_order_of_strokes_and_tolerances_in_a_row_does_not_matter(tmp_path):
     path.write_text(head.replace("start = 0.4", "start = 1.5").replace("2.4", "1.6") + springs)
     (row,) = selection(analyse(load_mechanism(path)))
     assert (row.values["stroke"], row.values["F1_low"]) == (0.2, 270.0)
+    path.write_text(path.read_text().replace("[900, 40, 40], [350,", "[200, 20, 20], [250,"))
+    (row,) = selection(analyse(load_mechanism(path)))
+    assert row.reasons == ("stroke 200 mm", "no tolerance of F1 stated above 250 N")
