@@ -194,10 +194,15 @@ def dynamic_loads(suspension: TrailingArmSuspension) -> dict[str, float]:
     if table is None:
         raise ValueError("the suspension has no fatigue table")
     stated = {"max_load": (table.max_load, TARE_MAX), "min_load": (table.min_load, TARE_MIN)}
-    return {
+    found = {
         key: factor * suspension.loads[table.tare] if load is None else load
         for key, (load, factor) in stated.items()
     }
+    if found["max_load"] <= found["min_load"]:
+        highest, lowest = (f"{load * 1e-3:.3f} kN" for load in found.values())
+        words = f"highest dynamic load {highest}, lowest {lowest}; by default from {table.tare}"
+        raise input_error(suspension.name, words, "state max_load and min_load", "fatigue")
+    return found
 
 
 def stress(spring: HelicalSpring, state: CoilState) -> float:

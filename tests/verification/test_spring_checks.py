@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from railsim.definitions.loading import load_spring
+from railsim.errors import InputError
 from railsim.springs import checks
 from railsim.springs.design import design
 from railsim.springs.summary import design_data, fatigue_data, ride_height_data, verification_data
@@ -184,6 +185,13 @@ def assert_alike(expected, found, path=""):
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-15), path
     elif path.rpartition(".")[2] != "note":
         assert found == expected, path
+
+
+def test_a_dynamic_load_on_the_wrong_side_of_the_default_of_the_other_is_refused():
+    """65 % of 59.866 kN are 38.913 kN: more than the highest load that is stated."""
+    table = "fatigue={goodman=[[0.0,430e6],[690e6,690e6]],max_load=30e3}"
+    with pytest.raises(InputError, match=r"fatigue: highest .* 30\.000 kN, lowest 38\.913 kN"):
+        fatigue(load_spring("turasas_axlebox", [table]))
 
 
 def test_a_spring_that_never_touches_has_no_stress():
