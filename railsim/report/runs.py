@@ -82,7 +82,7 @@ def page(
         sections.append(limits)
     if len(records) >= spread.LEAST:
         sections.append(_spread(records, data, inputs, units))
-    sections += [*_published(results), *measured]
+    sections += [*_published(every), *measured]
     sections.append(what_was_run(used, every, inputs))
     sections.append(_remarks(records, remarks))
     return rendered(

@@ -368,6 +368,7 @@ def test_inputs_are_those_of_all_runs_also_without_curves():
         assert words in inputs
     assert "friction 0.25" in inputs
     assert inputs.count("flexicoil primary suspension, load 'design' at rest") > 0
+    assert 'id="published"' in page("page", records, {"b": other}, assessable=every)
 
 
 def test_assumptions_of_more_vehicles_on_tracks_than_are_shown_are_counted():
