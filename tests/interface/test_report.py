@@ -100,7 +100,18 @@ async function probe(frame) {
     const count = name => box.querySelectorAll(name).length;
     found.views.push([count("canvas"), count("svg rect"), count("svg polyline")]);
     const texts = () => Array.from(box.querySelectorAll("svg text"), t => t.textContent);
-    if (kind === 1) { found.texts = texts(); }
+    if (kind === 1) {
+      found.texts = texts();
+      const value = box.querySelectorAll("select")[1], before = value.value;
+      const least = Array.from(value.options).find(o => /, smallest/.test(o.textContent));
+      for (const one of [least.value, before]) {
+        value.value = one;
+        value.dispatchEvent(new w.Event("change"));
+        await settle();
+        const cells = box.querySelectorAll("svg text.cell");
+        found.least = found.least || Array.from(cells, cell => Number(cell.textContent));
+      }
+    }
   }
   const table = d.querySelector('[data-plots="runs"]'), rows = () => Array.from(
     table.querySelectorAll("tbody tr"), row => Array.from(row.cells, cell => cell.textContent));
@@ -265,6 +276,14 @@ def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp
         assert found["views"][0] == [1, 0, 0]
         assert found["views"][1] == [0, 14, 0]  # seven speeds, two vehicles
         assert {str(speed) for speed in range(10, 17)} <= set(found["texts"])  # no 11.0, 12.00
+        unloading = min(
+            peak["value"]
+            for run in runs
+            for peak in run["peaks"]
+            if (peak["quantity"], peak["kind"]) == ("dQ_over_Q0", "min")
+        )
+        # each cell has runs of all three gains, and shows the strongest unloading of them
+        assert found["least"] == [pytest.approx(100.0 * unloading, abs=0.005)] * 14
         assert found["views"][2] == [0, 0, 209]  # the failed run has no values
         assert found["heads"][:4] == ["run", "vehicle", "speed (m/s)", "friction"]
         column = found["heads"].index("wheel load change, largest (%)")

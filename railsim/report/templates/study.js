@@ -104,7 +104,8 @@ window.railsimStudy = function (data, tools) {
     var x = parameter(over), y = parameter(beside), across = classes(x, CLASSES), up = classes(y, CLASSES);
     var cells = up.labels.map(function () { return across.labels.map(function () { return []; }); });
     value.values.forEach(function (v, r) { if (v !== null) { cells[up.of(y.values[r])][across.of(x.values[r])].push(v); } });
-    var worst = cells.map(function (row) { return row.map(function (g) { return g.length ? Math.max.apply(null, g) : null; }); });
+    var least = /, smallest$/.test(value.words), worse = least ? Math.min : Math.max;
+    var worst = cells.map(function (row) { return row.map(function (g) { return g.length ? worse.apply(null, g) : null; }); });
     var ends = extent([].concat.apply([], worst)), n = across.labels.length, m = up.labels.length;
     var W = 900, left = 150, wide = (W - left) / n, high = Math.min(44, Math.max(18, 360 / m)), H = m * high + 74, above = 20;
     var picture = svg("svg", made("div", box, undefined, "scroll"), { viewBox: "0 0 " + W + " " + H, class: "study" });
@@ -125,7 +126,7 @@ window.railsimStudy = function (data, tools) {
     svg("text", picture, { x: left + 0.5 * (W - left), y: above + m * high + 42, "text-anchor": "middle" }, words(x));
     svg("text", picture, { x: 4, y: 12 }, words(y));
     scale(box, ends[0], ends[1]);
-    return "Colour: largest " + words(value) + " of all runs of a cell; empty cells have no run.";
+    return "Colour: " + (least ? "smallest " : "largest ") + words(value) + " of all runs of a cell; empty cells have no run.";
   }
 
   /* parallel coordinates ---------------------------------------------------------------------- */
