@@ -66,7 +66,9 @@ def _short(name: str, names: Sequence[str]) -> str:
 
 
 def command(record: Record, inputs: Mapping[str, Any]) -> str:
-    """Return the command that computes a run of a study again.
+    """Return the command that computes a run of a study again; of a scenario, all its runs.
+
+    Empty where the run belongs to no study: its labels are names, not files.
 
     Examples
     --------
@@ -74,18 +76,24 @@ def command(record: Record, inputs: Mapping[str, Any]) -> str:
     >>> command(run, {"duration": 5.0})
     'railsim run coach_25t straight --speed 40 --duration 5'
     """
+    if not inputs:
+        return ""
     labels = dict(record["labels"])
-    words = ["railsim", "run"]
+    files = []
     for kind in ("vehicle", "track"):
         label = str(labels.pop(kind, ""))
-        files = [str(file) for file in inputs.get(f"{kind}s", ())]
-        words.append(next((file for file in files if Path(file).stem == label), label))
+        known = [str(file) for file in inputs.get(f"{kind}s", ())]
+        files.append(next((file for file in known if Path(file).stem == label), label))
+    words = ["railsim", "run", *files]
+    if scenario := inputs.get("scenario"):  # its conditions and seeds are no options of a run
+        words = ["railsim", "study", "--scenario", str(scenario), "--vehicles", files[0]]
+        labels = {}
     if "speed" in labels:
-        words += ["--speed", f"{labels.pop('speed'):g}"]
+        words += ["--speed", f"{labels.pop('speed'):.12g}"]
     for option in ("settings", "start", "duration", "until"):
         value = inputs.get(option)
         if value:
-            words += [f"--{option}", f"{value:g}" if isinstance(value, float) else str(value)]
+            words += [f"--{option}", f"{value:.12g}" if isinstance(value, float) else str(value)]
     pairs = [f"{key}={value}" for key, value in labels.items() if "." in key]
     for pair in (*inputs.get("assignments", ()), *pairs):
         words += ["--set", str(pair)]

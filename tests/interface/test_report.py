@@ -270,7 +270,8 @@ def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp
         labels = {**record["labels"], "speed": 10.0 + i % 7, "vehicle": f"coach{i % 2}"}
         runs.append({**record, "name": f"run{i}", "labels": labels})
     runs[5] = {**runs[5], "status": "failed", "status_reason": "no equilibrium", "peaks": []}
-    for found in probed(tmp_path, page("A study", runs, {}), STUDY_PROBE):
+    html = page("A study", runs, {}, inputs={"keep": "summary"})
+    for found in probed(tmp_path, html, STUDY_PROBE):
         assert found["errors"] == []
         assert found["overflow"] <= 0
         assert found["views"][0] == [1, 0, 0]
@@ -535,6 +536,10 @@ def test_spread_has_the_values_of_every_run():
     runs = records(4)
     assert list(parameters(runs)) == ["track.friction"]
     assert parameters(runs)["track.friction"]["values"] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert command(runs[1], {}) == ""  # of a result file alone: labels are names of vehicles
+    scenario = {"scenario": "en14363", "vehicles": ["../coach.toml"], "tracks": []}
+    campaign = "railsim study --scenario en14363 --vehicles ../coach.toml"
+    assert command({"labels": {**runs[1]["labels"], "seed": 11}}, scenario) == campaign
     assert command(runs[1], {"vehicles": ["../coach.toml"], "until": 400.0}) == (
         "railsim run ../coach.toml curve --speed 20 --until 400 --set track.friction=0.2"
     )

@@ -227,7 +227,7 @@ window.railsimStudy = function (data, tools) {
       Array.from(head.children).forEach(function (th, k) { th.className = [kind(columns[k]), k === by ? (falling ? "falling" : "rising") : ""].join(" "); });
     }
     filter.addEventListener("input", draw);
-    made("p", box, "Click a heading to sort, a row for its reason and its command.", "notes");
+    made("p", box, "Click a heading to sort, a row for its reason and, in a study, its command.", "notes");
     draw();
   }
   return { spread: views, runs: runs };
