@@ -182,7 +182,7 @@ function drawSection(side) {
   write(g, [(side ? "right" : "left") + " wheel", "Q " + wheel.Q.toFixed(1) + " kN", "Y " + wheel.Y.toFixed(1) + " kN"], h);
 }
 function drawBehind() {
-  const [g, w, h] = fit($("behind")), { wheels, at, body } = wheelset(), r = body.box[0], zoom = Math.min(w / 2.2, h / 1.5);
+  const [g, w, h] = fit($("behind")), { wheels, at, body } = wheelset(), r = body.box[0], zoom = Math.min(w / 2.2, h / 1.5, .33 * h / r);
   const P = ([y, z]) => [w / 2 + zoom * y, h * .7 + zoom * z], axle = [[-1.05, -.08], [1.05, -.08], [1.05, .08], [-1.05, .08]];
   for (const wheel of wheels) {
     const rail = wheel.rail.map(P), foot = h * .7 + zoom * .17;
