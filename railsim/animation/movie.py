@@ -17,6 +17,7 @@ from railsim.errors import argument_error
 from railsim.files.access import check_file, whole_file
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
+MARGIN = 1.0  # m, about the vehicle
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 SIDES = ("#004a80", "#b8450a")
 COLOURS = {"car": ((0.34, 0.66, 0.88, 0.22), "#004a80"), "frame": ((0.94, 0.63, 0.24, 0.8),
@@ -76,7 +77,8 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
     polygons.sort(key=lambda item: -item[0])
     _, points, faces, edges = zip(*polygons, strict=True)
     view.add_collection(PolyCollection(points, facecolors=faces, edgecolors=edges, linewidths=0.7))
-    view.set(xlim=(-15.0, 15.0), ylim=(4.5, -4.5), aspect="equal")
+    (left, top), (right, bottom) = _extent(scene)
+    view.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
     view.set_axis_off()
     at_s = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"
     larger = "" if gain == 1.0 else f"; motion of the bodies magnified {gain:g} times"
@@ -84,6 +86,17 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
     view.set_title(words, fontsize=8, loc="left")
     for side, axes in enumerate(sections):
         _draw_section(axes, scene, frame, side)
+
+
+def _extent(scene: Scene) -> tuple[Floats, Floats]:
+    """Corners of what is seen of the bodies on straight track, with a margin [m]."""
+    points = [
+        points + np.array([body.offset, body.y, body.z])
+        for body in scene.bodies
+        for points in _shape(body)
+    ]
+    seen, _ = _seen(np.concatenate(points), np.zeros(4))
+    return seen.min(axis=0) - MARGIN, seen.max(axis=0) + MARGIN
 
 
 def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Floats, Any, Any]]:

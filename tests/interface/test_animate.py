@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
-from railsim.animation.movie import _polygons, draw
+from railsim.animation.movie import _extent, _polygons, draw
 from railsim.animation.page import scene_data
 from railsim.animation.scene import _drawn
 from railsim.cli import main
@@ -269,6 +269,16 @@ def test_a_film_says_how_many_times_larger_the_motion_is(result):
         draw(view, sections, result_scene(result, frames=4), 1, gain)
         assert view.get_title(loc="left").endswith(words)
     assert [axes.get_ylabel() for axes in sections] == ["mm", "mm"]
+
+
+def test_the_whole_vehicle_is_in_the_picture_of_a_film(result):
+    """Also in the curve; the far end of the coach was cut off at its roof."""
+    scene = result_scene(result, frames=12)
+    low, high = _extent(scene)
+    for frame in range(12):
+        bodies = [points for *_, points, face, _ in _polygons(scene, frame, 1.0) if face[0] != "#"]
+        assert np.all(np.concatenate(bodies) > low)
+        assert np.all(np.concatenate(bodies) < high)
 
 
 def test_a_moved_body_is_seen_where_it_would_be_if_it_stood_there(result):
