@@ -64,12 +64,18 @@ def _scene(
         frames = frames or (200 if film else FRAMES)
         return result_scene(open_run(file), frames=frames, between=between)
     from railsim.definitions.loading import load_vehicle
+    from railsim.linear.eigenmodes import SLOWEST
 
     data = _read(file)
     name = vehicle or data.get("vehicle")
     if not isinstance(name, str):
         raise input_error("--vehicle", "not given", "the vehicle of the modes")
-    found = chosen_mode(data["modes"], mode)
+    modes = data["modes"]
+    if mode is None or mode.isdigit():  # as `railsim modes` lists them
+        oscillations = [one for one in modes if one["frequency"] > SLOWEST]
+        oscillations.sort(key=lambda one: one.get("natural_frequency", one["frequency"]))
+        modes = oscillations or modes
+    found = chosen_mode(modes, mode)
     how = {"frames": frames} if frames else ({"frames": 30, "cycles": 2} if film else {})
     return mode_scene(load_vehicle(name), found, **how)
 

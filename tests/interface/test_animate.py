@@ -241,6 +241,19 @@ def test_command_writes_a_page_of_a_mode(tmp_path, capsys):
     assert "no such mode" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("number", "name"), [(None, "slow"), ("1", "slow"), ("2", "fast")])
+def test_modes_are_counted_as_they_are_listed(number, name, tmp_path):
+    """By rising natural frequency, without those that do not oscillate, such as rolling."""
+    modes = [
+        {**MODE, "name": "rolling", "frequency": 1e-6},
+        {**MODE, "name": "fast", "frequency": 2.0, "natural_frequency": 3.0},
+        {**MODE, "name": "slow", "frequency": 2.5, "natural_frequency": 2.6},
+    ]
+    file = tmp_path / "modes.json"
+    file.write_text(json.dumps({"vehicle": "coach_manchester", "modes": modes}))
+    assert name in _scene(file, False, None, number, None, None).title
+
+
 @pytest.mark.parametrize(
     ("film", "frames", "cycles", "pictures"),
     [(True, None, 2, 60), (False, None, 3, 270), (True, 12, 3, 36)],
