@@ -93,7 +93,7 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
 @amount_options("--tonnage distance", "Traffic in Mt.", "Mt", "the rail profiles")
 @law_option
 @cli.given_options("creep law and contact", load=False)
-@cli.output_options("Folder for wear.json and the profiles.")
+@cli.output_options("Folder for wear.json, wear.png and the profiles.")
 @cli.allow_code_option
 def rails(traffic: Mix, given: cli.Given, **how: Any) -> None:
     """Compute the wear of both rails of a track under a mix of traffic, updating their profiles.
@@ -200,6 +200,13 @@ def _carry_out(
         wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
         title = f"{given['vehicle']}: wear of the wheels"
         output.write(PICTURE, lambda: wear_figure(wheels, rows["rows"], title))
+    else:
+        from railsim.plot.study import rail_wear_figure
+        from railsim.studies.wear_loop import since_new
+
+        rails = {side: [(at, worn) for at, worn, _ in since_new(found, side)] for side in rows}
+        title = f"{given['track']}: wear of the rails"
+        output.write(PICTURE, lambda: rail_wear_figure(rails, title))
     if ended is None or not output.as_json:
         output.answer(record, _parts(of, given, wear_law(law).source, rows))
     if ended is not None:

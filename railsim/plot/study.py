@@ -4,7 +4,7 @@ Families of curves, heat maps and rankings of the runs of a study; the Pareto fr
 optimisation and what its values depend on; a wheel that wears; limits over a track.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -321,26 +321,11 @@ def wear_figure(
     `wheels` ([m]): The new wheel, then the wheel after each step. `rows`: Of
     `railsim.studies.wear_loop.wear_rows`. `title`: What was analysed.
     """
-    new = wheels[0][1]
     figure = Picture(8.6, 7.6, title)
     outline, depth, conicity = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 0.8])
-    depth.sharex(outline)
-    outline.plot(1e3 * new.y, 1e3 * new.z, color="0.2", lw=1.2, label="new")
-    last = wheels[-1][1]
-    outline.plot(1e3 * last.y, 1e3 * last.z, color="C3", lw=1.0, label=_km(wheels[-1][0]))
-    outline.invert_yaxis()
-    outline.set_ylabel("z (mm)")
-    outline.legend()
-    for number, (distance, wheel) in enumerate(wheels[1:], start=1):
-        lost = 1e3 * (np.asarray(new.z) - np.asarray(wheel.z))
-        share = 0.25 + 0.75 * number / (len(wheels) - 1)
-        label = _km(distance) if number in (1, len(wheels) - 1) else None
-        depth.plot(1e3 * new.y, lost, color="C3", alpha=share, lw=1.0, label=label)
+    _worn(outline, depth, wheels, _km)
     depth.set_xlim(1e3 * PROFILE[0], 1e3 * PROFILE[1])
-    depth.set_ylim(bottom=0.0)
     depth.set(xlabel="y from the nominal rolling circle, flange negative (mm)")
-    depth.set(ylabel="depth of wear in z (mm)")
-    depth.legend()
     values = [row["equivalent_conicity"] for row in rows]
     kilometres = [1e-3 * distance for distance, _ in wheels]
     conicity.plot(kilometres, [np.nan if v is None else v for v in values], "o-", ms=4)
@@ -348,6 +333,47 @@ def wear_figure(
     conicity.set_ylim(0.0, 1.15 * conicity.get_ylim()[1])
     conicity.set_xlim(left=0.0)
     return figure
+
+
+@styled()
+def rail_wear_figure(rails: Mapping[str, Sequence[tuple[float, "Profile"]]], title: str) -> Figure:
+    """New and worn profiles and depth of wear of both rails.
+
+    `rails` ([kg]): The new rail, then the rail after each step, by side. `title`: What was
+    analysed.
+    """
+    figure = Picture(9.8, 5.6, title)
+    axes = figure.subplots(2, 2, height_ratios=[1.0, 1.2], sharey="row")
+    for (outline, depth), (side, steps) in zip(axes.T, rails.items(), strict=True):
+        _worn(outline, depth, steps, lambda tonnage: f"{1e-9 * tonnage:g} Mt")
+        outline.set_title(f"{side} rail")
+        depth.set(xlabel="y from the middle of the rail, gauge side negative (mm)")
+    return figure
+
+
+def _worn(
+    outline: Axes,
+    depth: Axes,
+    steps: Sequence[tuple[float, "Profile"]],
+    told: Callable[[float], str],
+) -> None:
+    """Draw the new and the last profile, and the depth of wear after each step."""
+    new, last = steps[0][1], steps[-1][1]
+    depth.sharex(outline)
+    outline.plot(1e3 * new.y, 1e3 * new.z, color="0.2", lw=1.2, label="new")
+    outline.plot(1e3 * last.y, 1e3 * last.z, color="C3", lw=1.0, label=told(steps[-1][0]))
+    if not outline.yaxis_inverted():
+        outline.invert_yaxis()
+    outline.set_ylabel("z (mm)")
+    outline.legend()
+    for number, (amount, worn) in enumerate(steps[1:], start=1):
+        lost = 1e3 * np.abs(np.asarray(new.z) - np.asarray(worn.z))
+        share = 0.25 + 0.75 * number / (len(steps) - 1)
+        label = told(amount) if number in (1, len(steps) - 1) else None
+        depth.plot(1e3 * new.y, lost, color="C3", alpha=share, lw=1.0, label=label)
+    depth.set_ylim(bottom=0.0)
+    depth.set_ylabel("depth of wear in z (mm)")
+    depth.legend()
 
 
 def _km(distance: float) -> str:

@@ -1,6 +1,7 @@
 """`railsim wear`: steps of wear, files, going on after an end, bad input."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import railsim
 from railsim.cli import main
 from railsim.errors import ModelError
 from railsim.profiles import load_profile
-from railsim.studies.wear_loop import wear_loop
+from railsim.studies.wear_loop import WearStep, wear_loop
 
 SHORT = """format = "railsim-track/1"
 name = "some metres of a curve"
@@ -143,3 +144,32 @@ def test_straight_above_the_critical_speed_is_a_remark(speed, hunts, tmp_path):
         assert told[0] == told[1]
         assert told[0].startswith(f"after 0 km on {straight.name} at 60 m/s: The vehicle hunts at")
         assert told[0].endswith("disturbed by 6 mm.")
+
+
+def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
+    """Left rail 0.2 mm lower after the second step, right rail 0.05 mm."""
+    new = load_profile("60E1")
+
+    def steps(*_, on_step, step, **__):
+        for number, lower in enumerate([(1e-4, 2e-5), (2e-4, 5e-5)]):
+            worn = {
+                side: replace(new, z=np.asarray(new.z) + by)
+                for side, by in zip(("left", "right"), lower, strict=True)
+            }
+            on_step(WearStep(number * step, step, {"left": new, "right": new}, worn, {}))
+
+    monkeypatch.setattr("railsim.studies.rail_wear.rail_wear", steps)
+    figures = []
+    monkeypatch.setattr("railsim.plot.style.save", lambda figure, *_, **__: figures.append(figure))
+    given = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "0.2", "--step", "0.1"]
+    assert main(["rail-wear", "curve_r500", *given, "--out", str(tmp_path / "w")]) == 0
+    (figure,) = figures
+    by_title = {axes.get_title(loc="left"): axes for axes in figure.axes}
+    assert {"left rail", "right rail"} <= set(by_title)
+    depths = [
+        {line.get_label(): line.get_ydata().max() for line in axes.lines}
+        for axes in figure.axes
+        if "depth" in axes.get_ylabel()
+    ]
+    expected = [{"0.1 Mt": 0.1, "0.2 Mt": 0.2}, {"0.1 Mt": 0.02, "0.2 Mt": 0.05}]
+    assert depths == [pytest.approx(one) for one in expected]
