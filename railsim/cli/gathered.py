@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,6 +67,7 @@ def gather(files: Sequence[str]) -> Gathered:
     from railsim.errors import Fault, Faults
 
     found, faults = Gathered(), Faults()
+    batches: list[tuple[Path, list[Record]]] = []
     for file in files:
         path = folder_of(file)
         with faults.caught():
@@ -75,12 +76,19 @@ def gather(files: Sequence[str]) -> Gathered:
                 allowed = "the folder of a study, or one with .h5 files"
                 faults.append(Fault(file, "", "no results in this folder", allowed))
             found.inputs = inputs if len(files) == 1 else {}
-            folder = path if os.path.isdir(path) else path.parent
-            _add(found, records, folder, prefix=len(files) > 1)
-    names = [record["name"] for record in found.records]
-    twice = {name for name in names if names.count(name) > 1} if len(files) > 1 else set()
-    faults += [Fault(name, "", "given twice", "give each result once") for name in sorted(twice)]
+            batches.append((path if os.path.isdir(path) else path.parent, records))
+    runs = [(folder, record["name"]) for folder, records in batches for record in records]
+    places = Counter((folder / name).resolve() for folder, name in runs)
+    twice = (place for place, number in places.items() if number > 1)
+    faults += [Fault(str(one), "", "given twice", "give each result once") for one in twice]
     faults.check()
+    names = Counter(name for _, name in runs)
+    alike = [name for name, number in names.items() if number > 1]
+    folders = Counter(folder.name for folder in {folder.resolve() for folder, _ in runs})
+    for folder, records in batches:
+        before = folder.resolve().name
+        before = before if folders[before] == 1 else str(folder)
+        _add(found, records, folder, {name: f"{before}/{name}" for name in alike})
     return found
 
 
@@ -109,14 +117,13 @@ def described_runs(file: str) -> "Description":
     return Description(data, [title, "", table, *found.remarks])
 
 
-def _add(found: Gathered, records: Sequence[Record], folder: Path, *, prefix: bool) -> None:
-    """Add records; of several folders each run is called after its folder where it has to be."""
-    known = {record["name"] for record in found.records}
+def _add(
+    found: Gathered, records: Sequence[Record], folder: Path, named: Mapping[str, str]
+) -> None:
+    """Add records; `named`: names of those that would not be told apart from others."""
     missing = 0
     for record in records:
-        name = record["name"]
-        if prefix and name in known:
-            name = f"{folder.name}/{name}"
+        name = named.get(record["name"], record["name"])
         found.records.append({**record, "name": name})
         if record["status"] in ("failed", "waiting"):
             continue

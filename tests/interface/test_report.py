@@ -23,6 +23,7 @@ from test_study import simulated as simulated
 import railsim
 from railsim.assessment.criteria import CRITERIA
 from railsim.cli import main
+from railsim.cli.gathered import gather
 from railsim.definitions import Settings
 from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
 from railsim.definitions.vehicle.laws import Signal
@@ -747,3 +748,20 @@ def test_settings_other_than_the_default_are_marked_and_the_usual_six_always_sho
     assert {key for key, (_, mark) in rows.items() if mark} == {"creep_law", "contact_damping"}
     assert rows["creep_law"] == (f"{Settings().creep_law}, polach", "changed")
     assert rows["step"] == ("1 ms", "")
+
+
+def test_results_are_counted_once_and_told_apart_by_their_folders(tmp_path, capsys):
+    """A file beside its folder was a second run, and its sections counted twice."""
+    folders = [tmp_path / name for name in ("a/results", "b/results", "c")]
+    for folder, gain in zip(folders, (1.0, 1.2, 1.4), strict=True):
+        folder.mkdir(parents=True)
+        example_result(gain=gain).to_hdf5(folder / "run.h5")
+    out = str(tmp_path / "page.html")
+    for again in (folders[0] / "run.h5", folders[0] / ".." / "results"):
+        assert main(["report", str(folders[0]), str(again), "--out", out]) == 2
+        assert "given twice; give each result once" in capsys.readouterr().err
+    for given in (folders, folders[::-1]):
+        found = gather([str(folder) for folder in given])
+        expected = [f"{folders[0]}/run", f"{folders[1]}/run", "c/run"]
+        assert sorted(found.paths) == sorted(expected)
+        assert found.paths["c/run"] == folders[2] / "run.h5"
