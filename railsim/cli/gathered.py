@@ -45,12 +45,13 @@ def opened(paths: Sequence[Path]) -> "dict[str, Result]":
     from railsim.result import open_run
 
     faults, results = Faults(), dict[str, Any]()
-    stems = [path.stem for path in paths]
+    stems, places = [path.stem for path in paths], set[Path]()
     for path in paths:
         label = path.stem if stems.count(path.stem) == 1 else str(path)
-        if label in results:
+        if (place := path.resolve()) in places:
             faults.append(Fault(str(path), "", "given twice", "give each result once"))
             continue
+        places.add(place)
         with faults.caught():
             results[label] = open_run(path)
     faults.check()

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,3 +163,11 @@ def test_bad_results_are_refused(files, chosen, words, capsys):
     given = [files[each] if isinstance(each, int) else each for each in chosen]
     assert main(["compare", *given]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_one_file_by_two_paths_is_given_twice(files, capsys, monkeypatch):
+    path = Path(files[0])
+    monkeypatch.chdir(path.parent)
+    for command in (["compare"], ["assess", "--coarse"]):
+        assert main([*command, str(path), path.name]) == 2
+        assert "given twice" in capsys.readouterr().err
