@@ -108,14 +108,13 @@ def result_scene(
     flat = flatten(vehicle)
     drawn = _drawn(flat)
     columns = [result.bodies.index(body.name) for body in drawn]
-    speed = f"{result.speed:.4g} m/s ({3.6 * result.speed:.4g} km/h)"
     known = "patch_N" in result
     patches = {name: result[f"patch_{name}"][rows] for name in "yzN"} if known else None
     poses = _poses(result, rows)
     wheelsets = [result.bodies.index(name) for name in result.wheelsets]
     profiles = sections(result, flat)
     return Scene(
-        title=f"{vehicle.name} · {result.track().name} · {speed}", bodies=drawn,
+        title=f"{vehicle.name} · {result.track().name} · {result.speed_words}", bodies=drawn,
         time=result["time"][rows], distance=distance[rows], pose=poses[:, columns],
         track=_track(Alignment(result.track()), distance[rows]), Q=result["Q"][rows],
         Y=result["Y"][rows], contact=contact_points(result, rows, profiles), sections=profiles,

@@ -114,10 +114,9 @@ def _figure(
 
 def title(result: Result) -> str:
     """Return what a figure of a result is called: vehicle, track, speed, and an early end."""
-    speed = f"{result.speed:.4g} m/s ({3.6 * result.speed:.4g} km/h)"
     names = unformatted(result.vehicle().name), unformatted(result.track().name)
     ended = "" if result.status == "complete" else f" · {result.status}"
-    return f"{names[0]}\n{names[1]} · {speed}{ended}"
+    return f"{names[0]}\n{names[1]} · {result.speed_words}{ended}"
 
 
 def _draw(

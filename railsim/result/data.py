@@ -136,9 +136,16 @@ class Result:
             found = re.search(r"^name = (.*)$", str(self._attributes.get(key, "")), re.MULTILINE)
             if found:
                 names.append(printable(found[1].strip("\"'")))
-        speed = self._attributes.get("speed")
-        words = "" if speed is None else f" at {speed:g} m/s ({3.6 * float(speed):.4g} km/h)"
+        words = f" at {self.speed_words}" if "speed" in self._attributes else ""
         return f"{' on '.join(names)}{words}".strip()
+
+    @property
+    def speed_words(self) -> str:
+        """The speed in m/s and km/h; that at the start is called so where it varies."""
+        settings = str(self._attributes.get("settings_json", ""))
+        varies = re.search(r'"drive"\s*:\s*{[^}]*"mode"\s*:\s*"(table|free)"', settings)
+        start = " at the start" if varies else ""
+        return f"{self.speed:.6g} m/s ({3.6 * self.speed:.4g} km/h){start}"
 
     def __repr__(self) -> str:
         steps = self["time"].shape[0] if "time" in self else 0

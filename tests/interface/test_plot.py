@@ -9,6 +9,8 @@ from example_result import WHEELSETS, example_result
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+import railsim
+from railsim.animation import result_scene
 from railsim.cli import main
 from railsim.definitions.excitations.measured_file import recordings
 from railsim.definitions.loading import load_track
@@ -61,6 +63,18 @@ def test_figures_of_the_study_are_the_default(result):
 def test_title_says_how_a_run_ended_early():
     for status, words in (("complete", "(72 km/h)"), ("derailed", "(72 km/h) · derailed")):
         assert histories(example_result(status=status)).get_suptitle().endswith(words)
+
+
+@pytest.mark.parametrize("mode", ["constant", "table"])
+def test_titles_call_a_speed_that_varies_that_at_the_start(mode):
+    """Of pictures, animations and the result itself."""
+    rows = {"speed_table": [[0.0, 20.0], [900.0, 30.0]]} if mode == "table" else {}
+    settings = railsim.Settings.model_validate({"drive": {"mode": mode, **rows}})
+    coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    run = railsim.simulate(coach, track, speed=20.0, duration=0.1, settings=settings)
+    words = "20 m/s (72 km/h)" + " at the start" * (mode == "table")
+    for title in (histories(run).get_suptitle(), run.title, result_scene(run).title):
+        assert title.endswith(words)
 
 
 def test_of_a_result_without_the_figures_of_the_study_everything_is_drawn(result):
