@@ -121,11 +121,15 @@ def _study_figure(
     ]
     faults.check()
     quantities = [_quantity(known[name]) for name in names]
-    # most values first, numbers before words
-    order = sorted(varied, key=lambda n: (not varied[n].numeric, -len(varied[n].different)))
+    # most values first, numbers before words; seeds last, which only name a random track
+    seeds = [name for name in varied if name.rpartition(".")[2] == "seed"]
+    order = sorted(
+        varied, key=lambda n: (n in seeds, not varied[n].numeric, -len(varied[n].different))
+    )
     x = against or next((name for name in order if name != family), None)
     family = family or next((name for name in order if name != x), None)
-    kind = kind or ("curves" if x and varied[x].numeric else "ranking")
+    ordered = x and varied[x].numeric and (against or x not in seeds)
+    kind = kind or ("curves" if ordered else "ranking")
     if kind == "ranking" or x is None:
         figure = ranking_figure(quantities, [str(record["name"]) for record in records])
     elif kind == "map":

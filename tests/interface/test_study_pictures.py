@@ -47,6 +47,21 @@ def test_study_is_drawn(folder, capsys, chosen):
     assert (folder / "study.png").stat().st_size > 5000
 
 
+@pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[:1]])
+def test_seeds_are_no_axis(speeds, tmp_path, monkeypatch):
+    """They have no order: runs over a seed alone are ranked, others are over what else varies."""
+    monkeypatch.setattr(
+        railsim.studies.run, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
+    )
+    rails = 'track.irregularities=[{type="random", spectrum="erri_b176_low"}]'
+    railsim.study(COACH, CURVE, speeds, out=tmp_path / "s", workers=1, assignments=[rails],
+                  grid={"track.irregularities.0.seed": [1, 2, 3]})  # fmt: skip
+    figure = _study_figure(str(tmp_path / "s"), (), None, None, None)
+    labels = {axes.get_xlabel() for axes in figure.axes}
+    assert ("speed (m/s)" in labels) == (len(speeds) > 1)
+    assert not any("seed" in words for words in labels)
+
+
 @pytest.mark.parametrize(
     ("chosen", "words"),
     [
