@@ -17,7 +17,7 @@ from railsim.errors import argument_error
 from railsim.files.access import check_file, whole_file
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
-MARGIN = 1.0  # m, about the vehicle
+MARGIN = 1.5  # m, about the vehicle: modes move by 5 % of its length
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 SIDES = ("#004a80", "#b8450a")
 COLOURS = {"car": ((0.34, 0.66, 0.88, 0.22), "#004a80"), "frame": ((0.94, 0.63, 0.24, 0.8),
