@@ -35,7 +35,7 @@ def true_vehicle() -> railsim.Vehicle:
 
 def main() -> None:
     """Write the data."""
-    track = railsim.load_track(HERE / "track.toml")
+    track = railsim.load_track(HERE / "line" / "track.toml")
     settings = railsim.Settings.model_validate({"output_rate": RATE, "outputs": OUTPUTS})
     run = railsim.simulate(true_vehicle(), track, speed=SPEED, settings=settings)
     noise = np.random.default_rng(11)

@@ -59,7 +59,7 @@ def test_measured_run_is_that_of_today_but_for_its_noise():
     folder = GALLERY.ROOT / "examples" / "measured_run"
     make = runpy.run_path(str(folder / "make.py"))
     settings = {"output_rate": make["RATE"], "outputs": make["OUTPUTS"]}
-    track = railsim.load_track(folder / "track.toml")
+    track = railsim.load_track(folder / "line" / "track.toml")
     result = railsim.simulate(
         make["true_vehicle"](), track, speed=make["SPEED"],
         settings=railsim.Settings.model_validate(settings),

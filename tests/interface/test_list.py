@@ -6,9 +6,11 @@ import sys
 
 import pytest
 
+import railsim
 from railsim.cli import main
 from railsim.definitions.loading import load_vehicle
 from railsim.errors import InputError
+from railsim.files.sources import shipped_names
 
 
 def test_list_names_what_is_there(capsys):
@@ -34,6 +36,12 @@ def test_springs_are_graded_by_most_of_their_numbers(capsys):
         "tare_laden_example": "A",
         "turasas_axlebox": "D",
     }
+
+
+def test_what_is_offered_as_a_measurement_is_one():
+    """Not the track beside it, which `railsim identify` then refuses."""
+    for name in shipped_names("measurement"):
+        assert railsim.load_measurement(name).name
 
 
 def test_unknown_kind_is_refused(capsys):

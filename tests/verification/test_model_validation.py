@@ -60,7 +60,7 @@ def test_mean_and_deviation_decide_each_and_eleven_sections_do_not():
 
 
 def simulated(vehicle, until=None, **outputs):
-    track = railsim.load_track(FOLDER / "track.toml")
+    track = railsim.load_track(FOLDER / "line" / "track.toml")
     settings = {"output_rate": 100.0, "outputs": {**make.OUTPUTS, **outputs}}
     return railsim.simulate(
         vehicle, track, speed=make.SPEED, until=until,
