@@ -103,7 +103,7 @@ def test_without_a_state_of_rest_the_vehicle_settles(ways, monkeypatch):
 
 def test_runs_of_a_class_share_one_way(ways, monkeypatch, tmp_path):
     """Two speeds within a factor of 1.2 and two coefficients of friction within 0.1."""
-    monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve: solve())
+    monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve, **_: solve())
     monkeypatch.setattr(step_choice, "_JUDGED", {})
     found = railsim.study(
         "coach_manchester",
@@ -165,7 +165,7 @@ def test_runs_are_stable_where_one_end_of_their_class_does_not_tell(
     name, radius, speed, friction, growth, monkeypatch
 ):
     """2.5 ms have the margin at the lowest speed and highest friction of their classes."""
-    monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve: solve())
+    monkeypatch.setattr(step_choice, "solution", lambda kind, inputs, solve, **_: solve())
     monkeypatch.setattr(step_choice, "_JUDGED", {})
     longest = time_step.MARGIN_ELASTIC * 2.5e-3
     track = curve_of(radius)
