@@ -349,6 +349,7 @@ def _wear(
 ) -> _Wear:
     """Mean of the runs weighted by their shares."""
     total = sum(run.share for run in wearing.runs)
+    several = len({run.vehicle.name for run in wearing.runs}) > 1  # of them it is said which
     depths, hunts = [], dict[str, str]()
     worn_profiles = {wearing.names[name]: profile for name, profile in worn.items()}
     for number, run in enumerate(wearing.runs):
@@ -356,6 +357,7 @@ def _wear(
         def part(done: float, before: int = number) -> None:
             progress((before + done) / len(wearing.runs))
 
+        of = f", {run.vehicle.name}" if several else ""
         known = {rail: load_profile(rail) for rail in run.track.rail if rail not in worn_profiles}
         known |= worn_profiles
         try:
@@ -370,10 +372,10 @@ def _wear(
             words = _hunting(result) or _hunting_when_disturbed(run, settings, known)
         except ModelError as error:
             names = ", ".join(profile.name for profile in worn.values())
-            place = f"{names} after {wearing.amount(at)} on {run.track.name}"
+            place = f"{names} after {wearing.amount(at)} on {run.track.name}{of}"
             raise ModelError(f"{place}: {error}") from None
         if words:
-            hunts[f"{run.track.name} at {run.speed:g} m/s"] = words
+            hunts[f"{run.track.name} at {run.speed:g} m/s{of}"] = words
     return _Wear({k: np.asarray(np.sum([d[k] for d in depths], axis=0)) for k in worn}, hunts)
 
 

@@ -103,6 +103,17 @@ def test_rails_wear_over_the_tonnage_of_a_mix():
         assert (worn.kind, worn.name) == ("rail", f"60E1, {side} worn")
 
 
+def test_every_vehicle_of_a_mix_that_hunts_is_named():
+    """Two coaches hunt at 60 m/s on the straight: one remark each, with its name."""
+    straight = railsim.load_track("straight").replace(plan=[{"type": "STR", "length": 60.0}])
+    coach, told = railsim.load_vehicle("coach_manchester"), []
+    names = ["coach A", "coach B"]
+    mix = [Traffic(coach.model_copy(update={"name": name}), 60.0, 1.0) for name in names]
+    rail_wear(straight, mix, step=1e3, steps=1, on_remark=told.append)
+    began = [words.split(": The vehicle hunts at")[0] for words in told]
+    assert began == [f"after 0 Mt on {straight.name} at 60 m/s, {name}" for name in names]
+
+
 def test_left_hand_curve_wears_the_other_rail_alike():
     coach = railsim.load_vehicle("coach_manchester")
     (right,), (left,) = (
