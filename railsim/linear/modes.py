@@ -281,7 +281,7 @@ def modes(
     conicity : float, optional
         Wheels replaced by straight cones of this slope [1].
     radius, cant : float
-        Of the track on which the vehicle rolls [m].
+        Of the track on which the vehicle rolls, both negative in left-hand curves [m].
     held : bool
         Hold the wheelsets: modes of the suspended masses alone.
     hold : sequence of str

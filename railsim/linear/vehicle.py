@@ -74,6 +74,8 @@ class Contact:
         faults.require(known, "linearisation", found, " or ".join(LINEARISATIONS))
         positive, found = math.isfinite(size) and size > 0.0, f"found {size:g} m"
         faults.require(positive, "amplitude", found, "a positive number of m")
+        used = self.linearisation == "harmonic" or size == AMPLITUDE
+        faults.require(used, "amplitude", found, "only with linearisation harmonic")
         inside = self.conicity is None or low <= self.conicity <= high
         faults.require(inside, "conicity", f"found {self.conicity}", f"{low:g} to {high:g}")
         return faults
@@ -150,6 +152,11 @@ class LinearVehicle:
         self.Q0: Floats = balance.Q0
         omitted = left_out(vehicle, track, settings or Settings(), assembled)
         self.remarks = (*balance.remarks, *omitted)
+        if self.curvature * cant < 0.0:
+            self.remarks += (
+                "cant on the wrong side, the outer rail is the lower one: cant is positive in "
+                "right-hand curves, negative in left-hand ones",
+            )
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         if self.sticking:
             self.remarks += (

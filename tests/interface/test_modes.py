@@ -94,6 +94,7 @@ def test_root_locus_over_a_key(capsys):
         (["--conicity", "3"], "--conicity"),
         (["--linearisation", "harmonic", "--amplitude", "0.2"], "--amplitude"),
         (["--linearisation", "harmonic", "--amplitude", "-1"], "--amplitude"),
+        (["--amplitude", "0.001"], "--amplitude: found 0.001 m; only with linearisation harmonic"),
         (["--set", "vehicle.bodies.carbody.mas=3"], "mas"),
         (["--radius", "100", "--speed", "60"], "no steady state"),
     ],
@@ -103,6 +104,13 @@ def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     error = capsys.readouterr().err
     assert words in error
     assert "Traceback" not in error
+
+
+@pytest.mark.parametrize(("cant", "told"), [("0.1", True), ("-0.1", False)])
+def test_cant_of_a_left_hand_curve_is_negative(capsys, cant, told):
+    """As in track files: with 0.1 m the inner rail would be the higher one."""
+    assert main(["modes", "coach_manchester", "--radius", "-600", "--cant", cant]) == 0
+    assert ("cant on the wrong side" in "".join(capsys.readouterr())) == told
 
 
 def test_a_mode_is_animated(capsys, tmp_path):
