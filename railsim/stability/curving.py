@@ -1,10 +1,10 @@
 """Quasi-static curving over radius, cant deficiency and friction.
 
 Each point is steady rolling on a circle by Newton's method (`railsim.linear.steady`), led from the
-neighbouring point.  Where that fails, and with friction elements, which hold what the way leaves in
-them, the vehicle runs through a transition into the circle and on until it is still; such points
-are marked, and those where it leaves the track too.  Where it does not come to rest, values are
-means over time.
+neighbouring point.  Where that fails or its state is unstable, and with friction elements, which
+hold what the way leaves in them, the vehicle runs through a transition into the circle and on until
+it is still; such points are marked, and those where it leaves the track too.  Where it does not
+come to rest, values are means over time.
 
     V^2 = g R (h + I)/1.5 m        speed from radius R, cant h and cant deficiency I
 """
@@ -24,11 +24,12 @@ from railsim.definitions.loading import load_track
 from railsim.errors import Faults, ModelError
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
-from railsim.kernels.state import ARC_LENGTH
+from railsim.kernels.state import ARC_LENGTH, SPEED
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import POSITION, circle, left_out, placed
-from railsim.linear.coordinates import coordinates
+from railsim.linear.coordinates import FreeVehicle, coordinates
+from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
@@ -66,6 +67,7 @@ COLUMNS = (
     Column("found", " "),
 )
 METHODS = ("leaves the track", "", "by time integration", "mean: does not come to rest")
+GROWS, SAME = 0.05, 1e-4  # 1/s of motions about an unstable state; m and rad, of equal states
 STILL = 1e-4  # share of the wheel loads by which forces still change after a second
 
 
@@ -336,8 +338,20 @@ class _Search:
             with suppress(NotConverged):
                 found, solver = led(self.model, along, start, smallest=1.0 / 16.0)
                 self._last = goal, found
-                return solver, [found], NEWTON
+                return self._judged(solver, found, goal)
         return self._in_time(goal, speed)
+
+    def _judged(self, solver: SteadyRolling, found: Floats, goal: Floats) -> Point:
+        """A steady state of Newton's method; where it is unstable, what a run comes to instead."""
+        free = FreeVehicle(self.model, solver.system, found)
+        modes = eigenmodes(free.linearisation(free.tangent()))
+        if modes.eigenvalues.real.max() < GROWS:
+            return solver, [found], NEWTON
+        timed = self._in_time(goal, float(found[SPEED]))
+        at = free.coordinates.indices[free.coordinates.positions]
+        if timed[2] == TIME and np.allclose(timed[1][0][at], found[at], rtol=0.0, atol=SAME):
+            return solver, [found], NEWTON
+        return timed
 
     def _in_time(self, goal: Floats, speed: float) -> Point:
         """Run into the circle and on until nothing changes, else for means over time."""

@@ -81,6 +81,31 @@ def test_quantities_of_curving_follow_from_the_wheel_forces_and_turn_with_the_cu
     assert found.wheelset_position == pytest.approx((10.78, 8.22, -8.22, -10.78))
 
 
+def test_where_steady_rolling_is_unstable_values_are_means_of_the_motion():
+    """R 3000 m at 62.6 m/s: a run from 1 mm beside the steady state hunts, at 44.3 m/s it does not.
+
+    The wear number of that run is ten times that of the steady state, 84 N.
+    """
+    coach, track = load_vehicle("coach_manchester"), load_track("straight")
+    found = railsim.curving(coach, track, radius=3000.0, cant=0.1, cant_deficiency=[0.0, 0.1])
+    assert found.converged.ravel().tolist() == [1, 3]
+    runs = []
+    for speed in found.speed[0]:
+        layout = [{"type": "CIR", "length": 1500.0, "radius": 3000.0}]
+        curve = track.replace(plan=layout, cant=[{"type": "CST", "length": 1500.0, "cant": 0.1}])
+        beside = Settings(initial={"rear.inner.wheelset": {"y": 1e-3}})
+        run = railsim.simulate(coach, curve, speed=float(speed), duration=20.0, settings=beside)
+        late = run["time"] > 8.0
+        runs.append((run["wheelset_lateral"][late, 2], run["T_gamma"][late].sum(axis=(1, 2))))
+    (steady, wear), (hunting, more) = runs
+    assert np.ptp(steady) < 1e-4
+    assert np.mean(steady) == pytest.approx(found.lateral[0, 0, 0, 2], abs=1e-4)
+    assert np.ptp(hunting) > 5e-3
+    assert found.T_gamma[0].sum(axis=(1, 2, 3)) == pytest.approx(
+        [wear.mean(), more.mean()], rel=0.05
+    )
+
+
 def test_positions_in_a_curve_are_those_of_the_steady_state():
     track = load_track("straight")
     search = _Search(load_vehicle("coach_manchester"), track, 0.15, Settings(), None)
