@@ -406,6 +406,21 @@ def test_pieces_of_a_branch_end_at_its_jumps():
     assert not settled_to(shot, [slow, fast]).points[0].stable
 
 
+@pytest.mark.parametrize("share", [0.25, 0.75])
+def test_a_motion_between_two_runs_has_an_amplitude_and_a_frequency_between_theirs(share):
+    """Runs at 60 and 70 m/s with 2 and 6 mm, 4 and 8 Hz: on the line between them, and only there.
+
+    3 % of amplitude and 0.5 % of frequency beside it a motion is another one.
+    """
+    runs = [Point(60.0, 2e-3, 4.0), Point(70.0, 6e-3, 8.0)]
+    on = 60.0 + 10.0 * share, 2e-3 + 4e-3 * share, 4.0 + 4.0 * share
+    for factors, same in (((1, 1), True), ((1.02, 0.996), True), ((1.04, 1), False),
+                          ((1, 1.01), False), ((1, 0.99), False)):  # fmt: skip
+        at = Point(on[0], on[1] * factors[0], on[2] * factors[1], stable=False)
+        for piece in (runs, runs[::-1]):
+            assert settled_to(Branch("continuation", [at]), [piece]).points[0].stable == same
+
+
 def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest():
     """The reference body but its place along the track; rails, not what slopes have learnt."""
     of = LinearVehicle(load_vehicle("coach_manchester"), railsim.load_track("straight"))

@@ -58,3 +58,18 @@ def test_harmonic_linearisation_of_a_small_amplitude_is_the_tangent_in_a_curve_t
     tangent, small = (vehicle.linearised(SPEED, path).matrix for path in (None, ContactPath(1e-6)))
     columns = np.max(np.abs(tangent), axis=0)
     np.testing.assert_allclose(small / columns, tangent / columns, atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["coach_manchester", "coach_25t", "wagon_y25"])
+def test_every_coordinate_of_a_linearisation_has_a_name_of_its_own(name):
+    """Of an element with internal states along several axes each is named by its axis."""
+    coach = load_vehicle(name)
+    vehicle = LinearVehicle(coach, load_any_track("straight"))
+    names = vehicle.coordinates.names
+    assert all(names)
+    assert len(set(names)) == len(names)
+    rows = vehicle.model.system.mounts.internal
+    first = vehicle.coordinates.n_positions + vehicle.coordinates.n_velocities
+    for mount, row in zip(vehicle.model.index.mounts, rows, strict=True):
+        for axis, number in zip("xyz", row, strict=True):
+            assert number < 0 or names[first + number] == f"{mount}.{axis}"

@@ -81,6 +81,21 @@ def test_quantities_of_curving_follow_from_the_wheel_forces_and_turn_with_the_cu
     assert found.wheelset_position == pytest.approx((10.78, 8.22, -8.22, -10.78))
 
 
+def test_a_row_of_the_table_shows_the_leading_wheelset_and_its_outer_wheel():
+    """With a cant deficiency the outer wheel carries more; all values in the units of the head."""
+    coach = load_vehicle("coach_manchester")
+    found = railsim.curving(coach, radius=[400.0, -400.0], cant_deficiency=0.1, friction=0.3)
+    for k, row in enumerate(found.table().rows):
+        outer = int(np.argmax(found.Q[k, 0, 0, 0]))
+        assert outer == k  # left in a curve to the right
+        of_wheel = (values[k, 0, 0, 0] for values in (found.lateral, found.attack))
+        forces = (values[k, 0, 0, 0, outer] for values in (found.Q, found.Y, found.Y_over_Q))
+        given = found.radius[k], 0.1, 0.3, np.sqrt(GRAVITY * 400.0 * 0.25 / 1.5)
+        assert row[:9] == pytest.approx([*given, *of_wheel, *forces])
+        assert row[9] == pytest.approx(sum(found.T_gamma[k].ravel()))
+        assert row[10] == ""
+
+
 def test_where_steady_rolling_is_unstable_values_are_means_of_the_motion():
     """R 3000 m at 62.6 m/s: a run from 1 mm beside the steady state hunts, at 44.3 m/s it does not.
 
