@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from dynamics import Settings, load_track, load_vehicle, rotation, steady
 from rig import test_vehicle
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
 import railsim
+from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import WHEELSET
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
@@ -18,6 +21,7 @@ from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 from railsim.simulation.run_in import settled
+from railsim.stability import curving as stability_curving
 from railsim.stability.curving import _Search
 from railsim.track.tables import track_tables
 
@@ -79,6 +83,99 @@ def test_quantities_of_curving_follow_from_the_wheel_forces_and_turn_with_the_cu
         values = getattr(found, name)
         np.testing.assert_allclose(values[left], sign * values[right][..., ::-1], rtol=1e-4)
     assert found.wheelset_position == pytest.approx((10.78, 8.22, -8.22, -10.78))
+
+
+def two_axles(places, longitudinal, lateral):
+    """A wagon of 20 t on two wheelsets with springs of their own at 1 m from the middle [N/m]."""
+    wheelset = {"mass": 1300.0, "inertia": [700.0, 100.0, 700.0], "radius": 0.46}
+    body = {"mass": 20e3, "inertia": [2e4, 2e5, 2e5], "position": [0.0, 0.0, -1.2]}
+    wheelsets, elements = {}, {}
+    for name, x, kx, ky in zip(("front", "rear"), places, longitudinal, lateral, strict=True):
+        at = {"position": [x, 0.0, -0.46], "profile": "cone_1in20"}
+        wheelsets[name] = wheelset | at
+        spring = {"kind": "bushing", "bodies": ["wagon", name], "sides": "both"}
+        stiffness = {"stiffness": [kx, ky, 1e6], "damping": [1e4, 1e4, 2e4]}
+        elements[f"of_{name}"] = spring | stiffness | {"point": [x, 1.0, -0.46]}
+    named = {"format": "railsim-vehicle/1", "name": "two axles", "bodies": {"wagon": body}}
+    return Vehicle.model_validate(named | {"wheelsets": wheelsets, "elements": elements})
+
+
+def creep_coefficients(N):
+    """f11, f22 [N], f23 [Nm] of a wheel of r 0.46 m on a head of R 0.3 m, N [N].
+
+    Hertz; Kalker's table for nu 0.25 (1967) between b/a = 0.7 and 0.8.
+    """
+    flat, curved = 0.5 / 0.46, 0.5 / 0.3
+
+    def excess(k):
+        K, E = ellipk(1.0 - k**2), ellipe(1.0 - k**2)
+        return (K - E) / (E / k**2 - K) - flat / curved
+
+    k = brentq(excess, 0.1, 0.999)
+    cube = 3.0 * ellipe(1.0 - k**2) * N / (2.0 * np.pi * (flat + curved) * 1.139e11 * k**2)
+    ab = k * cube ** (2.0 / 3.0)
+    table = (4.54, 4.36), (4.21, 3.99), (1.95, 1.75)
+    c11, c22, c23 = (np.interp(k, (0.7, 0.8), column) for column in table)
+    return 8.2e10 * ab * c11, 8.2e10 * ab * c22, 8.2e10 * ab**1.5 * c23
+
+
+def radial(places, longitudinal, lateral, curvature):
+    """Lateral displacements and yaw angles of both wheelsets, linear equations of the steady curve.
+
+    After Boocock (1969) and Newland (1968): creep forces, springs and conicity; with the roll of
+    the cones on the heads (Wickens 1965), the gravitational stiffness and the forces of spin.
+    """
+    r0, b0, taper, head = 0.46, 0.753 - 0.3 * (0.05 - 0.025), 0.05, 0.3
+    roll = taper / (b0 - r0 * taper)
+    conicity = roll * (b0 + head * taper)
+    base = places[0] - places[1]
+    shares = -places[1] / base, places[0] / base
+    matrix, given = np.zeros((6, 6)), np.zeros(6)  # y and yaw of front, rear, wagon
+    for i, (x, share) in enumerate(zip(places, shares, strict=True)):
+        weight = (20e3 * share + 1300.0) * GRAVITY
+        f11, f22, f23 = creep_coefficients(0.5 * weight)
+        y, yaw = 2 * i, 2 * i + 1
+        # springs stretch by `stretch` u - `laid`: where the wheelset lies on the circle
+        across, turn = np.zeros(6), np.zeros(6)
+        across[[4, 5, y]], turn[[5, yaw]] = (1.0, x, -1.0), (1.0, -1.0)
+        for k, stretch, laid in (
+            (2.0 * lateral[i], across, 0.5 * x**2 * curvature),
+            (2.0 * longitudinal[i], turn, x * curvature),
+        ):
+            matrix -= k * np.outer(stretch, stretch)
+            given -= k * stretch * laid
+        matrix[y, yaw] += 2.0 * f22
+        matrix[y, y] -= weight * roll
+        given[y] += 2.0 * f23 * curvature
+        matrix[yaw, y] -= 2.0 * f11 * b0 * conicity / r0
+        given[yaw] += 2.0 * f11 * b0**2 * curvature
+    return np.linalg.solve(matrix, given)[:4].reshape(2, 2).T
+
+
+@pytest.mark.parametrize(
+    ("longitudinal", "lateral"),
+    [((1e4, 1e4), (1e6, 1e6)), ((1e6, 8e6), (5e5, 3e6)), ((3e6, 3e6), (1e6, 1e6))],
+)
+def test_two_unlike_axles_steer_as_the_linear_theory_says(longitudinal, lateral, monkeypatch):
+    """Wide curve, balanced, Kalker's linear theory, friction 1.5; 2 % of the largest.
+
+    Of steady rolling, which the theory has whether it is stable or not.
+
+    The front wheelset is farther from the middle, and the springs of both differ.
+    """
+    monkeypatch.setattr(stability_curving, "GROWS", np.inf)
+    places = (3.0, -2.5)
+    vehicle = two_axles(places, longitudinal, lateral)
+    track = load_track("straight").replace(support={"preset": "rigid"}, friction=1.5)
+    for radius in (10000.0, -10000.0):
+        found = railsim.curving(
+            vehicle, track, radius=radius, cant=0.02, settings=Settings(creep_law="linear")
+        )
+        y, yaw = radial(places, longitudinal, lateral, 1.0 / radius)
+        assert found.lateral.ravel() == pytest.approx(y, abs=0.02 * np.max(np.abs(y)))
+        # a yaw angle counts by the force of its creep against that of the displacements
+        allowed = 0.02 * max(np.max(np.abs(yaw)), np.max(np.abs(y)) * 0.05 / 0.46)
+        assert found.attack.ravel() == pytest.approx(yaw, abs=allowed)
 
 
 def test_a_row_of_the_table_shows_the_leading_wheelset_and_its_outer_wheel():
