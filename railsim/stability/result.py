@@ -34,7 +34,10 @@ class LinearLoss:
 
 @dataclass(frozen=True)
 class OverAmplitude:
-    """Linear critical speed over the amplitude of the contact; None where the vehicle is stable."""
+    """Linear critical speed over the amplitude of the contact; None where the vehicle is stable.
+
+    Where it is unstable at the lower end of the search already, that end.
+    """
 
     amplitude: list[float] = field(default_factory=list)  # [m]
     speed: list[float | None] = field(default_factory=list)  # [m/s]
@@ -189,8 +192,11 @@ class CriticalSpeed(Plottable):
                 if speed is not None:
                     yield words, speed, None, None, ""
         if line is not None and line.smallest is not None:
-            speed, amplitude = line.smallest
-            yield "linear, harmonic, smallest over amplitude", speed, None, amplitude, ""
+            name, (speed, amplitude) = "linear, harmonic, smallest over amplitude", line.smallest
+            if speed > self.low:
+                yield name, speed, None, amplitude, ""
+            else:
+                yield name, None, None, amplitude, "unstable at its lower end"
         for method, point in self.nonlinear.items():
             if point is None:
                 yield f"non-linear, {method}", None, None, None, none

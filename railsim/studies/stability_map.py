@@ -110,7 +110,12 @@ def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) 
 def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
     """Return the critical speeds of a map by method in words, NaN where there is none [m/s]."""
     first = next((record for record in records if "linearisation" in record), {})
-    contact = Contact(first.get("linearisation", "tangent"), first.get("amplitude") or AMPLITUDE)
+    cones = {record.get("conicity") for record in records if "linearisation" in record}
+    contact = Contact(
+        first.get("linearisation", "tangent"),
+        first.get("amplitude") or AMPLITUDE,
+        cones.pop() if len(cones) == 1 else None,
+    )
     kinds = {"linear": f"linear, {contact.words()}"}
     methods = dict.fromkeys(m for one in records for m in one.get("nonlinear_by_method") or ())
     if methods:

@@ -13,7 +13,7 @@ from railsim.linear.vehicle import Contact
 from railsim.plot.stability import map_figure
 from railsim.stability import critical_speed, curving
 from railsim.stability.branches import Branch, Point
-from railsim.studies.stability_map import map_table
+from railsim.studies.stability_map import map_speeds, map_table
 
 
 def test_linear_critical_speed(capsys, tmp_path):
@@ -176,6 +176,26 @@ def test_picture_of_a_short_wagon_in_a_curve_has_its_whole_title():
     for axes in figure.get_axes():
         for title in (axes.title, axes._left_title):
             assert title.get_window_extent().x1 <= figure.bbox.x1
+
+
+@pytest.mark.parametrize(("smallest", "words"), [(50.0, "unstable at its lower end"), (60.0, "")])
+def test_the_lower_end_of_the_search_is_no_critical_speed_over_amplitude(smallest, words):
+    """Unstable at 50 m/s, where the search begins: from which speed on is not known."""
+    where = {"rails": "", "friction": "", "law": "", "linear_law": ""}
+    found = critical_speed.CriticalSpeed(Contact(), conditions=where, low=50.0, high=120.0)
+    found.linear_over_amplitude = critical_speed.OverAmplitude([1e-4, 3e-3], [smallest, 70.0])
+    (row,) = (row for row in found.table().rows if "over amplitude" in row[0])
+    assert row[1] == (None if words else smallest)
+    assert row[-1] == words
+
+
+def test_a_map_names_the_cones_that_all_its_points_have():
+    """Without them the speeds would be read as those of the vehicle's own wheels."""
+    record = {"linearisation": "tangent", "amplitude": None, "linear": {"speed": 60.0}}
+    same = [record | {"conicity": 0.1}] * 2
+    assert [*map_speeds(same)] == ["linear, tangent, cones of 0.1"]
+    assert [*map_speeds([record | {"conicity": g} for g in (0.1, 0.2)])] == ["linear, tangent"]
+    assert [*map_speeds([record | {"conicity": None}])] == ["linear, tangent"]
 
 
 def test_speed_to_which_a_limit_was_not_reached_is_that_to_which_motions_were_followed():
