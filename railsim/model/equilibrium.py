@@ -415,11 +415,9 @@ class _Balance:
 
     def _message(self, state: Floats, rest: Floats, change: Floats) -> str:
         n = self.model.index.n_bodies
-        worst = np.argsort(-np.abs(rest))[:5]
+        of_bodies = np.flatnonzero(np.asarray(self._equations) < internal_begin(n))
         parts = []
-        for k in worst:
-            if self._equations[k] >= internal_begin(n):
-                continue
+        for k in of_bodies[np.argsort(-np.abs(rest[of_bodies]))[:5]]:
             body, component = divmod(self._equations[k] - velocity_begin(n), 6)
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")

@@ -122,9 +122,12 @@ def critical_speed(
     if over_amplitude:
         found.linear_over_amplitude = _over_amplitude(smooth, low, high)
         if found.linear is not None and smooth.system.support.elastic:
-            rigid = prepared(law, contact, track.replace(support={"preset": "rigid"}))
-            lost = _loss_of_hunting(rigid, low, high).parameter
-            found.linear = replace(found.linear, speed_on_rigid_rails=lost)
+            try:
+                rigid = prepared(law, contact, track.replace(support={"preset": "rigid"}))
+                lost = _loss_of_hunting(rigid, low, high).parameter
+                found.linear = replace(found.linear, speed_on_rigid_rails=lost)
+            except ModelError as error:
+                found.remarks.append(f"on rigid rails: {error}")
     tell = progress or (lambda _: None)
     tell(0.05)
     wanted = [method for method in METHODS if method in methods and method != "linear"]

@@ -8,6 +8,7 @@ import pytest
 
 import railsim
 from railsim.cli import main
+from railsim.errors import ModelError
 from railsim.linear.steady import NotConverged
 from railsim.linear.vehicle import Contact
 from railsim.plot.stability import map_figure
@@ -187,6 +188,23 @@ def test_the_lower_end_of_the_search_is_no_critical_speed_over_amplitude(smalles
     (row,) = (row for row in found.table().rows if "over amplitude" in row[0])
     assert row[1] == (None if words else smallest)
     assert row[-1] == words
+
+
+def test_what_fails_on_rigid_rails_takes_no_critical_speed_on_others(monkeypatch):
+    """Cones of 1:5 rest on the gauge corner, and on rigid rails no equilibrium was found there."""
+    whole = critical_speed.LinearVehicle
+
+    def prepared(vehicle, track, **how):
+        if track.support.preset == "rigid":
+            raise ModelError("no static equilibrium")
+        return whole(vehicle, track, **how)
+
+    monkeypatch.setattr(critical_speed, "LinearVehicle", prepared)
+    coach = railsim.load_vehicle("coach_manchester")
+    found = railsim.critical_speed(coach, methods="linear", low=35.0, high=45.0)
+    assert found.linear.speed == pytest.approx(39.75, abs=0.1)
+    assert found.linear.speed_on_rigid_rails is None
+    assert "on rigid rails: no static equilibrium" in found.remarks
 
 
 def test_a_map_names_the_cones_that_all_its_points_have():

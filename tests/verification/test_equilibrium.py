@@ -2,6 +2,7 @@
 
 import itertools
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from railsim.constants import GRAVITY
 from railsim.definitions.loading import load_vehicle, load_vehicle_text
 from railsim.errors import ModelError
 from railsim.model.assembly import assemble
-from railsim.model.equilibrium import RESIDUAL, _at_rest, equilibrium
+from railsim.model.equilibrium import RESIDUAL, _at_rest, _Balance, equilibrium
 
 DATA = Path(__file__).parents[1] / "data" / "vehicles"
 WAGON = (DATA / "two_axle_wagon.toml").read_text(encoding="utf-8")
@@ -62,6 +63,17 @@ def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
         assert np.sum(found.Q0) == pytest.approx(weight, rel=1e-6)
         # what the step of a force is measured with
         assert found.model.system.contact.load == pytest.approx(np.full(2, weight / 4.0))
+
+
+def test_message_names_bodies_where_the_forces_of_elements_change_faster(monkeypatch):
+    """Rates of internal forces, in N/s, are larger than any acceleration: they hid all bodies."""
+    balance = object.__new__(_Balance)
+    balance.model = SimpleNamespace(index=SimpleNamespace(n_bodies=2, bodies=("car", "frame")))
+    n = 2
+    balance._equations = np.array([6 * n + 2, 6 * n + 6 + 1, *(12 * n + np.arange(6))])
+    monkeypatch.setattr(_Balance, "_alternating", lambda *_: [])
+    message = balance._message(np.zeros(30), np.array([0.5, -2.0, *(1e6 * np.ones(6))]), 0.0)
+    assert message.endswith("accelerations: frame y'' = -2, car z'' = 0.5")
 
 
 def test_message_names_the_elements_that_alternate(monkeypatch):
