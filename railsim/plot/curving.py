@@ -8,7 +8,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from railsim.arrays import Floats, Indices
 from railsim.plot.style import Picture, distinct, note, say, styled, wheelset_colours
-from railsim.stability.curving import Curving
+from railsim.stability.curving import MEAN, METHODS, TIME, Curving
 
 LEFT, RIGHT = 0, 1
 MAPS = 3  # maps of wear side by side at most
@@ -105,9 +105,11 @@ def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: st
             label = f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm"
             colour, line = distinct(m), styles[i % len(styles)]
             axes.plot(radius, shown, ls=line, color=colour, marker=".", ms=4, label=label)
-            timed = found.converged[:, i, m][order] > 1
-            how = "by time integration" if timed.any() else None
-            axes.plot(radius[timed], shown[timed], "o", color=colour, ms=6, mfc="none", label=how)
+            for code, marker in ((TIME, "o"), (MEAN, "x")):
+                those = found.converged[:, i, m][order] == code
+                how = METHODS[code] if those.any() else None
+                marked = radius[those], shown[those], marker
+                axes.plot(*marked, color=colour, ms=6, mfc="none", label=how)
     axes.set_title(words)
 
 
