@@ -166,6 +166,8 @@ class LinearVehicle:
         _check_hold(self.model, hold)
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
+        if not self.coordinates.n_velocities:
+            raise argument_error("held", "nothing is left that moves", "hold fewer bodies")
         self._known: dict[float, Floats] = {}
         self._tangents: dict[float, tuple[FreeVehicle, Floats]] = {}
         self._rest = placed(balance.state)
@@ -225,7 +227,7 @@ class LinearVehicle:
 
 
 def _check_hold(model: Model, hold: Sequence[str]) -> None:
-    """Refuse to hold parts that are not bodies, or all bodies."""
+    """Refuse to hold parts that are not bodies."""
     kinds = zip(model.index.bodies, model.system.bodies.kind, strict=True)
     rigid = [name for name, kind in kinds if kind in (RIGID, FIXED)]
     wrong = [name for name in hold if name not in rigid]

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,6 +105,13 @@ def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     error = capsys.readouterr().err
     assert words in error
     assert "Traceback" not in error
+
+
+def test_a_vehicle_of_which_all_is_held_has_no_modes(capsys):
+    wheelset = Path(__file__).parents[1] / "data" / "vehicles" / "single_wheelset.toml"
+    assert main(["modes", str(wheelset), "--held"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == "--held: nothing is left that moves; hold fewer bodies"
 
 
 @pytest.mark.parametrize(("cant", "told"), [("0.1", True), ("-0.1", False)])
