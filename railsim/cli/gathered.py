@@ -48,12 +48,13 @@ def opened(paths: Sequence[Path]) -> "dict[str, Result]":
     stems, places = [path.stem for path in paths], set[Path]()
     for path in paths:
         label = path.stem if stems.count(path.stem) == 1 else str(path)
-        if (place := path.resolve()) in places:
-            faults.append(Fault(str(path), "", "given twice", "give each result once"))
-            continue
-        places.add(place)
         with faults.caught():
-            results[label] = open_run(path)
+            result = open_run(path)
+            if (place := path.resolve()) in places:
+                faults.append(Fault(str(path), "", "given twice", "give each result once"))
+                continue
+            places.add(place)
+            results[label] = result
     faults.check()
     return results
 

@@ -113,11 +113,13 @@ def test_load_to_one_side_is_leant_to_its_own_side():
 @pytest.mark.parametrize(
     ("vehicle", "friction"), [([], (0.5, 0.2)), (["bodies.carbody.position.1=0.08"], (0.4, 0.4))]
 )
-def test_guiding_takes_the_worse_of_both_hands(vehicle, friction):
+def test_guiding_takes_the_worse_of_both_hands(vehicle, friction, monkeypatch):
     """A load to one side, or unequal rails, and the mirror image give the same, the worse hand.
 
-    In the level curve that is the larger of the forces of steady curving to either hand.
+    In the level curve that is the larger of the forces of steady rolling to either hand.  With
+    unequal rails a run leaves that state for one beside it, 0.3 % away, which curving would take.
     """
+    monkeypatch.setattr(railsim.stability.curving, "GROWS", np.inf)
     on, limits = railsim.load_track("straight"), load_stationary_limits("stationary")
     mirrored = [text.replace("=0.08", "=-0.08") for text in vehicle]
     guiding = []
