@@ -33,6 +33,18 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_stability_commands.py::"
+        "test_what_fails_on_rigid_rails_takes_no_critical_speed_on_others",
+        "verification/test_spring_search.py::test_the_lightest_nest_is_not_missed",
+        "verification/test_spring_search.py::test_it_is_said_that_stresses_are_not_limited",
+        "reference/test_gritti_pantograph.py::"
+        "test_lift_5_follows_the_cam_as_closely_as_it_can_reconstructed",
+        "verification/test_steady_curving.py::"
+        "test_where_steady_rolling_is_unstable_values_are_means_of_the_motion",
+        "verification/test_identification.py::"
+        "test_a_channel_that_a_robust_loss_leaves_out_does_not_widen_the_intervals[cauchy]",
+        "reference/test_gritti_pantograph.py::test_a18_constant_ratio_new",
+        "reference/test_gritti_pantograph.py::test_a23_constant_actuator_force_new",
         "interface/test_benchmarks.py::test_script_runs_in_its_small_form[growth.py]",
         "reliability/test_ends.py::test_physical_end_keeps_its_result[standstill]",
         "interface/test_stability_commands.py::test_linear_critical_speed",

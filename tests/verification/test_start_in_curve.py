@@ -111,7 +111,7 @@ def test_friction_elements_need_their_run_in(monkeypatch):
 
 
 def test_curving_has_what_the_way_leaves_in_friction_elements():
-    """Mean values of a run of 30 s in the curve; without these forces Y would be 3.5 kN, not 9.4.
+    """Mean values of a run of 15 s in the curve; without these forces Y would be 3.5 kN, not 9.4.
 
     The table of the two curves is of the outer wheel on either hand.
     """
@@ -128,16 +128,16 @@ def test_curving_has_what_the_way_leaves_in_friction_elements():
         plan=[
             {"type": "STR", "length": 30.0},
             {"type": "CLO", "length": 80.0},
-            {"type": "CIR", "length": 650.0, "radius": radius},
+            {"type": "CIR", "length": 420.0, "radius": radius},
         ],
         cant=[
             {"type": "CST", "length": 30.0, "cant": 0.0},
             {"type": "LIR", "length": 80.0},
-            {"type": "CST", "length": 650.0, "cant": cant},
+            {"type": "CST", "length": 420.0, "cant": cant},
         ],
     )
-    run = railsim.simulate(wagon, track, speed=float(found.speed[0, 0]), until=720.0)
-    still = run["distance"] > 600.0
+    run = railsim.simulate(wagon, track, speed=float(found.speed[0, 0]), until=500.0)
+    still = run["distance"] > 440.0
     for name, values in (("Q", found.Q), ("Y", found.Y), ("T_gamma", found.T_gamma)):
         size = np.abs(values[0, 0, 0]).max()
         assert run[name][still].mean(axis=0) == pytest.approx(values[0, 0, 0], abs=0.03 * size)
