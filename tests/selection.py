@@ -33,6 +33,17 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_manual_site.py::"
+        "test_no_page_of_the_manual_runs_off_the_screen_or_needs_a_network",
+        "interface/test_docs.py::test_blocks_of_a_page_run_in_their_order[docs/user/mechanisms.md]",
+        "interface/test_docs.py::"
+        "test_blocks_of_a_page_run_in_their_order[docs/user/creep_forces.md]",
+        "interface/test_stationary.py::test_both_branches_of_a_wagon_are_told_and_drawn",
+        "interface/test_study.py::test_cost_of_a_run_does_not_grow_with_their_number",
+        "interface/test_campaign.py::"
+        "test_quiet_records_of_the_whole_campaign_pass_and_one_missing_run_does_not",
+        "verification/test_identification.py::test_a_stretched_arc_length_is_said",
+        "verification/test_random_combinations.py::test_random_combination[138]",
         "interface/test_stability_commands.py::"
         "test_what_fails_on_rigid_rails_takes_no_critical_speed_on_others",
         "verification/test_spring_search.py::test_the_lightest_nest_is_not_missed",
