@@ -33,6 +33,14 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "unit/test_foreign_calls.py::"
+        "test_ten_thousand_calls_leave_all_arrays_alive_and_the_result_the_same",
+        "interface/test_mechanism.py::test_out_writes_a_self_contained_page_pictures_and_positions",
+        "interface/test_study.py::test_pictures_of_runs_and_of_vehicles_against_each_other",
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[optimise.py]",
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[fastsim_benchmark.py]",
+        "reference/test_gritti_pantograph.py::test_a19_linear_ratio_new",
+        "verification/test_random_combinations.py::test_random_combination[97]",
         "interface/test_manual_site.py::"
         "test_no_page_of_the_manual_runs_off_the_screen_or_needs_a_network",
         "interface/test_docs.py::test_blocks_of_a_page_run_in_their_order[docs/user/mechanisms.md]",
