@@ -44,7 +44,7 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     _steering(axes[1, 1], found, order)
     for one in axes.flat:
         if not found.converged.any():
-            say(one, "leaves the track at every point")
+            say(one, "no values at any point")
         one.set_xlabel("radius (m)")
         if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
             one.set_xscale("log")
@@ -117,7 +117,7 @@ def _plan(axes: Axes, found: Curving) -> None:
     """Wheelsets on the unrolled track in the tightest curve, seen from above."""
     there = found.converged[:, 0, 0] > 0
     if not there.any():
-        say(axes, "leaves the track at every radius with the first deficiency and friction")
+        say(axes, "no values at any radius for the first deficiency and friction")
         return
     r = int(np.argmin(np.where(there, np.abs(found.radius), np.inf)))
     x = np.array(found.wheelset_position)

@@ -66,7 +66,12 @@ COLUMNS = (
     Column("T_gamma", unit="N", format=".0f"),
     Column("found", " "),
 )
-METHODS = ("leaves the track", "", "by time integration", "mean: does not come to rest")
+METHODS = (
+    "leaves the track, or no stable step",
+    "",
+    "by time integration",
+    "mean: does not come to rest",
+)
 GROWS, SAME = 0.05, 1e-4  # 1/s of motions about an unstable state; m and rad, of equal states
 STILL = 1e-4  # share of the wheel loads by which forces still change after a second
 
@@ -79,7 +84,7 @@ class Curving(Plottable):
     - `cant`: [m]
     - `speed`: [m/s]
     - `converged`: 1 by Newton's method, 2 by time integration, 3 by means of a motion that does not
-      come to rest, 0 where the vehicle leaves the track; values are NaN there
+      come to rest, 0 where the vehicle leaves the track, or no step is stable: NaN
     - `Q`, `Y`, `Y_over_Q`, `dQ_over_Q0`, `T_gamma`, `contact_y`: see `railsim.notation`;
       `contact_y` is the lateral position of the most loaded patch [m]
     - `lateral`, `attack`: lateral displacement [m] and angle of attack, the yaw against the radial
@@ -358,8 +363,8 @@ class _Search:
         curvature, cant, _, friction = goal.tolist()
         solver = SteadyRolling(self.model, self._system(curvature, cant, friction))
         straight = self._system(0.0, 0.0, friction)
-        rolling = SteadyRolling(self.model, straight).prepared(self._rest[1], speed)
         try:
+            rolling = SteadyRolling(self.model, straight).prepared(self._rest[1], speed)
             stable = Stability(self.model, straight, rolling, "fast", lambda _: ())
             step = 0.5 * stable.choose(INTERVAL)  # half of it in flange contact
             state = self._into(goal, speed, straight, rolling, step)

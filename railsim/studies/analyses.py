@@ -151,7 +151,9 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Ou
         settings=case.settings,
     )
     if found.converged.item() == FAILED:
-        raise ModelError(f"the vehicle leaves the track on a radius of {analysis.radius:g} m")
+        raise ModelError(
+            f"R {analysis.radius:g} m: the vehicle leaves the track, or no step is stable"
+        )
     numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in LARGEST}
     numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards: no derailment
     numbers["sum_abs_Y"] = float(np.max(np.abs(found.Y).sum(axis=-1)))
