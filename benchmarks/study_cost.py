@@ -2,11 +2,12 @@
 
     python benchmarks/study_cost.py OUT [--vehicles V...] [--tracks T...] [--speeds 10]
         [--frictions 25] [--duration 40] [--workers 2]
-        [--json study.json]
+        [--keep summary] [--json study.json]
 
 By default two coaches on two curves at so many speeds and coefficients of friction, with
-`keep = "summary"`.  Printed: the share of the own time loops of the runs in the CPU time of all
-processes (loops that settle vehicles and judge time steps are not counted), and private memory.
+`keep = "summary"`, that is without result files.  Printed: the share of the own time loops of the
+runs in the CPU time of all processes (loops that settle vehicles and judge time steps are not
+counted), and private memory.
 """
 
 import argparse
@@ -35,6 +36,7 @@ def main() -> None:
     parser.add_argument("--frictions", type=int, default=25)
     parser.add_argument("--duration", type=float, default=40.0)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--keep", default="summary")
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     memory = Memory()
@@ -45,7 +47,7 @@ def main() -> None:
         [f"{speed:.4g}" for speed in np.linspace(12.0, 22.0, asked.speeds)],
         grid={"track.friction": [f"{mu:.4g}" for mu in np.linspace(0.2, 0.5, asked.frictions)]},
         duration=asked.duration,
-        keep="summary",
+        keep=asked.keep,
         workers=asked.workers,
         overwrite=True,
         out=asked.out,

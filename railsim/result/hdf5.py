@@ -20,7 +20,6 @@ import logging
 import math
 import os
 import re
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -37,9 +36,11 @@ from railsim.files.access import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result import sinks
+from railsim.result.attributes import Values
+from railsim.result.contents import Contents, Dataset
 from railsim.result.data import Attributes, Result, frozen
-from railsim.result.integrity import DIGEST, content_digest, seal
-from railsim.result.reading import open_result
+from railsim.result.integrity import seal
+from railsim.result.reading import opened
 
 # what is wrong with the disk rather than with the name
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG)
@@ -50,7 +51,6 @@ PEAKS = "peaks"  # group of largest and smallest values over all steps
 CHUNK_BYTES = 2**18
 ROWS_AT_ONCE = 2048  # of the coach 4 MB
 DOUBLE = ("time", "distance", "mileage")
-GZIP = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 @dataclass(frozen=True)
@@ -95,19 +95,14 @@ class Hdf5Sink(sinks.Sink):
         self._attributes = dict(attributes)
         self._overwrite = overwrite
         self._quantities: dict[str, Quantity] = {}
-        self._datasets: dict[str, h5py.Dataset] = {}
+        self._datasets: dict[str, Dataset] = {}
         self._blocks: dict[str, Floats] = {}  # what waits to be written, by quantity
-        self._crc: dict[str, int] = {}
         self._waiting = 0
-        self._length = 0
-        # what is written is not read again: HDF5 need not keep chunks, by itself 8 MB of each
-        # quantity; the partial file is locked already
-        how = {"track_order": True, "rdcc_nbytes": 0, "locking": False}
         try:
             with ExitStack() as undo:  # also of an interrupt, before a `with` can see to it
                 self._partial = PartialFile(self.path, alone=True, option=option)
                 undo.callback(self._partial.remove)
-                self._file = h5py.File(self._partial.path, "w", **how)
+                self._contents = Contents(self._partial.path)
                 undo.pop_all()
         except OSError as error:
             if error.errno in FULL:
@@ -124,17 +119,22 @@ class Hdf5Sink(sinks.Sink):
         self._quantities = {quantity.name: quantity for quantity in quantities}
         names = sinks.full_coordinates(coordinates)
         for dim, labels in names.items():
-            _write_names(self._file, dim, labels)
+            _write_names(self._contents, dim, labels)
         for name in sinks.timed(self._quantities):
             inner = tuple(len(names[dim]) for dim in self._quantities[name].dims[1:])
             self._blocks[name] = np.empty((ROWS_AT_ONCE, *inner))
-            self._crc[name] = 0
 
     def _create_datasets(self, length: int | None = None) -> None:
         """Create what is a function of time; with chunks that fit, where the length is known."""
         for name in sorted(self._blocks, key=lambda name: name != "time"):
-            how = self._blocks[name].shape[1:], length, self._storage
-            self._datasets[name] = _create(self._file, self._quantities[name], *how)
+            # a chunk is never written in part, and a short run is a small file
+            quantity, inner = self._quantities[name], self._blocks[name].shape[1:]
+            rows = _chunk_rows(inner, length)
+            self._datasets[name] = self._contents.create(
+                name, (0, *inner), np.dtype(self._storage.kind(name)), _about(quantity),
+                quantity.dims, chunks=(rows, *(max(1, size) for size in inner)), growing=True,
+                compress=self._storage.compress,
+            )  # fmt: skip
 
     def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`; rows wait until they are worth writing."""
@@ -152,14 +152,9 @@ class Hdf5Sink(sinks.Sink):
     def _write_rows(self) -> None:
         if not self._datasets:
             self._create_datasets()
-        length = self._length + self._waiting
         for name, dataset in self._datasets.items():
-            rows = self._blocks[name][: self._waiting]
-            rows = np.ascontiguousarray(rows, dtype=dataset.dtype)
-            dataset.resize(length, axis=0)
-            dataset[self._length : length] = rows
-            self._crc[name] = zlib.crc32(rows.data, self._crc[name])
-        self._length, self._waiting = length, 0
+            dataset.append(self._blocks[name][: self._waiting])
+        self._waiting = 0
 
     def close(
         self,
@@ -171,15 +166,12 @@ class Hdf5Sink(sinks.Sink):
         """See `Sink.close`; the file now has its name."""
         with _disk_errors(self.path):
             self._write_rest(statics, profiles, groups)
-            self._file.attrs.update(sinks.root_attributes(self._attributes, attributes))
-            self._file.attrs[DIGEST] = content_digest(self._file, self._crc)
-            self._file.flush()  # where the disk is full, before the file is closed
-            self._file.close()
+            self._contents.finish(sinks.root_attributes(self._attributes, attributes))
             seal(self._partial.path)
             wanted, self.path = self.path, self._partial.finish(overwrite=self._overwrite)
         if self.path != wanted:
             _LOG.warning(f"{wanted} has appeared in the meantime; the result is {self.path}")
-        return open_result(self.path)
+        return opened(self.path, lambda _: True)  # sealed just now
 
     def _write_rest(self, statics: Named, profiles: Named, groups: Named) -> None:
         if not self._datasets:
@@ -188,19 +180,21 @@ class Hdf5Sink(sinks.Sink):
             self._write_rows()
         for name, quantity in self._quantities.items():
             if "time" not in quantity.dims:
-                _describe(_stored(self._file, name, frozen(statics[name])), quantity)
+                array = frozen(statics[name])
+                self._contents.store(name, array, _about(quantity), quantity.dims)
         for name, profile in profiles.items():
-            _write_profile(self._file, name, profile)
+            _write_profile(self._contents, name, profile)
         for group, arrays in _of_quantities(groups, self._quantities).items():
-            for name, array in arrays.items():
-                _stored(self._file, f"{group}/{name}", frozen(array))
             if group == PEAKS:
-                _describe_peaks(self._file[group], self._file)
+                _write_names(self._contents, f"{PEAKS}/extreme", EXTREMES)
+            for name, array in arrays.items():
+                about, dims = _about_peak(name) if group == PEAKS else ({}, ())
+                self._contents.store(f"{group}/{name}", frozen(array), about, dims)
 
     def abort(self) -> None:
         """Remove what was written so far; harmless after `close`."""
         with suppress(OSError, RuntimeError):  # what could not be written cannot be closed either
-            self._file.close()
+            self._contents.close()
         self._partial.remove()
 
 
@@ -252,86 +246,57 @@ def _of_quantities(
     return {group: arrays for group, arrays in kept.items() if arrays}
 
 
-def _stored(file: h5py.File, name: str, array: Any) -> h5py.Dataset:
-    """Store a whole array with its checksum."""
-    array = np.asarray(array)
-    checked = {"chunks": array.shape, "fletcher32": True} if array.size and array.ndim else {}
-    return file.create_dataset(name, data=array, **checked)
-
-
-def _write_names(file: h5py.Group, dim: str, labels: Sequence[str]) -> None:
+def _write_names(contents: Contents, dim: str, labels: Sequence[str]) -> None:
     encoded = [label.encode() for label in labels]
     # GNU Octave reads no fixed-length UTF-8, and what is ASCII is the same in both
     encoding = "ascii" if all(label.isascii() for label in labels) else "utf-8"
     kind = h5py.string_dtype(encoding, max((len(label) for label in encoded), default=1))
-    dataset = _stored(file, dim, np.array(encoded, dtype=kind))
-    dataset.attrs["_Encoding"] = "utf-8"
-    dataset.attrs["long_name"] = f"name of the {dim}"
-    dataset.make_scale(dim)
+    about = {"_Encoding": "utf-8", "long_name": f"name of the {dim.removeprefix(f'{PEAKS}/')}"}
+    contents.store(dim, np.array(encoded, dtype=kind), about, (dim,))
 
 
-def _create(
-    file: h5py.File, quantity: Quantity, inner: Shape, length: int | None, storage: Storage
-) -> h5py.Dataset:
-    """Create an empty dataset for a quantity that is a function of time.
+def _chunk_rows(inner: Shape, length: int | None) -> int:
+    """Return the instants of a chunk of a quantity.
 
-    `inner`: Its shape at an instant. `length`: Number of instants: a chunk is never written in
-    part, and a short run is a small file.
+    `inner`: Its shape at an instant. `length`: Number of instants, where it is known.
     """
-    # a power of two: whole chunks are written at once
-    rows = 2 ** int(np.log2(max(1, min(1024, CHUNK_BYTES // (8 * max(1, int(np.prod(inner))))))))
+    fitting = CHUNK_BYTES // (8 * max(1, math.prod(inner)))
+    rows = 1 << max(1, min(1024, fitting)).bit_length() - 1  # a power of two: written whole
     if length is not None:
         rows = math.ceil(length / math.ceil(length / rows)) if length else 1
-    dataset = file.create_dataset(
-        quantity.name, shape=(0, *inner), maxshape=(None, *inner),
-        chunks=(rows, *(max(1, size) for size in inner)), dtype=storage.kind(quantity.name),
-        fletcher32=True, **(GZIP if storage.compress else {}),
-    )  # fmt: skip
-    if quantity.name == "time":
-        dataset.make_scale("time")
-    _describe(dataset, quantity)
-    return dataset
+    return rows
 
 
-def _describe(dataset: h5py.Dataset, quantity: Quantity) -> None:
-    dataset.attrs["units"] = quantity.unit
-    dataset.attrs["long_name"] = quantity.long_name
+def _about(quantity: Quantity) -> Values:
+    about: dict[str, str | float] = {"units": quantity.unit, "long_name": quantity.long_name}
     if quantity.sign:
-        dataset.attrs["comment"] = quantity.sign
+        about["comment"] = quantity.sign
     if quantity.name not in QUANTITIES:
-        dataset.attrs["symbol"] = quantity.symbol
-        dataset.attrs["shown_units"] = quantity.shown_unit
-        dataset.attrs["shown_scale"] = quantity.scale
-    if quantity.name != "time":
-        for axis, dim in enumerate(quantity.dims):
-            dataset.dims[axis].attach_scale(dataset.file[dim])
+        about["symbol"] = quantity.symbol
+        about["shown_units"] = quantity.shown_unit
+        about["shown_scale"] = quantity.scale
+    return about
 
 
-def _describe_peaks(group: h5py.Group, file: h5py.File) -> None:
-    """Units, names and dimensions of largest and smallest values, their times and distances."""
-    _write_names(group, "extreme", EXTREMES)
-    for name, dataset in group.items():
-        if name == "extreme":
-            continue
-        base = sinks.peak_quantity(name)
-        quantity = QUANTITIES[base]
-        words = f"largest and smallest {quantity.long_name}"
-        if name == base:
-            dataset.attrs["units"], dataset.attrs["long_name"] = quantity.unit, words
-        else:
-            other = QUANTITIES[name.removeprefix(f"{base}_")]
-            dataset.attrs["units"] = other.unit
-            dataset.attrs["long_name"] = f"{words}: {other.long_name}"
-        dataset.dims[0].attach_scale(group["extreme"])
-        for axis, dim in enumerate(quantity.dims[1:], start=1):
-            dataset.dims[axis].attach_scale(file[dim])
+def _about_peak(name: str) -> tuple[Values, Sequence[str]]:
+    """Units, names and dimensions of largest and smallest values, their times or distances."""
+    base = sinks.peak_quantity(name)
+    quantity = QUANTITIES[base]
+    words = f"largest and smallest {quantity.long_name}"
+    if name != base:
+        other = QUANTITIES[name.removeprefix(f"{base}_")]
+        about = {"units": other.unit, "long_name": f"{words}: {other.long_name}"}
+    else:
+        about = {"units": quantity.unit, "long_name": words}
+    return about, (f"{PEAKS}/extreme", *quantity.dims[1:])
 
 
-def _write_profile(file: h5py.File, name: str, profile: Profile) -> None:
+def _write_profile(contents: Contents, name: str, profile: Profile) -> None:
+    about: dict[str, str | float] = {
+        "units": "m",
+        "long_name": f"{profile.kind} profile {profile.name}: y, z",
+    }
+    about |= {fact: getattr(profile, fact) for fact in ("name", "kind", "source", "inclination")}
+    about["notes"] = "\n".join(profile.notes)
     points = np.column_stack([profile.y, profile.z])
-    dataset = _stored(file, f"profiles/{quote(name, safe=' ')}", points)
-    dataset.attrs["units"] = "m"
-    dataset.attrs["long_name"] = f"{profile.kind} profile {profile.name}: y, z"
-    for fact in ("name", "kind", "source", "inclination"):
-        dataset.attrs[fact] = getattr(profile, fact)
-    dataset.attrs["notes"] = "\n".join(profile.notes)
+    contents.store(f"profiles/{quote(name, safe=' ')}", points, about)

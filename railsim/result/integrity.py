@@ -16,20 +16,21 @@ import hashlib
 import json
 import re
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import h5py
 import numpy as np
 
 from railsim.errors import input_error
+from railsim.result.attributes import read_attribute
 
 DIGEST = "digest"
 REMEDY = "it is damaged or was changed since it was written; run it again"
 # attributes that HDF5 and netCDF keep for themselves; and the digest is not part of itself
-_INTERNAL = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", DIGEST)
+_INTERNAL = ("_", "CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", DIGEST)
 _SEAL = re.compile(rb"railsim-seal crc32 ([0-9a-f]{8}) of ([0-9]{20}) bytes\n")
 _SEAL_BYTES = 58
 _BLOCK = 2**20
@@ -68,32 +69,48 @@ def _crc_of(path: Path, length: int) -> tuple[int, int]:
     return crc, done
 
 
-def content_digest(file: h5py.File, known: Mapping[str, int] = MappingProxyType({})) -> str:
-    """Return the digest of everything in a result file.
+@dataclass(frozen=True)
+class Facts:
+    """What the digest covers of a dataset."""
 
-    `file`: An open result file, all of whose links are its own. `known`: CRC-32 of datasets that
-    need not be read.
-    """
-    digest = hashlib.sha256(_attributes(file).encode())
-    for name, dataset in sorted(_datasets(file)):
-        crc = known[name] if name in known else zlib.crc32(dataset[()].tobytes())
-        facts = [name, dataset.dtype.str, list(dataset.shape), f"{crc:08x}"]
-        digest.update(f"{json.dumps(facts)} {_attributes(dataset)}\n".encode())
-    return f"sha256:{digest.hexdigest()}"
+    kind: str  # of its values, as numpy writes it
+    shape: Sequence[int]
+    crc: int  # CRC-32 of its values
+    attributes: Mapping[str, Any]
 
 
-def _datasets(group: h5py.Group, above: str = "") -> Iterator[tuple[str, h5py.Dataset]]:
+def digest(attributes: Mapping[str, Any], datasets: Mapping[str, Facts]) -> str:
+    """Return the digest of the root attributes and all datasets of a file."""
+    found = hashlib.sha256(_text(attributes).encode())
+    for name, of in sorted(datasets.items()):
+        facts = json.dumps([name, of.kind, list(of.shape), f"{of.crc:08x}"])
+        found.update(f"{facts} {_text(of.attributes)}\n".encode())
+    return f"sha256:{found.hexdigest()}"
+
+
+def content_digest(file: h5py.File) -> str:
+    """Return the digest of what an open result file holds, all of whose links are its own."""
+    return digest(_attributes(file), dict(_datasets(file)))
+
+
+def _datasets(group: h5py.Group, above: str = "") -> Iterator[tuple[str, Facts]]:
     for name, member in group.items():
         if isinstance(member, h5py.Dataset):
-            yield above + name, member
+            crc = zlib.crc32(member[()].tobytes())
+            yield above + name, Facts(member.dtype.str, member.shape, crc, _attributes(member))
         else:
             yield from _datasets(member, f"{above}{name}/")
 
 
-def _attributes(thing: h5py.File | h5py.Dataset) -> str:
+def _attributes(thing: h5py.File | h5py.Dataset) -> dict[str, Any]:
+    names = [name for name in thing.attrs if not name.startswith(_INTERNAL)]
+    return {name: read_attribute(thing, name) for name in names}
+
+
+def _text(attributes: Mapping[str, Any]) -> str:
     """Return attributes as text, the same before and after they were stored."""
-    names = [name for name in thing.attrs if not name.startswith(("_", *_INTERNAL))]
-    return json.dumps({name: _plain(thing.attrs[name]) for name in names}, sort_keys=True)
+    own = {name: value for name, value in attributes.items() if not name.startswith(_INTERNAL)}
+    return json.dumps({name: _plain(value) for name, value in own.items()}, sort_keys=True)
 
 
 def _plain(value: Any) -> Any:

@@ -12,17 +12,19 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import h5py
 import numpy as np
+from h5py import h5d, h5g, h5l, h5o, h5s
 
 from railsim.arrays import Floats
 from railsim.errors import Fault, Faults, InputError, input_error
 from railsim.files.access import is_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
+from railsim.result.attributes import read_attribute
 from railsim.result.data import FrozenArrays, Result, frozen
 from railsim.result.integrity import DIGEST, REMEDY, content_digest, sealed
 from railsim.result.sinks import FORMAT, peak_quantity
@@ -59,7 +61,11 @@ def open_result(path: str | Path) -> Result:
     `path`: File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote. Raises InputError:
     there is no such file, it is not a result of railsim, or it is damaged.
     """
-    path = Path(path)
+    return opened(Path(path), sealed)
+
+
+def opened(path: Path, is_whole: Callable[[Path], bool]) -> Result:
+    """Open a result file as `open_result`; `is_whole`: whether its digest need not be looked at."""
     if not is_file(path):
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
         found = "a folder" if os.path.isdir(path) else found
@@ -68,7 +74,7 @@ def open_result(path: str | Path) -> Result:
         if path.stat().st_size == 0:
             raise input_error(str(path), "the file is empty", AS_WRITTEN)
         stamp = _stamp(os.stat(path))
-        whole = sealed(path)
+        whole = is_whole(path)
         with h5py.File(path, "r") as file:
             _refuse_another(path, file, stamp)
             return _Reader(file, path, stamp).result(whole=whole)
@@ -182,6 +188,26 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
         raise input_error(str(path), found, allowed, name) from None
 
 
+class _Dataset(NamedTuple):
+    """A dataset of plain numbers or names that has been looked at."""
+
+    place: h5d.DatasetID
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    @property
+    def is_text(self) -> bool:
+        return self.dtype.kind == "S"
+
+    def values(self) -> np.ndarray[Any, Any]:
+        array = np.empty(self.shape, dtype=self.dtype)
+        self.place.read(h5s.ALL, h5s.ALL, array)
+        return array
+
+    def of_h5py(self) -> h5py.Dataset:
+        return h5py.Dataset(self.place)
+
+
 class _Reader:
     """Looks at every member of an open file before it is read."""
 
@@ -205,7 +231,7 @@ class _Reader:
         inner = {name: dict(self._members(group, f"{name}/")) for name, group in groups.items()}
         for name, some in inner.items():
             for key, member in some.items():
-                if not isinstance(member, h5py.Dataset):
+                if not isinstance(member, _Dataset):
                     raise self.fault(f"{name}/{key}", "a group within a group")
         size = self._path.stat().st_size
         if self._declared > DEFLATE_RATIO * size + SPARE_BYTES:
@@ -228,7 +254,7 @@ class _Reader:
         }
         arrays: dict[str, dict[str, Floats]] = {}
         for group, some in inner.items():
-            numbers = {key: each for key, each in some.items() if each.dtype.kind != "S"}
+            numbers = {key: each for key, each in some.items() if not each.is_text}
             arrays[group] = {k: self._floats(f"{group}/{k}", each) for k, each in numbers.items()}
         self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
         shapes = {name: datasets[name].shape for name in quantities}
@@ -243,32 +269,35 @@ class _Reader:
             raise self.fault(above, f"{len(group)} members", f"{MOST_MEMBERS} at most")
         for name in group:
             with _readable(self._path, above + name):
-                link = group.get(name, getlink=True)
-                member = group[name] if isinstance(link, h5py.HardLink) else None
-            if isinstance(member, h5py.Dataset):
-                self._check_dataset(above + name, member)
-            elif not isinstance(member, h5py.Group):
+                hard = group.id.links.get_info(name.encode()).type == h5l.TYPE_HARD
+                member = h5o.open(group.id, name.encode()) if hard else None
+            if isinstance(member, h5d.DatasetID):
+                member = self._dataset(above + name, member)
+            elif isinstance(member, h5g.GroupID):
+                member = h5py.Group(member)
+            else:
                 raise self.fault(above + name, "a link or a type instead of a dataset")
             yield name, member
 
-    def _check_dataset(self, name: str, dataset: h5py.Dataset) -> None:
-        """See that a dataset is plain numbers or names, in this file, as large as it says."""
-        if dataset.is_virtual or dataset.external:
+    def _dataset(self, name: str, place: h5d.DatasetID) -> _Dataset:
+        """Return a dataset, of plain numbers or names, in this file, as large as it says."""
+        creation, dtype, shape = place.get_create_plist(), place.dtype, place.shape
+        if creation.get_layout() == h5d.VIRTUAL or creation.get_external_count():
             raise self.fault(name, "its values are in another file")
-        creation = dataset.id.get_create_plist()
         filters = {creation.get_filter(index)[0] for index in range(creation.get_nfilters())}
         if not filters <= FILTERS:
             raise self.fault(name, "a filter that railsim does not use")
-        text = h5py.check_string_dtype(dataset.dtype)
-        if dataset.dtype.kind not in "fiu" and not (text and text.length):
-            raise self.fault(name, f"values of type {dataset.dtype}", "numbers or names")
-        if dataset.shape is None or not dataset.shape:
+        text = h5py.check_string_dtype(dtype)
+        if dtype.kind not in "fiu" and not (text and text.length):
+            raise self.fault(name, f"values of type {dtype}", "numbers or names")
+        if not shape:
             raise self.fault(name, "no array")
-        declared = math.prod(dataset.shape) * dataset.dtype.itemsize
-        held = dataset.id.get_storage_size()
+        declared = math.prod(shape) * dtype.itemsize
+        held = place.get_storage_size()
         if declared > held and h5py.h5z.FILTER_DEFLATE not in filters:
             raise self.fault(name, f"says {declared} bytes and holds {held}", REMEDY)
         self._declared += declared
+        return _Dataset(place, dtype, shape)
 
     def _attributes(self, thing: Any, name: str) -> dict[str, Any]:
         """Return attributes as plain values; whole numbers come as numpy's."""
@@ -278,7 +307,7 @@ class _Reader:
                 continue
             location = f"{name}.{key}" if name else key
             with _readable(self._path, location):
-                value = thing.attrs[key]
+                value = read_attribute(thing, key)
             value = value.item() if isinstance(value, np.generic) else value
             if isinstance(value, bytes):  # a text of fixed length
                 value = value.decode("utf-8", errors="replace")
@@ -314,9 +343,9 @@ class _Reader:
     # -- what it holds ----------------------------------------------------------------------------
 
     def _described(
-        self, datasets: Mapping[str, h5py.Dataset]
+        self, datasets: Mapping[str, _Dataset]
     ) -> tuple[dict[str, tuple[str, ...]], dict[str, Quantity]]:
-        named = {name: each for name, each in datasets.items() if each.dtype.kind == "S"}
+        named = {name: each for name, each in datasets.items() if each.is_text}
         coordinates = {name: self._labels(name, each) for name, each in named.items()}
         numbers = {name: each for name, each in datasets.items() if name not in coordinates}
         sizes = {name: len(labels) for name, labels in coordinates.items()}
@@ -333,22 +362,22 @@ class _Reader:
                 raise self.fault(name, found, f"{lengths} along {', '.join(quantity.dims)}")
         return coordinates, quantities
 
-    def _labels(self, name: str, dataset: h5py.Dataset) -> tuple[str, ...]:
-        if dataset.ndim != 1:
+    def _labels(self, name: str, dataset: _Dataset) -> tuple[str, ...]:
+        if len(dataset.shape) != 1:
             raise self.fault(name, f"its shape is {dataset.shape}", "a list of names")
         with _readable(self._path, name):
-            labels = tuple(text.decode("utf-8") for text in dataset[()].tolist())
+            labels = tuple(text.decode("utf-8") for text in dataset.values().tolist())
         if len(set(labels)) < len(labels):
             raise self.fault(name, "a name occurs twice", REMEDY)
         return labels
 
-    def _quantity(self, name: str, dataset: h5py.Dataset) -> Quantity:
+    def _quantity(self, name: str, dataset: _Dataset) -> Quantity:
         """Return the quantity of a dataset: from the notation, else from what the file says."""
         if name in QUANTITIES:
             return QUANTITIES[name]
-        facts = self._attributes(dataset, name)
+        facts = self._attributes(dataset.of_h5py(), name)
         with _readable(self._path, name):
-            dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.dims)
+            dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.of_h5py().dims)
         unit = str(facts.get("units", "1"))
         scale = facts.get("shown_scale", 1.0)
         if isinstance(scale, str) or not math.isfinite(scale):
@@ -357,14 +386,14 @@ class _Reader:
         shown, sign = str(facts.get("shown_units", unit)), str(facts.get("comment", ""))
         return Quantity(name, words, symbol, unit, dims, shown, float(scale), sign)
 
-    def _floats(self, name: str, dataset: h5py.Dataset) -> Floats:
-        if dataset.dtype.kind == "S":
+    def _floats(self, name: str, dataset: _Dataset) -> Floats:
+        if dataset.is_text:
             raise self.fault(name, "names instead of numbers")
         with _readable(self._path, name):
-            return frozen(dataset[()])
+            return frozen(dataset.values())
 
-    def _profile(self, name: str, dataset: h5py.Dataset) -> Profile:
-        points, facts = self._floats(name, dataset), self._attributes(dataset, name)
+    def _profile(self, name: str, dataset: _Dataset) -> Profile:
+        points, facts = self._floats(name, dataset), self._attributes(dataset.of_h5py(), name)
         if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
             raise self.fault(name, f"its shape is {points.shape}", "finite points y, z")
         kind, inclination = facts.get("kind"), facts.get("inclination")

@@ -14,6 +14,7 @@ it leaves nothing behind.
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
+from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Any, Protocol, Self
 
@@ -28,6 +29,7 @@ from railsim.version import __version__
 FORMAT = "railsim-result/2"
 ALWAYS = tuple(QUANTITIES.values())
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+EVERYTHING = ("*",)
 
 
 class Sink(Protocol):
@@ -103,11 +105,11 @@ class MemorySink(Sink):
     """Keeps all chunks in memory.
 
     `attributes`: Root attributes to add to those of the run. `only`: Names of the quantities that
-    are kept; by default all.
+    are kept, with ``*`` for any characters; by default all.
     """
 
     def __init__(
-        self, attributes: Attributes = NOTHING, only: Collection[str] | None = None
+        self, attributes: Attributes = NOTHING, only: Collection[str] = EVERYTHING
     ) -> None:
         self._attributes = dict(attributes)
         self._only = only
@@ -119,8 +121,7 @@ class MemorySink(Sink):
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
     ) -> None:
         """See `Sink.begin`."""
-        only = self._only
-        self._quantities = {q.name: q for q in quantities if only is None or q.name in only}
+        self._quantities = {q.name: q for q in quantities if matches(q.name, self._only)}
         self._coordinates = full_coordinates(coordinates)
         self._chunks = {name: [] for name in timed(self._quantities)}
 
@@ -157,6 +158,11 @@ def full_coordinates(coordinates: Mapping[str, Sequence[str]]) -> dict[str, tupl
     """Return the coordinates of a run with the ones that are always the same."""
     known: dict[str, Sequence[str]] = {"side": SIDES, "component": COMPONENTS}
     return {name: tuple(labels) for name, labels in (known | dict(coordinates)).items()}
+
+
+def matches(name: str, patterns: Iterable[str]) -> bool:
+    """Whether a name is one of those given, with ``*`` for any characters."""
+    return any(fnmatchcase(name, one) for one in patterns)
 
 
 def timed(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from railsim.processes import available_cores
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import Storage
+from railsim.result.sinks import matches
 from railsim.studies import execute
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Journal, Records
@@ -283,7 +283,7 @@ class State:
         return any(
             name not in result
             for name in QUANTITIES
-            if all(any(fnmatchcase(name, p) for p in some) for some in (recorded, wanted))
+            if all(matches(name, some) for some in (recorded, wanted))
         )
 
     def settle(self, journal: Journal) -> list[str]:

@@ -19,7 +19,6 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -33,6 +32,7 @@ from railsim.processes import WorkerPool, begin_worker, worker_context
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import PLAIN, Storage, write
+from railsim.result.sinks import EVERYTHING, matches
 from railsim.simulation import simulate
 from railsim.simulation.first_start import compile_time_loop, is_compiled
 from railsim.studies.analyses import analysed
@@ -58,10 +58,15 @@ class Job:
     picture: Path | None = None
     function: str | None = None  # for user-defined quantities, see `railsim.studies.user_function`
     # quantities of the result, see `railsim.studies.spec.kept_quantities`
-    keep: tuple[str, ...] = ("*",)
+    keep: tuple[str, ...] = EVERYTHING
     storage: Storage = PLAIN  # compression and precision of its file
     # of a run that exists, whose analyses alone are to be computed: what is known of it
     known: Record | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether its file holds everything, as the run itself writes it."""
+        return self.keep == EVERYTHING and self.storage == PLAIN
 
 
 Batch = tuple[Job, ...]
@@ -104,13 +109,13 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         with suppress(RailsimError):  # its file lacks required quantities: it is run again
             result = open_result(first.path)
             return [finished_record(first.case, result, first.function, first.known)]
-    files = [job.path if job.keep else None for job in batch]
+    files = [job.path if job.whole else None for job in batch]
     found: list[Result | Exception]
     try:
         if len(batch) == 1:
-            # the quantities that the record needs; None for all
-            wants_all = first.function or first.case.analyses or first.picture or first.keep
-            only = None if wants_all else OF_FACTS
+            # the quantities that the record and the file need
+            wants_all = first.function or first.case.analyses or first.picture
+            only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *first.keep}
             found = [run_case(first.case, files[0], overwrite=True, progress=progress, only=only)]
         else:
             cases = [job.case for job in batch]
@@ -160,9 +165,9 @@ def _reduced(job: Job, result: Result) -> str:
     if not job.keep:
         job.path.unlink(missing_ok=True)  # kept by an earlier run
         return ""
-    if job.keep != ("*",) or job.storage != PLAIN:
+    if not job.whole:
         wanted = (*job.keep, *ALWAYS_KEPT)
-        names = [name for name in result if any(fnmatchcase(name, one) for one in wanted)]
+        names = [name for name in result if matches(name, wanted)]
         write(result, job.path, overwrite=True, names=names, storage=job.storage)
     return job.path.name
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from railsim.errors import InputError
 from railsim.result import Hdf5Sink, Result
-from railsim.result.sinks import MemorySink
+from railsim.result.sinks import EVERYTHING, MemorySink
 from railsim.simulation import outcomes, simulate
 from railsim.studies.case import Case
 
@@ -18,14 +18,14 @@ def run_case(
     overwrite: bool,
     progress: Callable[[float], None] | None,
     resume: Result | None = None,
-    only: Collection[str] | None = None,
+    only: Collection[str] = EVERYTHING,
 ) -> Result:
     """Run a case to its file, which carries name and key of the case.
 
     `path`: result file; None to keep the result in memory; `resume`: result whose final state is
     the initial state of this run; the file then carries no key; `only`: names of the quantities in
-    a result in memory; by default all. Raises InputError, ModelError: as `railsim.simulate`; the
-    file cannot be written.
+    a result in memory, with ``*`` for any characters; by default all. Raises InputError,
+    ModelError: as `railsim.simulate`; the file cannot be written.
     """
     facts = {"run": case.name}
     if resume is None:
@@ -42,7 +42,7 @@ def _sink(
     path: str | Path | None,
     overwrite: bool,
     facts: Mapping[str, str],
-    only: Collection[str] | None = None,
+    only: Collection[str] = EVERYTHING,
 ) -> Hdf5Sink | MemorySink:
     if path is None:
         return MemorySink(facts, only)

@@ -101,6 +101,22 @@ def test_same_result_gives_the_same_bytes(tmp_path):
     assert result.to_hdf5(tmp_path / "b.h5").read_bytes() == first
 
 
+def test_digest_is_that_of_what_the_file_holds(written):
+    """It is formed while the file is written, and found again by reading all of it."""
+    with h5py.File(written) as file:
+        assert file.attrs["digest"] == content_digest(file)
+
+
+def test_result_of_writing_is_the_one_that_is_read(tmp_path):
+    with Hdf5Sink(tmp_path / "run.h5") as sink:
+        one = feed(sink)
+    other = open_result(tmp_path / "run.h5")
+    assert list(one) == list(other)
+    assert dict(one.attributes) == dict(other.attributes)
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name])
+
+
 def test_profiles_keep_names_that_are_paths(tmp_path):
     with Hdf5Sink(tmp_path / "run.h5") as sink:
         sink.begin(COORDINATES, [QUANTITIES["time"]])

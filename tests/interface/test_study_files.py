@@ -122,6 +122,26 @@ def test_reduced_results_do_not_count_as_whole_ones(tmp_path, simulated):
     assert remarks == [f"{words}: {COACH}_{CURVE}_20"]
 
 
+def test_kept_quantities_are_those_of_the_whole_result(tmp_path):
+    """With the name and key of the run, its state and what it started from."""
+    for folder, keep in (("whole", "all"), ("part", "Q,body_*")):
+        railsim.study([COACH], [CURVE], [20.0], keep=keep, out=tmp_path / folder, workers=1)
+    whole, part = (
+        railsim.open_result(tmp_path / folder / f"{COACH}_{CURVE}_20.h5")
+        for folder in ("whole", "part")
+    )
+    motion = ["body_position", "body_velocity", "body_acceleration"]
+    assert sorted(part) == sorted(["time", "distance", "Q0", "Q", *motion])
+    for name in part:
+        np.testing.assert_array_equal(part[name], whole[name])
+    measured = {"created", "wall_time", "cpu_time", "real_time_factor"}
+    assert whole.attributes.keys() == part.attributes.keys()
+    for name in whole.attributes.keys() - measured:
+        assert whole.attributes[name] == part.attributes[name]
+    assert list(part.groups["peaks"]) == ["Q", "Q_distance", "Q_time"]
+    np.testing.assert_array_equal(part.groups["state"]["end"], whole.groups["state"]["end"])
+
+
 @pytest.mark.parametrize(
     ("standard", "change", "words"),
     [
