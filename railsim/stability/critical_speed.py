@@ -471,9 +471,7 @@ def _conclude(
     if only_ramp:
         kept = [[p for p in one.points if p.speed >= one.end] for one in found.branches]
         branches = [Branch("ramp", points) for points in kept]
-    top = found.high
-    if branches and all(branch.direction == "continuation" for branch in branches):
-        top = max(point.speed for branch in branches for point in branch.points)  # followed to
+    top = found.searched_to
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", top)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", top)
     if only_ramp and (found.amplitude_limit.reached or found.instability_limit.reached):

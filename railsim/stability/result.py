@@ -119,6 +119,12 @@ class CriticalSpeed(Plottable):
         known = [point for point in self.nonlinear.values() if point is not None]
         return min(known, key=lambda point: point.speed, default=None)
 
+    @property
+    def searched_to(self) -> float:
+        """Highest speed at which hunting was sought, less than `high` where it derails [m/s]."""
+        speeds = [point.speed for branch in self.branches for point in branch.points]
+        return max(speeds, default=self.high)
+
     def record(self) -> dict[str, Any]:
         """Return everything as plain data."""
         lowest, nonlinear = self.lowest, None
@@ -126,7 +132,7 @@ class CriticalSpeed(Plottable):
             nonlinear = {
                 **(lowest.record() if lowest else {"speed": None}),
                 "reached": lowest is not None,
-                "searched_to": self.high,
+                "searched_to": self.searched_to,
             }
         line = self.linear_over_amplitude
         by_method = {name: point and point.record() for name, point in self.nonlinear.items()}
@@ -179,7 +185,7 @@ class CriticalSpeed(Plottable):
 
     def _rows(self) -> Iterator[tuple[str, float | None, float | None, float | None, str]]:
         how, lost, line = self.contact.words(), self.linear, self.linear_over_amplitude
-        none = f"none up to {self.high:g} m/s"
+        none = f"none up to {self.searched_to:.4g} m/s"
         if lost is None:
             words = "unstable at its lower end" if self.unstable_at_low else "none in this range"
             yield f"linear, {how}", None, None, None, words

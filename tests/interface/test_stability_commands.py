@@ -190,6 +190,21 @@ def test_the_lower_end_of_the_search_is_no_critical_speed_over_amplitude(smalles
     assert row[-1] == words
 
 
+def test_above_the_speed_of_a_derailment_nothing_is_said_of_hunting():
+    """A bogie without its car derails above 8 m/s: what lies above, to 60 m/s, was not looked at."""
+    where = {"rails": "", "friction": "", "law": "", "linear_law": ""}
+    found = critical_speed.CriticalSpeed(Contact(), conditions=where, low=5.0, high=60.0)
+    found.branches = [Branch("up", [Point(5.0, 0.0, np.nan), Point(8.23, 0.0, np.nan)])]
+    found.nonlinear = {"bifurcation": None}
+    coach = railsim.load_vehicle("coach_manchester")
+    begins = SimpleNamespace(Q0=np.full((4, 2), 7e4), already=False, parameter=10.0)
+    critical_speed._conclude(found, coach, begins, begins)
+    words = {row[0].split()[0]: row[-1] for row in found.table().rows}
+    assert words["non-linear,"] == "none up to 8.23 m/s"
+    assert words["amplitude"] == words["rms"] == "not reached up to 8.23 m/s"
+    assert found.record()["nonlinear"]["searched_to"] == 8.23
+
+
 def test_what_fails_on_rigid_rails_takes_no_critical_speed_on_others(monkeypatch):
     """Cones of 1:5 rest on the gauge corner, and on rigid rails no equilibrium was found there."""
     whole = critical_speed.LinearVehicle
