@@ -64,7 +64,8 @@ def main() -> None:
     print(f"folder {size / 1e6:.2f} MB, {size / runs:.0f} bytes a run")
     print("memory (MB) at tenths of the time:", *(f"{mb:.0f}" for mb in memory.tenths()))
     if asked.json:
-        found = {"runs": runs, "cpu": cpu, "own": own, "wall": wall, "bytes": size}
+        measured = {"cpu": cpu, "own": own, "wall": wall, "bytes": size}
+        found = {"keep": asked.keep, "runs": runs, **measured}
         asked.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 

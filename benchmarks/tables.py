@@ -2,8 +2,9 @@
 
     python benchmarks/tables.py
 
-`bench.json` is the output of `whole.py`, `speeds.json` that of `irregular.py`, `study.json` that of
-`study_cost.py`, `peers.json` and `growth.json` those of the scripts of the same names.
+`bench.json` is the output of `whole.py`, `speeds.json` that of `irregular.py`, `study.json` and
+`study_files.json` those of `study_cost.py`, `peers.json` and `growth.json` those of the scripts of
+the same names.
 """
 
 import json
@@ -83,13 +84,16 @@ def irregular(found: dict[str, Any]) -> str:
     return table(head.split("|"), rows)
 
 
-def study(found: dict[str, Any]) -> str:
-    head = "runs|CPU (s)|own time loops (s)|CPU outside them, a run (ms)|bytes a run"
-    outside = 1e3 * (found["cpu"] - found["own"]) / found["runs"]
-    row = "{runs}|{cpu:.1f}|{own:.1f}|{outside:.0f}|{each:.0f}".format(
-        **found, outside=outside, each=found["bytes"] / found["runs"]
-    )
-    return table(head.split("|"), [row.split("|")])
+def study(*found: dict[str, Any]) -> str:
+    head = "kept|runs|CPU (s)|own time loops (s)|CPU outside them, a run (ms)|bytes a run"
+    rows = [
+        "{keep}|{runs}|{cpu:.1f}|{own:.1f}|{outside:.0f}|{each:.0f}".format(
+            **one, outside=1e3 * (one["cpu"] - one["own"]) / one["runs"],
+            each=one["bytes"] / one["runs"],
+        ).split("|")
+        for one in found
+    ]  # fmt: skip
+    return table(head.split("|"), rows)
 
 
 def growth(found: dict[str, Any]) -> dict[str, str]:
@@ -146,7 +150,7 @@ def main() -> None:
     bench, found, speeds = load("bench"), load("peers"), load("speeds")
     known = dict(zip(BENCH, (table(*made) for made in tables(bench)), strict=True))
     known |= {"peers": peers(found), "fastsim": fastsim(found["fastsim"])}
-    known |= {"irregular": irregular(speeds), "study": study(load("study"))}
+    known |= {"irregular": irregular(speeds), "study": study(load("study"), load("study_files"))}
     known |= growth(load("growth")) | {"speed": speed(bench, speeds, found)}
     makers = {name: lambda made=made: made for name, made in known.items()}
     fill_page(ROOT / "docs" / "performance.md", makers)

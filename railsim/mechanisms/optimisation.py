@@ -19,7 +19,7 @@ from scipy.optimize import Bounds, minimize
 from railsim.arrays import Floats
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number
-from railsim.errors import Fault, InputError, argument_fault
+from railsim.errors import Fault, InputError, argument_error, argument_fault
 from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
@@ -66,7 +66,7 @@ def optimise(
     Raises
     ------
     InputError
-        There is no [optimise]; no start within the bounds can be assembled.
+        There is no [optimise]; too few or too many starts; no start within the bounds can be assembled.
     """
     if definition.optimise is None:
         fault = Fault(definition.name, "optimise", "missing", "the table [optimise] is needed")
@@ -78,6 +78,9 @@ def optimise(
         fault = argument_fault("starts", "", f"{count:,}, some {time}", f"{MOST_STARTS:,} at most")
         raise InputError([fault])
     chosen_seed = wanted.seed if seed is None else seed
+    for name, value, least in (("starts", count, 1), ("seed", chosen_seed, 0)):
+        if value < least:
+            raise argument_error(name, f"found {value}", f"{least} at least")
     judge = Judge(definition)
     found = _search(judge, first_points(judge, count, chosen_seed), workers)
     usable = [start for start in found if np.isfinite(start.objective)]

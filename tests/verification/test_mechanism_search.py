@@ -259,6 +259,12 @@ def test_every_position_with_a_value_is_found(tmp_path):
         result.everywhere("force", 900.0)
 
 
+@pytest.mark.parametrize(("name", "value", "least"), [("starts", 0, 1), ("seed", -1, 0)])
+def test_numbers_of_no_search_are_refused(name, value, least):
+    with pytest.raises(InputError, match=f"{name}: found {value}; {least} at least"):
+        optimise(load_mechanism("atr95_lift_4"), **{name: value})
+
+
 def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(ARM.replace("d = [0.05, 0.25]", "d = [0.19287, 0.25]"))
