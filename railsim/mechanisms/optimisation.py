@@ -66,7 +66,8 @@ def optimise(
     Raises
     ------
     InputError
-        There is no [optimise]; too few or too many starts; no start within the bounds can be assembled.
+        There is no [optimise]; too few or too many starts; no start within the bounds can be
+        assembled.
     """
     if definition.optimise is None:
         fault = Fault(definition.name, "optimise", "missing", "the table [optimise] is needed")

@@ -65,7 +65,7 @@ class Contents:
         how = {"track_order": True, "rdcc_nbytes": 0, "locking": False}
         self._file = h5py.File(path, "w", **how)
         self._datasets: dict[str, Dataset] = {}
-        self._groups: dict[str, h5py.Group] = {}
+        self._groups: set[str] = set()
 
     def create(
         self, name: str, shape: Shape, dtype: np.dtype[Any], attributes: Values = NOTHING,
@@ -86,7 +86,8 @@ class Contents:
                 creation.set_deflate(4)
             creation.set_fletcher32()
         if (group := name.rpartition("/")[0]) and group not in self._groups:
-            self._groups[group] = self._file.create_group(group)
+            self._file.create_group(group)
+            self._groups.add(group)
         links = h5p.create(h5p.LINK_CREATE)
         links.set_char_encoding(h5t.CSET_ASCII if name.isascii() else h5t.CSET_UTF8)
         space = h5s.create_simple(shape, (h5s.UNLIMITED, *shape[1:]) if growing else shape)
@@ -118,6 +119,4 @@ class Contents:
 
     def close(self) -> None:
         """Close the file."""
-        self._datasets.clear()
-        self._groups.clear()
         self._file.close()
