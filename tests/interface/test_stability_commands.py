@@ -191,7 +191,7 @@ def test_the_lower_end_of_the_search_is_no_critical_speed_over_amplitude(smalles
 
 
 def test_above_the_speed_of_a_derailment_nothing_is_said_of_hunting():
-    """A bogie without its car derails above 8 m/s: what lies above, to 60 m/s, was not looked at."""
+    """A bogie without its car derails above 8 m/s: what lies above, to 60 m/s, was not seen."""
     where = {"rails": "", "friction": "", "law": "", "linear_law": ""}
     found = critical_speed.CriticalSpeed(Contact(), conditions=where, low=5.0, high=60.0)
     found.branches = [Branch("up", [Point(5.0, 0.0, np.nan), Point(8.23, 0.0, np.nan)])]
