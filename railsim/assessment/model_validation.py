@@ -81,22 +81,11 @@ def validate_model(
     InputError
         Channels that the vehicle or the result does not have; no section; unequal numbers.
     """
-    files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
-    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
+    runs, limits = inputs(measured, limits)
     found = [results] if isinstance(results, Result) else list(results)
     if len(found) != len(runs) or not runs:
         words = f"{len(found)} results for {len(runs)} measured run{'s' * (len(runs) != 1)}"
         raise argument_error("results", words, "one for each", option="RESULT.h5")
-    names = [run.name for run in runs]
-    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        words, allowed = f"two runs named '{twice[0]}'", "a name for each run"
-        raise argument_error("measured", words, allowed, option="MEASURED.toml")
-    if not isinstance(limits, ValidationLimits):
-        limits = load(ValidationLimits, limits)
-    unknown = sorted(set(limits.limits) - set(QUANTITIES))
-    if unknown:
-        allowed = "allowed: " + ", ".join(QUANTITIES)
-        raise input_error("limits", "unknown quantity", allowed, f"limits.{unknown[0]}")
     tests = load_running_limits(zones)
     pairs: list[Pair] = []
     overlays: list[Overlay] = []
@@ -120,8 +109,29 @@ def validate_model(
     if not all(one.checked for one in limits.limits.values()):
         remarks.append(f"limits of {limits.edition} not checked against the printed standard")
     said = tuple(dict.fromkeys(remarks))
-    results_of = found[0].vehicle().name, tuple(names), tuple(comparisons), tuple(overlays)
+    names = tuple(run.name for run in runs)
+    results_of = found[0].vehicle().name, names, tuple(comparisons), tuple(overlays)
     return ModelValidation(*results_of, limits.edition, said)
+
+
+def inputs(
+    measured: Measurement | str | Path | Sequence[Measurement | str | Path],
+    limits: ValidationLimits | str | Path,
+) -> tuple[list[Measurement], ValidationLimits]:
+    """Return measured runs and limits; raises InputError: what is wrong with them."""
+    files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
+    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
+    names = [run.name for run in runs]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        words, allowed = f"two runs named '{twice[0]}'", "a name for each run"
+        raise argument_error("measured", words, allowed, option="MEASURED.toml")
+    if not isinstance(limits, ValidationLimits):
+        limits = load(ValidationLimits, limits)
+    unknown = sorted(set(limits.limits) - set(QUANTITIES))
+    if unknown:
+        allowed = "allowed: " + ", ".join(QUANTITIES)
+        raise input_error("limits", "unknown quantity", allowed, f"limits.{unknown[0]}")
+    return runs, limits
 
 
 def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> list[Result]:

@@ -38,16 +38,15 @@ def command(
       railsim validate-model run12.toml run12.h5 --out comparison
       railsim validate-model run12.toml run13.toml study/
     """
-    from railsim.assessment.model_validation import validate_model
-    from railsim.measurement import load_measurement
+    from railsim.assessment.model_validation import inputs, validate_model
 
     output.reserve(*FILES)
     names = [f for f in files if not (os.path.isdir(f) or Path(f).suffix.lower() in RESULTS)]
     if not names:
         raise input_error("MEASURED.toml", "none given", "a measurement file for each run")
-    runs = [load_measurement(name) for name in names]
+    runs, wanted = inputs(names, limits)  # before anything is simulated
     results = _results(names, runs, [f for f in files if f not in names], vehicle)
-    found = validate_model(runs, results, limits=limits)
+    found = validate_model(runs, results, limits=wanted)
     if output.folder:
         from railsim.report.measured import measured_page, of_validation, validation_figures
 

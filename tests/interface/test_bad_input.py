@@ -260,10 +260,13 @@ def test_run_without_speed_is_told(tmp_path, capsys, monkeypatch):
     [
         (["validate-model", "coach_25t_run", "coach_25t_run"], "MEASURED.toml: two runs named"),
         (["validate-model", "coach_25t_run", "a.h5", "b.h5"], "RESULT.h5: 2 results for 1 "),
+        (["validate-model", "coach_25t_run", "--limits", "none"], "none: no file 'none'"),
         (["identify", "coach_25t", *2 * ["coach_25t_run"], "-p", "x"], "MEASURED.toml: coach_25t"),
     ],
 )
 def test_files_without_an_option_are_not_called_by_one(given, words, tmp_path, monkeypatch, capsys):
+    """And what is wrong with them is said before a run is simulated."""
+    monkeypatch.setattr("railsim.identification.runs.simulated_run", None)
     monkeypatch.chdir(tmp_path)
     for name in ("a.h5", "b.h5"):
         example_result().to_hdf5(name)
