@@ -33,12 +33,8 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
-        "unit/test_foreign_calls.py::"
-        "test_ten_thousand_calls_leave_all_arrays_alive_and_the_result_the_same",
         "interface/test_mechanism.py::test_out_writes_a_self_contained_page_pictures_and_positions",
         "interface/test_study.py::test_pictures_of_runs_and_of_vehicles_against_each_other",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[optimise.py]",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[fastsim_benchmark.py]",
         "reference/test_gritti_pantograph.py::test_a19_linear_ratio_new",
         "verification/test_random_combinations.py::test_random_combination[97]",
         "interface/test_manual_site.py::"
@@ -58,21 +54,16 @@ LONG = frozenset(
         "verification/test_spring_search.py::test_it_is_said_that_stresses_are_not_limited",
         "reference/test_gritti_pantograph.py::"
         "test_lift_5_follows_the_cam_as_closely_as_it_can_reconstructed",
-        "verification/test_steady_curving.py::"
-        "test_where_steady_rolling_is_unstable_values_are_means_of_the_motion",
         "verification/test_identification.py::"
         "test_a_channel_that_a_robust_loss_leaves_out_does_not_widen_the_intervals[cauchy]",
         "reference/test_gritti_pantograph.py::test_a18_constant_ratio_new",
         "reference/test_gritti_pantograph.py::test_a23_constant_actuator_force_new",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[growth.py]",
-        "reliability/test_ends.py::test_physical_end_keeps_its_result[standstill]",
         "interface/test_stability_commands.py::test_linear_critical_speed",
         "interface/test_examples.py::"
         "test_example_runs_and_draws_its_picture[16_how_loud_is_this_flat]",
         "interface/test_examples.py::test_example_runs_and_draws_its_picture[12_tilting]",
         "interface/test_examples.py::"
         "test_example_runs_and_draws_its_picture[10_study_friction_speed]",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[whole.py]",
         "interface/test_mechanism.py::test_a_motion_is_written_with_every_link_and_actuator",
         "interface/test_manual.py::test_tables_of_the_curving_study_are_up_to_date[flexicoil]",
         "interface/test_check_step.py::test_check_in_json_is_the_difference_of_two_runs",
@@ -107,8 +98,6 @@ LONG = frozenset(
         "reference/test_gritti_pantograph.py::"
         "test_no_seed_ends_above_the_published_design_reconstructed[1-1]",
         "interface/test_docs.py::test_blocks_of_a_page_run_in_their_order[docs/user/stability.md]",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[mechanisms.py]",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[springs.py]",
         "interface/test_examples.py::test_example_runs_and_draws_its_picture[05_when_does_it_hunt]",
         "interface/test_examples.py::test_example_runs_and_draws_its_picture[18_coach_on_a_bridge]",
         "interface/test_run.py::test_braking_to_a_standstill_keeps_the_run[True]",

@@ -245,7 +245,10 @@ class Judge:
     def _force(self, motion: Motion, way: int = 1) -> Any:
         """Unknown force on the way from start to end, or back, shape (lane, position)."""
         rates = Rates(friction=way * motion.model.sense, trial=True)
-        return -generalised_force(motion, rates) / unit_work(motion, self.unknown)
+        return motion.once(
+            ("unknown force", way),
+            lambda: -generalised_force(motion, rates) / unit_work(motion, self.unknown),
+        )
 
     def _objective(self, height: Any, ratio: Any, force: Any, whole: Any) -> tuple[Any, Any]:
         """Residuals, shape (lane, residual); amounts whose largest is added to their squares."""

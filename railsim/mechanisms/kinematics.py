@@ -4,9 +4,9 @@ A prime is a derivative by the driver; `Motion` holds all bodies' coordinates wi
 Complex models give complex results, whose imaginary parts are derivatives by parameters.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.assembly import assembled, constraints, dead_loop, open_loop
 from railsim.mechanisms.model import STEP, Model
 
+T = TypeVar("T")
 Triple = tuple[Any, Any, Any]
 ASTRAY = 1.0
 """Turn from the given pose beyond which the nearest assembly is looked for instead [rad]."""
@@ -36,14 +37,20 @@ class Motion:
     q1: NDArray[Any]  # its derivatives by the driver
     q2: NDArray[Any]
     arcs: Integers  # arc on which each cam's roller is, (position, joint)
-    known: dict[str, Triple] = field(default_factory=dict, repr=False, compare=False)
+    known: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def once(self, name: Hashable, found: Callable[[], T]) -> T:
+        """What is called so of these positions: `found` where it is not known yet."""
+        if name not in self.known:
+            self.known[name] = found()
+        known: T = self.known[name]
+        return known
 
     def point(self, name: str) -> Triple:
         """Position of a named point with two derivatives, shapes (..., position, 2)."""
-        if name not in self.known:
-            k = self.model.points[name]
-            self.known[name] = self.at(self.model.linkage.point_body[k], *self._local(k))
-        return self.known[name]
+        k = self.model.points[name]
+        body = self.model.linkage.point_body[k]
+        return self.once(name, lambda: self.at(body, *self._local(k)))
 
     def arc_centre(self, joint: int) -> Any:
         """Position of the centre of the arc that a cam's roller is on, shape (position, 2)."""
@@ -73,6 +80,9 @@ class Motion:
 
     def length(self, pair: Sequence[str]) -> Triple:
         """Distance of two points with two derivatives, shape (..., position) [m]."""
+        return self.once(tuple(pair), lambda: self._length(pair))
+
+    def _length(self, pair: Sequence[str]) -> Triple:
         first, second = self.point(pair[0]), self.point(pair[1])
         d, d1, d2 = (b - a for a, b in zip(first, second, strict=True))
         length = np.sqrt(dot(d, d))
