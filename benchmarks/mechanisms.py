@@ -1,6 +1,6 @@
 """Speed of the tool for linkages: kinematics with force, search, the whole command.
 
-    python benchmarks/mechanisms.py [--starts 20]
+    python benchmarks/mechanisms.py [--starts 20] [--search atr95_lift_5]
 
 Times are CPU times of this process where one does the work, else wall times; the machine is told.
 A loop of Python with the closed form of lift 5 and its force is the peer in the same run.
@@ -59,9 +59,9 @@ def closed_form_in_python():
     return best(loop)
 
 
-def search(starts, workers):
+def search(name, starts, workers):
     """Wall time of a search, and CPU time of this process alone [s]."""
-    mechanism = load_mechanism("atr95_lift_5")
+    mechanism = load_mechanism(name)
     begin, busy = time.perf_counter(), time.process_time()
     optimise(mechanism, starts=starts, workers=workers)
     return time.perf_counter() - begin, time.process_time() - busy
@@ -89,7 +89,8 @@ def command():
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--starts", type=int, default=20)
-    starts = parser.parse_args().starts
+    parser.add_argument("--search", default="atr95_lift_5")
+    asked = parser.parse_args()
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     positions, with_force = kinematics()
     loop = closed_form_in_python()
@@ -97,8 +98,9 @@ def main():
     print(f"closed form of the lift alone in a loop of Python: {loop / positions:.1f} times that")
     whole, version = command()
     print(f"whole command {whole:.2f} s of CPU, --version {version:.2f} s")
-    print(f"{starts} starts of lift 5 in one process: {search(starts, 1)[1]:.1f} s of CPU")
-    print(f"the same on 2 cores: {search(starts, 2)[0]:.1f} s of wall time")
+    one, two = (search(asked.search, asked.starts, workers) for workers in (1, 2))
+    print(f"{asked.starts} starts of {asked.search} in one process: {one[1]:.1f} s of CPU")
+    print(f"the same on 2 cores: {two[0]:.1f} s of wall time")
 
 
 if __name__ == "__main__":

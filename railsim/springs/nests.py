@@ -6,6 +6,7 @@ kept, and nan where a nest has no physical solution.  The formulas are those of 
 `design` and `checks`; nothing is computed differently here than in design and verification.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,6 +49,16 @@ class Dimensions:
     D: Floats  # mean coil diameters, likewise
     H0: Floats  # free height of the outer spring, (nest,)
 
+    @classmethod
+    def joined(cls, some: Sequence["Dimensions"]) -> "Dimensions":
+        """Nests of several."""
+        return cls(
+            *(
+                np.concatenate([vars(one)[name] for one in some], axis=-1)
+                for name in cls.__annotations__
+            )
+        )
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -64,6 +75,12 @@ class Evaluation:
         """Whether every limit is kept (to round-off)."""
         kept: Flags = np.all([slack >= -1e-9 for slack in self.slack.values()], axis=0)
         return kept
+
+    def part(self, rows: slice) -> "Evaluation":
+        """Some of the nests."""
+        slack = {name: values[rows] for name, values in self.slack.items()}
+        n, margin, errors = (of[:, rows] for of in (self.n, self.margin, self.deflection_error))
+        return Evaluation(n, self.mass[rows], margin, slack, errors)
 
 
 def task_of(suspension: TrailingArmSuspension) -> Task:

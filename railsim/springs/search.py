@@ -13,9 +13,10 @@ from the design equations, the numbers of coils from the stiffnesses.  In four s
 Every limit is a slack, relative and positive when it is kept (`LIMITS` says what each one means).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.optimize import linprog
@@ -26,6 +27,10 @@ from railsim.definitions.spring import Search, TrailingArmSuspension
 from railsim.errors import Fault, InputError
 from railsim.springs import nests as many
 from railsim.springs.nests import Dimensions, Evaluation, Task, evaluate
+
+R = TypeVar("R")
+Asked = tuple[Dimensions, Floats | None]  # nests to be evaluated, and their coils as built, if any
+Steps = Generator[Asked, Evaluation, R]  # a search that asks for evaluations
 
 # limit: key of the file that loosens it, and how
 LIMITS = {
@@ -106,8 +111,9 @@ def search(suspension: TrailingArmSuspension) -> SearchResult:
     feasible = found.feasible
     leaders, merit = _leaders(task, sample, _merit(task, found))
     best = np.argsort(merit, kind="stable")[: task.limits.results + _SPARE]
-    optima = [_optimum(task, leaders, int(i)) for i in best]
-    nests = [nest for optimum in optima if (nest := _built(task, optimum)) is not None]
+    optima = _abreast(task, [_optimum(task, leaders, int(i)) for i in best])
+    built = _abreast(task, [_built(task, optimum) for optimum in optima])
+    nests = [nest for nest in built if nest is not None]
     by_mass = task.limits.objective == "mass"
     nests.sort(key=lambda nest: nest.mass if by_mass else -nest.fatigue_margin)
     result = SearchResult(
@@ -201,7 +207,33 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
     return Dimensions(d.T, x[:, :2].T, x[:, 2]), merit
 
 
-def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
+def _abreast(task: Task, searches: Sequence[Steps[R]]) -> list[R]:
+    """Ends of searches that go on in step: nests that they ask for are evaluated in one call."""
+    asked: dict[int, Asked] = {}
+    ends: dict[int, R] = {}
+
+    def go_on(number: int, answer: Any = None) -> None:
+        try:
+            asked[number] = searches[number].send(answer)
+        except StopIteration as end:
+            asked.pop(number, None)
+            ends[number] = end.value
+
+    for number in range(len(searches)):
+        go_on(number)
+    while asked:
+        nests = Dimensions.joined([nests for nests, _ in asked.values()])
+        coils = [n for _, n in asked.values() if n is not None]  # of all, or of none
+        found = evaluate(task, nests, np.concatenate(coils, axis=-1) if coils else None)
+        begin = 0
+        for number, (of_one, _) in list(asked.items()):
+            end = begin + len(of_one.H0)
+            go_on(number, found.part(slice(begin, end)))
+            begin = end
+    return [ends[number] for number in range(len(searches))]
+
+
+def _optimum(task: Task, sample: Dimensions, start: int) -> Steps[_Optimum]:
     """Best mean diameters and free height for one pair of wires; the least broken where none fit.
 
     Variables are (D_outer, D_inner, H0) over the size of the space.  Sequential linear programming:
@@ -218,8 +250,8 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
         *D, H0 = (points * scale).T
         return Dimensions(np.repeat(d, len(points), axis=1), np.stack(D), H0)
 
-    def linearised(x: Floats) -> _Linearised:
-        found = evaluate(task, at(x + neighbours))
+    def linearised(x: Floats) -> Steps[_Linearised]:
+        found = yield at(x + neighbours), None
         aims = np.stack(_aims(task, found), axis=-1)
         slack = np.stack(list(found.slack.values()), axis=-1)
         # far outside the model's range: finite, and clearly wrong
@@ -232,14 +264,14 @@ def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
     low = np.append(w_min * d, task.limits.free_height[0]) / scale
     high = np.append(w_max * d, longest) / scale
     x = np.append(sample.D[:, start], sample.H0[start]) / scale
-    here, reach = linearised(x), _FIRST_BOX
+    here, reach = (yield from linearised(x)), _FIRST_BOX
     for _ in range(_PROGRAMS):
         box = np.maximum(low - x, -reach), np.minimum(high - x, reach)
         step, promised = _linear_step(here, *box)
         gain = here.merit - promised
         if gain < _CONVERGED or reach < _CONVERGED:
             break
-        there = linearised(x + step)
+        there = yield from linearised(x + step)
         kept = (here.merit - there.merit) / gain
         if kept > 0.1:
             x, here = x + step, there
@@ -287,28 +319,28 @@ def _aims(task: Task, found: Evaluation) -> list[Floats]:
     return [*(1.0 / found.margin)]
 
 
-def _built(task: Task, found: _Optimum) -> Nest | None:
+def _built(task: Task, found: _Optimum) -> Steps[Nest | None]:
     """The best rounding near an optimum that keeps every limit, None where none does."""
     if found.worst < _NEARLY:
         return None
     nest, best, at = None, np.inf, np.array([*found.dimensions.D[:, 0], *found.dimensions.H0])
-    while (nearby := _rounded(task, found, at)) is not None and nearby[0] < best:
+    while (nearby := (yield from _rounded(task, found, at))) is not None and nearby[0] < best:
         best, nest = nearby
         at = np.array([nest.outer.mean_diameter, nest.inner.mean_diameter, nest.outer.free_height])
     return nest
 
 
-def _rounded(task: Task, found: _Optimum, around: Floats) -> tuple[float, Nest] | None:
+def _rounded(task: Task, found: _Optimum, around: Floats) -> Steps[tuple[float, Nest] | None]:
     """The best nest of whole steps around (D_outer, D_inner, H0), with its merit."""
     step, coil_step = task.limits.diameter_step, task.limits.coil_step
     near = np.array(list(product((-1, 0, 1, 2), repeat=3))).T
     *D, H0 = (np.floor(around / step + 1e-6)[:, None] + near) * step
     rounded = Dimensions(np.repeat(found.dimensions.d, len(H0), axis=1), np.stack(D), H0)
-    exact = evaluate(task, rounded).n
+    exact = (yield rounded, None).n
     x = Dimensions(*(np.repeat(value, 4, axis=-1) for value in vars(rounded).values()))
     up = np.tile([[0, 0, 1, 1], [0, 1, 0, 1]], len(H0))
     n = (np.floor(np.repeat(exact, 4, axis=1) / coil_step) + up) * coil_step
-    result = evaluate(task, x, n)
+    result = yield x, n
     error = np.max(np.abs(result.deflection_error), axis=0)
     fits = result.feasible & (error <= task.limits.height_error_max)
     # a third of a percent of the aim is worth less than a millimetre of ride height
