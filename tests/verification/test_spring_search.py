@@ -134,7 +134,7 @@ def test_coils_are_rounded_both_ways(monkeypatch):
     changes = ["search.candidates=256", "search.results=1", f"search.wire_diameters={WIRES}"]
     suspension = load_spring("turasas_axlebox", changes)
     search(suspension)
-    rounded = [k for k, (_, n, _) in enumerate(asked) if n is not None and len(n[0]) == 256]
+    rounded = [k for k, (_, n, _) in enumerate(asked) if n is not None and not len(n[0]) % 256]
     assert rounded
     for k in rounded:
         exact = np.array(asked[k - 1][2]) / suspension.search.coil_step
