@@ -5,7 +5,7 @@ functions beside it.  Arrays that come from a file are read when they are first 
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -450,7 +450,7 @@ class FrozenArrays(Mapping[str, Floats]):
     """Read-only arrays by name."""
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:
-        self._loaded = {name: frozen(array) for name, array in arrays.items()}
+        self._loaded: MutableMapping[str, Floats] = {n: frozen(a) for n, a in arrays.items()}
 
     def __getitem__(self, name: str) -> Floats:
         return self._loaded[name]

@@ -3,17 +3,19 @@
 A file is checked against its seal before HDF5 sees it (`railsim.result.integrity`), and against its
 digest where the seal is missing.  Then every link, type, shape and attribute is looked at before
 anything is read: a file from somebody else cannot point to another file, and takes no more memory
-than it has bytes on the disk.  Arrays are read when they are first asked for.
+than it has bytes on the disk.  Arrays are read when they are asked for.
 """
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
+from weakref import WeakValueDictionary
 
 import h5py
 import numpy as np
@@ -52,6 +54,7 @@ MOST_MEMBERS = 1000
 FILTERS = {h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 DEFLATE_RATIO = 100  # what compression may save at most, over the whole file
 SPARE_BYTES = 64_000_000  # and what may be saved beyond, for constant quantities
+MOST_HELD = 256_000_000  # of arrays that were read, beside those in use
 AS_WRITTEN = "a result as railsim wrote it"
 
 
@@ -116,8 +119,30 @@ def check_result(path: str | Path) -> Result:
     return result
 
 
+class _Recent:
+    """Arrays that were read last, of all results: many results do not fill the memory.
+
+    `most`: How much is held on to [bytes].
+    """
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._arrays: deque[Floats] = deque()
+        self._bytes = 0
+
+    def add(self, array: Floats) -> None:
+        """Hold on to an array, and let go of the oldest ones."""
+        self._arrays.append(array)
+        self._bytes += array.nbytes
+        while self._bytes > self.most and len(self._arrays) > 1:
+            self._bytes -= self._arrays.popleft().nbytes
+
+
+_recent = _Recent(MOST_HELD)
+
+
 class StoredArrays(FrozenArrays):
-    """Arrays of a result file, each read when it is first asked for.
+    """Arrays of a result file, each read when it is asked for and not in memory still.
 
     `path`: The file; it is not kept open. `shapes`: Shapes of the arrays by their names. `stamp`:
     What tells the file from another of its name.
@@ -126,22 +151,25 @@ class StoredArrays(FrozenArrays):
     def __init__(
         self, path: Path, shapes: Mapping[str, tuple[int, ...]], stamp: tuple[int, ...]
     ) -> None:
-        super().__init__({})
+        self._loaded: MutableMapping[str, Floats] = WeakValueDictionary()
         self._path = path
         self._absolute = path.absolute()
         self._shapes = dict(shapes)
         self._stamp = stamp
 
     def __getitem__(self, name: str) -> Floats:
-        if name not in self._loaded:
+        array = self._loaded.get(name)
+        if array is None:
             if name not in self._shapes:
                 raise KeyError(name)
-            self._loaded[name] = self._read(name)
-        return self._loaded[name]
+            array = self._loaded[name] = self._read(name)
+            _recent.add(array)
+        return array
 
     def part(self, name: str, rows: slice) -> Floats:
         """Return some rows of an array; only these are read."""
-        return self._loaded[name][rows] if name in self._loaded else self._read(name, rows)
+        array = self._loaded.get(name)
+        return self._read(name, rows) if array is None else array[rows]
 
     def _read(self, name: str, rows: slice | tuple[()] = ()) -> Floats:
         with _readable(self._path, name), h5py.File(self._absolute, "r") as file:

@@ -1,6 +1,7 @@
 """The result file and the result in memory, as INTERFACE.md describes them."""
 
 import os
+import weakref
 
 import h5py
 import numpy as np
@@ -10,7 +11,7 @@ from example_result import BODIES, COORDINATES, PROFILES, WHEELSETS, arrays, exa
 
 from railsim.errors import InputError
 from railsim.notation import COMPONENTS, QUANTITIES, Quantity
-from railsim.result import Hdf5Sink, MemorySink, open_result, open_run
+from railsim.result import Hdf5Sink, MemorySink, open_result, open_run, reading
 from railsim.result.integrity import content_digest
 
 
@@ -115,6 +116,22 @@ def test_result_of_writing_is_the_one_that_is_read(tmp_path):
     assert dict(one.attributes) == dict(other.attributes)
     for name in one:
         np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_arrays_that_were_read_do_not_fill_the_memory(written, monkeypatch):
+    """The last ones are held; what was let go is read again, and the same."""
+    held = arrays()["Q"].nbytes + arrays()["Y"].nbytes
+    monkeypatch.setattr(reading, "_recent", reading._Recent(held))
+    result = open_result(written)
+    Q, Y = (weakref.ref(result[name]) for name in ("Q", "Y"))
+    assert result["Q"] is Q()
+    assert result["Y_over_Q"].shape == arrays()["Y"].shape
+    assert Q() is None
+    assert result["Y"] is Y()
+    np.testing.assert_array_equal(result["Q"], arrays()["Q"])
+    mine = result["body_position"]
+    assert Y() is None
+    assert result["body_position"] is mine
 
 
 def test_profiles_keep_names_that_are_paths(tmp_path):
