@@ -176,6 +176,9 @@ class StoredArrays(FrozenArrays):
             _refuse_another(self._path, file, self._stamp)
             return frozen(file[name][rows])
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._shapes  # nothing is read
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._shapes)
 

@@ -134,6 +134,14 @@ def test_arrays_that_were_read_do_not_fill_the_memory(written, monkeypatch):
     assert result["body_position"] is mine
 
 
+def test_whether_a_result_has_a_quantity_is_known_without_reading_it(written, monkeypatch):
+    monkeypatch.setattr(reading.StoredArrays, "_read", None)
+    result = open_result(written)
+    assert "Q" in result
+    assert "nothing" not in result
+    assert set(result) >= {"Q", "Y"}
+
+
 def test_profiles_keep_names_that_are_paths(tmp_path):
     with Hdf5Sink(tmp_path / "run.h5") as sink:
         sink.begin(COORDINATES, [QUANTITIES["time"]])
