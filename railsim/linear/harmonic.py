@@ -45,14 +45,18 @@ class ContactPath:
         amplitude.
         """
         found = tangent.copy()
+        vehicle.rate(vehicle.x)
+        goals = vehicle.work.rail_force[:, [2, 3]].copy()
         for body in vehicle.system.contact.body:
             y, z, roll = (vehicle.coordinates.position_of[int(body), k] for k in (Y, Z, ROLL))
-            force, height, angle = self._harmonics(vehicle, int(body))
+            force, height, angle = self._harmonics(vehicle, int(body), goals[body])
             found[:, y] = force - tangent[:, z] * height - tangent[:, roll] * angle
         return found
 
-    def _harmonics(self, vehicle: FreeVehicle, body: int) -> tuple[Floats, float, float]:
-        """H of the derivative, of z and of roll."""
+    def _harmonics(
+        self, vehicle: FreeVehicle, body: int, goal: Floats
+    ) -> tuple[Floats, float, float]:
+        """H of the derivative, of z and of roll; `goal`: force and moment that the rails give."""
         total = np.zeros(len(vehicle.x))
         moved = np.zeros(2)
         for side in (1.0, -1.0):
@@ -64,47 +68,43 @@ class ContactPath:
                 # from the middle outwards: far from its path a wheelset stands on one rail
                 guess = self._known.get((body, y), pose * (y / before if before else 0.0))
                 try:
-                    x, pose = self._on_path(vehicle, body, y, guess)
+                    rate, pose = self._on_path(vehicle, body, y, guess, goal)
                 except ModelError as error:
                     words = f"found {1e3 * self.amplitude:g} mm, but {error}"
                     raise argument_error("amplitude", words, "a smaller amplitude") from None
                 self._known[body, y] = pose
                 before = y
                 share = 4.0 * side * sine / (ANGLES * self.amplitude)
-                total += share * vehicle.rate(x)
+                total += share * rate
                 moved += share * pose
         return total, float(moved[0]), float(moved[1])
 
     def _on_path(
-        self, vehicle: FreeVehicle, body: int, y: float, pose: Floats
+        self, vehicle: FreeVehicle, body: int, y: float, pose: Floats, goal: Floats
     ) -> tuple[Floats, Floats]:
-        """Coordinates with a wheelset moved by y along its path, and its dz and droll."""
+        """Derivative with a wheelset moved by y along its path, and its dz and droll."""
         indices = [vehicle.coordinates.position_of[body, k] for k in (Y, Z, ROLL)]
         base = vehicle.x
-        vehicle.rate(base)
-        goal = vehicle.work.rail_force[body, [2, 3]].copy()
 
-        def rest(pose: Floats) -> Floats:
+        def tried(pose: Floats) -> tuple[Floats, Floats]:
             x = base.copy()
             x[indices] += (y, *pose)
-            vehicle.rate(x)
-            return np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
+            rate = vehicle.rate(x)
+            return rate, np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
 
         before = np.inf
         for _ in range(MOST_ITERATIONS):
-            value = rest(pose)
+            rate, value = tried(pose)
             size = np.max(np.abs(value))
             if size < BALANCED:
                 break
             if (body, y) not in self._slopes or size > SLOW * before:
-                ends = [rest(pose + STEP * unit) - rest(pose - STEP * unit) for unit in np.eye(2)]
-                self._slopes[body, y] = np.transpose(ends) / (2.0 * STEP)
+                ends = [[tried(pose + d * STEP * e)[1] for d in (1.0, -1.0)] for e in np.eye(2)]
+                self._slopes[body, y] = np.transpose([a - b for a, b in ends]) / (2.0 * STEP)
             try:
                 pose, before = pose - np.linalg.solve(self._slopes[body, y], value), size
             except np.linalg.LinAlgError:  # a wheelset off its rails has no slopes
                 raise ModelError("no contact path") from None
         else:
             raise ModelError("no contact path")
-        x = base.copy()
-        x[indices] += (y, *pose)
-        return x, pose
+        return rate, pose
