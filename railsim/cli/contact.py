@@ -26,6 +26,7 @@ FIELD_SIZE = 1.2
 
 RANGES = {
     "gauge": (0.3, 2.5, "m"),
+    "gauges": (0.3, 2.5, "m"),
     "inclination": (0.0, 0.2, "(1:40 is 0.025)"),
     "back_to_back": (0.2, 2.4, "m"),
     "radius": (0.05, 1.5, "m"),
@@ -94,7 +95,8 @@ def command(
     if len(profiles) > 2:
         raise click.UsageError("give a wheel and a rail; --wheel and --rail twice for both sides")
     wheel, rail = profiles[:1] or wheel, profiles[1:] or rail
-    _check({"wheel": wheel, "rail": rail, "radius": radii}, numbers)
+    by_side = {"wheel": wheel, "rail": rail, "radius": radii}
+    _check(by_side, numbers, gauges or ())
     if creep and not 0.0 < friction <= 1.0:
         raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
     if gauges and len(gauges) == 1:
@@ -126,16 +128,18 @@ def command(
     output.answer(described.data, described.parts)
 
 
-def _check(by_side: Mapping[str, Sequence[Any]], numbers: Mapping[str, Any]) -> None:
+def _check(
+    by_side: Mapping[str, Sequence[Any]], numbers: Mapping[str, Any], gauges: Sequence[float]
+) -> None:
     """Refuse more values than there are sides, and numbers that mean nothing, all at once."""
     Faults(
         Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for each side")
         for name, values in by_side.items()
         if len(values) > 2
     ).check()
-    faults = Faults()
+    faults, further = Faults(), {**by_side, "gauges": gauges}
     for name, (low, high, unit) in RANGES.items():
-        for value in by_side.get(name) or [numbers[name]]:
+        for value in further[name] if name in further else [numbers[name]]:
             if not low <= value <= high:
                 option, allowed = name.replace("_", "-"), f"{low:g} to {high:g} {unit}"
                 faults.append(Fault(f"--{option}", "", f"found {value:g}", allowed))
@@ -232,7 +236,7 @@ def _build_creep_table(workers: int, output: cli.Output) -> None:
     from railsim.contact.creep_table import build_nodes, gather_nodes, shipped_nodes, write_nodes
 
     folder = output.folder or Path("creep_table")
-    check_folder(folder)
+    check_folder(folder, [CREEP_TABLE], overwrite=output.overwrite)
     with output.progress("creep table") as show:
         for done, count in build_nodes(folder, workers):
             show(done / count)

@@ -56,6 +56,7 @@ def command(
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """
     workers = how.pop("workers")
+    output.reserve(*FILES)
     inputs, ranges = given.inputs(), _ranges(conicity, friction, over)
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))
     if how["excitations"] is None:
@@ -64,7 +65,6 @@ def command(
         _point(inputs, given, dict(zip(ranges, values, strict=True)))
         for values in product(*ranges.values())
     ]
-    output.reserve(*FILES)
     if len(points) > 1:
         _map(points, ranges, how, workers, output)
         return

@@ -8,7 +8,6 @@ import click
 
 from railsim.cli import common as cli
 from railsim.errors import input_error
-from railsim.files.access import make_folder
 
 FILES = ("identified.toml", "identified.json", "report.html", "fits.png", "residuals.png")
 KEPT = "evaluations"
@@ -51,8 +50,6 @@ def command(
     from railsim.identification import identify
 
     folder, quiet = output.reserve(*FILES), output.quiet or output.as_json
-    if folder:
-        make_folder(folder)
     keys = [key.strip() for text in parameters for key in text.split(",") if key.strip()]
 
     def progress(count: int) -> None:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 REPORT, OPTIMISED = "report.html", "optimised.toml"
 
+Wanted = tuple[str, str, float]  # words of --at: name of a result, its value
+
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
@@ -61,15 +63,18 @@ def command(
     from railsim.processes import available_cores
 
     mechanisms = [load_mechanism(file, assignments) for file in files]
-    output.reserve()
+    output.reserve(REPORT, *[OPTIMISED] * searched)
+    wanted = _wanted(at)
     optimum, results, at_values, cases = None, [], [], {}
     for file, mechanism in zip(files, mechanisms, strict=True):
         with cli.faults_in(file, "mechanism", mechanism.name):
             if searched:
                 chosen, cores = mechanism.in_case(case), available_cores()
+                for _, name, _ in wanted:  # before the search
+                    analyse(chosen).result(name)
                 optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
-            at_values.append(_values_at(results[-1], at))
+            at_values.append(_values_at(results[-1], wanted))
             if len(results) == 1 and mechanism.cases and case is None and not searched:
                 cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
@@ -104,11 +109,11 @@ def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
         raise InputError(named) from None
 
 
-def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
-    """Results where one of them has a value, by the words of --at."""
+def _wanted(at: Sequence[str]) -> list[Wanted]:
+    """Words of --at, with the name of the result and its value."""
     from railsim.errors import input_error
 
-    found = []
+    found = list[Wanted]()
     for assignment in at:
         name, equals, written = assignment.partition("=")
         try:
@@ -117,8 +122,17 @@ def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
             equals = ""
         if not equals:
             raise input_error("--at", f"'{assignment}'", "NAME=VALUE, in SI units")
-        found += [{"where": assignment, **one} for one in result.everywhere(name.strip(), value)]
+        found.append((assignment, name.strip(), value))
     return found
+
+
+def _values_at(result: "Analysis", wanted: Sequence[Wanted]) -> list[dict[str, Any]]:
+    """Results where one of them has a value."""
+    return [
+        {"where": words, **one}
+        for words, name, value in wanted
+        for one in result.everywhere(name, value)
+    ]
 
 
 def _data(

@@ -2,6 +2,7 @@
 
 import math
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -114,9 +115,15 @@ def _over(given: cli.Given, over: str, speed: float, how: dict[str, Any]) -> "Ro
     key, _, text = over.partition("=")
     contact = Contact(*(how.pop(name) for name in ("linearisation", "amplitude", "conicity")))
 
+    @cache
+    def inputs(value: float) -> cli.Inputs:
+        return given.inputs([f"{key}={value!r}"])
+
     def prepared(value: float) -> LinearVehicle:
-        coach, rails, settings = given.inputs([f"{key}={value!r}"])
+        coach, rails, settings = inputs(value)
         return LinearVehicle(coach, rails, contact=contact, settings=smooth_law(settings), **how)
 
     values = cli.values_of(text, "--over")
+    for value in values:  # all are looked at before the first is computed
+        inputs(value)
     return parameter_locus(prepared, key, values, speed, unit_of_input(given.inputs(), key))

@@ -117,6 +117,13 @@ class Analysis:
         """All results at the first position where one of them has a value; see `everywhere`."""
         return self.everywhere(quantity, value)[0]
 
+    def result(self, quantity: str) -> Floats:
+        """Return a result of `output` by its name; raises InputError: there is none."""
+        if quantity not in self.output:
+            found = f"no result '{quantity}'"
+            raise argument_error("at", found, nearest(quantity, self.output), key=quantity)
+        return self.output[quantity]
+
     def everywhere(self, quantity: str, value: float) -> list[dict[str, float]]:
         """All results at every position, from start to end, where one of them has a value.
 
@@ -127,10 +134,7 @@ class Analysis:
         InputError
             There is no such result, or it never has this value.
         """
-        if quantity not in self.output:
-            found = f"no result '{quantity}'"
-            raise argument_error("at", found, nearest(quantity, self.output), key=quantity)
-        known = self.output[quantity]
+        known = self.result(quantity)
         low, high = np.nanmin(known), np.nanmax(known)
         level = (known[1:] == value) & (known[:-1] == value)
         s = zeros(self.motion, lambda motion: outputs(motion)[quantity] - value)

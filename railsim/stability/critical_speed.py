@@ -107,9 +107,10 @@ def critical_speed(
         There is no equilibrium, or no stable step.
     """
     methods = [methods] if isinstance(methods, str) else methods
-    low, high = _checked(methods, (low, high), points, excitations)
+    contact = Contact(linearisation, amplitude, conicity)
+    low, high = checked(contact, methods, low, high, points, excitations)
     settings, track = settings or Settings(), track or load_track("straight")
-    contact, law = Contact(linearisation, amplitude, conicity), smooth_law(settings)
+    law = smooth_law(settings)
 
     def prepared(settings: Settings, contact: Contact, track: Track = track) -> LinearVehicle:
         return LinearVehicle(vehicle, track, contact=contact, settings=settings, profiles=profiles)
@@ -158,33 +159,37 @@ def critical_speed(
     return found
 
 
-def _checked(
+def checked(
+    contact: Contact,
     methods: Sequence[str],
-    speeds: tuple[float | str, float | str],
+    low: float | str,
+    high: float | str,
     points: int,
-    excitations: Sequence[float],
+    excitations: Sequence[float] = EXCITATIONS,
 ) -> tuple[float, float]:
     """Return lowest and highest speed [m/s]; raise InputError with all faults of the arguments."""
-    low, high = map(speed_in_si, speeds)
+    slowest, fastest = map(speed_in_si, (low, high))
     faults = Faults()
     unknown = next((method for method in methods if method not in METHODS), None)
     faults.require(
         unknown is None, "methods", f"found '{unknown}'", " or ".join(METHODS), "--method"
     )
     least, most = SPEED_RANGE
-    for name, option, value in (("low", "--from", low), ("high", "--to", high)):
+    for name, option, value in (("low", "--from", slowest), ("high", "--to", fastest)):
         inside = isinstance(value, Real) and least <= float(value) <= most
         faults.require(inside, name, f"found {value!r}", f"{least:g} to {most:g} m/s", option)
     if not faults:
-        words = f"less than the highest, {high:g} m/s"
-        faults.require(low < high, "low", f"found {low:g} m/s", words, "--from")
+        words = f"less than the highest, {fastest:g} m/s"
+        slower = slowest < fastest
+        faults.require(slower, "low", f"found {slowest:g} m/s", words, "--from")
     faults.require(2 <= points <= 200, "points", f"found {points}", "2 to 200")
     wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
     words = f"found {wrong[0]:g} m" if wrong else "no size"
     allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(excitations) and not wrong
     faults.require(fine, "excitations", words, allowed, "--excitation")
+    faults += contact.faults()
     faults.check()
-    return float(low), float(high)
+    return float(slowest), float(fastest)
 
 
 # linear -------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import InputError, RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import WorkerPool, available_cores
-from railsim.stability.critical_speed import critical_speed
+from railsim.stability.critical_speed import checked, critical_speed
 from railsim.studies.records import Record, read_record, write_record
 from railsim.table import Column, Table
 from railsim.version import __version__
@@ -51,8 +51,9 @@ def stability_map(
     `options`: further arguments of `critical_speed`; `folder`: folder for finished points, if any;
     `workers`: processes; None: one for each core; `overwrite`: compute everything again;
     `progress`: called repeatedly with the finished fraction; `on_remark`: called with a sentence on
-    every stored point that is damaged and computed again.
+    every stored point that is damaged and computed again. Raises InputError: an option is wrong.
     """
+    _check(points, **options)
     paths = [_stored_path(folder, point, options) for point in points]
     found: dict[int, Record] = {}
     for number, path in enumerate(paths):
@@ -71,6 +72,20 @@ def stability_map(
             write_record(path, record)
         progress(len(found) / len(points))
     return [found[number] for number in range(len(points))]
+
+
+def _check(
+    points: Sequence[MapPoint],
+    /,
+    linearisation: str,
+    amplitude: float,
+    *,
+    over_amplitude: bool,
+    **options: Any,
+) -> None:
+    """Look at the arguments of all points before the first is computed."""
+    for conicity in dict.fromkeys(point.at.get("conicity") for point in points):
+        checked(Contact(linearisation, amplitude, conicity), **options)
 
 
 def _computed(

@@ -31,6 +31,7 @@ from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
+from railsim.simulation.conditions import SPEED_RANGE
 from railsim.studies.records import read_record, write_record
 from railsim.version import __version__
 
@@ -295,7 +296,11 @@ def _wheels(vehicle: Vehicle) -> set[str]:
 def _check(wearing: Wearing, how: Loop) -> None:
     faults = Faults()
     faults += [Fault("wear", "routes", "no route", "at least one")] * (not wearing.runs)
+    low, high = SPEED_RANGE
     for run in wearing.runs:
+        if not low <= run.speed <= high:
+            found = f"found {run.speed:g} m/s for {run.track.name}"
+            faults.append(Fault("wear", "speed", found, f"{low:g} to {high:g} m/s"))
         if not (run.share > 0.0 and math.isfinite(run.share)):
             found = f"found {run.share:g} for {run.track.name}"
             faults.append(Fault("wear", "share", found, "above 0"))

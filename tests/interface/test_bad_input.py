@@ -125,6 +125,11 @@ SETTINGS = [
 ]
 
 
+MAP = "coach_manchester --conicity 0.1,0.2"
+MASSES = "coach_manchester --over vehicle.bodies.carbody.mass=3e4,-1"
+RUN = "coach_25t coach_25t_run"
+
+
 def check(tmp_path, capsys, monkeypatch, texts, wrong, key, words):
     """Run files of `texts` and expect one fault of file `wrong` about `key`."""
     monkeypatch.chdir(tmp_path)
@@ -272,3 +277,26 @@ def test_files_without_an_option_are_not_called_by_one(given, words, tmp_path, m
         example_result().to_hdf5(name)
     assert main(given) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("work", "given", "words"),
+    [
+        (
+            "studies.stability_map._computed",
+            f"critical-speed {MAP} --points 0",
+            "--points: found 0",
+        ),
+        ("studies.stability_map._computed", f"critical-speed {MAP},9", "--conicity: found 9"),
+        ("linear.modes.parameter_locus", f"modes {MASSES}", "--over: bodies.carbody.mass: -1"),
+        ("identification.fit.Problem", f"identify {RUN} -p x", "--parameters: x: no value 'x'"),
+        ("contact.summary.contact_summary", "contact --gauges 1.4,9", "--gauges: found 9; 0.3 to"),
+    ],
+)
+def test_what_is_wrong_is_said_before_long_work(work, given, words, tmp_path, monkeypatch, capsys):
+    """And nothing is left behind."""
+    monkeypatch.setattr(f"railsim.{work}", None)
+    monkeypatch.chdir(tmp_path)
+    assert main([*given.split(), "--out", "out"]) == 2
+    assert words in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())

@@ -254,6 +254,13 @@ def test_creep_refuses_a_friction_that_means_nothing(capsys):
         assert "--friction" in capsys.readouterr().err
 
 
+def test_creep_table_that_is_there_is_told_before_half_an_hour(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("railsim.contact.creep_table.build_nodes", None)
+    (tmp_path / "creep_table.npz").touch()
+    assert cli.main(["contact", "--build-creep-table", "--out", str(tmp_path)]) == 2
+    assert "holds creep_table.npz; give --overwrite" in capsys.readouterr().err
+
+
 def test_creep_table_is_built_from_the_rows_that_are_there(tmp_path, capsys):
     from railsim.contact.creep_table import shipped_nodes
 

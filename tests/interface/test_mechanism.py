@@ -339,6 +339,22 @@ def test_bad_options_are_told(capsys, options, words):
     assert words in " ".join(refused(capsys, "atr95_lift_5", *options))
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--at", "hight=0.5"], "--at: hight: no result 'hight'; did you mean 'height'"),
+        (["--at", "height"], "--at: 'height'; NAME=VALUE"),
+        ([], "--out: . holds optimised.toml; give --overwrite"),
+    ],
+)
+def test_bad_options_are_told_before_the_search(capsys, monkeypatch, tmp_path, options, words):
+    monkeypatch.setattr("railsim.mechanisms.optimisation.optimise", None)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "optimised.toml").touch()
+    out = [] if options else ["--out", "."]
+    assert words in " ".join(refused(capsys, "atr95_lift_4", "--optimise", *options, *out))
+
+
 def test_crank_that_cannot_turn_round_is_told_where(write, capsys):
     # Grashof: 0.9 + 1.3 > 1.0 + 0.8, no crank turns; lost where coupler and rocker stretch
     file = four_bar(write, crank=0.9, coupler=1.3, rocker=0.8, start=1.0, end=6.0)
