@@ -164,7 +164,7 @@ def checked(
     methods: Sequence[str],
     low: float | str,
     high: float | str,
-    points: int,
+    points: int = 16,
     excitations: Sequence[float] = EXCITATIONS,
 ) -> tuple[float, float]:
     """Return lowest and highest speed [m/s]; raise InputError with all faults of the arguments."""

@@ -239,7 +239,7 @@ def curving(
     both = track.friction_at(0.0)
     radii, deficiencies = _several(radius), _several(cant_deficiency)
     mus = _several(friction) if friction is not None else [float(np.mean(both))]
-    _check(radii, cant, deficiencies, mus)
+    check_grid(radii, cant, deficiencies, mus)
     search = _Search(vehicle, track, cant, settings or Settings(), profiles)
     if friction is None and mus[0] > 0.0:
         search.shares = both / mus[0]
@@ -260,9 +260,10 @@ def _several(values: float | Sequence[float]) -> list[float]:
     return [float(value) for value in np.atleast_1d(values)]
 
 
-def _check(
+def check_grid(
     radius: Sequence[float], cant: float, deficiency: Sequence[float], friction: Sequence[float]
 ) -> None:
+    """Raise InputError with all faults of the values of a grid."""
     faults = Faults()
     least = f"{SMALLEST_RADIUS:g} m at least, negative to the left"
     for value in radius:

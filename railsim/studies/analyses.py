@@ -16,7 +16,7 @@ from railsim.definitions.study.analyses import (
     ModesAnalysis,
     RunAnalysis,
 )
-from railsim.errors import ModelError
+from railsim.errors import Fault, Faults, ModelError
 from railsim.result import Result
 from railsim.studies.case import Case
 
@@ -46,6 +46,38 @@ def numbers_of(analysis: Analysis) -> tuple[str, ...]:
     if isinstance(analysis, CriticalSpeedAnalysis):
         return ("linear", "frequency", *analysis.methods)
     return ("damping", "frequency") if isinstance(analysis, ModesAnalysis) else ()
+
+
+def check_analyses(analyses: Mapping[str, Analysis]) -> None:
+    """Raise InputError: what is out of range in analyses, as it would be at every point."""
+    faults = Faults()
+    for name, analysis in analyses.items():
+        own = Faults()
+        with own.caught():
+            _check(analysis)
+        faults += [
+            Fault("study", f"analyses.{name}.{one.file}", one.found, one.allowed, "--analyses")
+            for one in own
+            if getattr(analysis, one.file) is not None  # else that of the point
+        ]
+    faults.check()
+
+
+def _check(analysis: Analysis) -> None:
+    if isinstance(analysis, CurvingAnalysis):
+        from railsim.stability.curving import check_grid
+
+        check_grid([analysis.radius], analysis.cant, [analysis.cant_deficiency or 0.0], ())
+    elif isinstance(analysis, ModesAnalysis | CriticalSpeedAnalysis):
+        from railsim.linear.vehicle import Contact
+
+        contact = Contact(**_contact(analysis))
+        if isinstance(analysis, ModesAnalysis):
+            contact.faults().check()
+        else:
+            from railsim.stability.critical_speed import checked
+
+            checked(contact, analysis.methods, analysis.low, analysis.high)
 
 
 def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Outcome:

@@ -171,6 +171,8 @@ def optimise(
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
     replaced = {name: value for name, value in changes.items() if value is not None}
     wanted = checked(Optimise, definition.optimise.model_dump() | replaced, "optimise")
+    if choose is not None and not 1 <= choose <= wanted.evaluations:
+        raise argument_error("choose", f"design {choose}", f"1 to {wanted.evaluations}")
     runs = wanted.evaluations * definition.runs
     check_number(runs, workers or available_cores(), lambda: ROUGH_DURATION)
     with nullcontext() if isinstance(file, Study) else faults_of_file(str(file)):
@@ -181,6 +183,7 @@ def optimise(
         overwrite=overwrite,
         progress=progress,
         on_remark=on_remark,
+        beside=("optimise.json", "designs.csv", "front.png"),
     )
     folder = Path(out)
     check_folder(folder)

@@ -30,7 +30,7 @@ from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
 from railsim.result.extremes import BY_SIGN, PEAK_QUANTITIES
 from railsim.result.facts import FACTS
-from railsim.studies.analyses import numbers_of
+from railsim.studies.analyses import check_analyses, numbers_of
 from railsim.studies.case import Case, Loader, Overrides, run_labels, run_name
 from railsim.studies.rows import PERMITTED, Row, made_rows
 from railsim.studies.spec import RunSpec, StudySpec
@@ -71,6 +71,7 @@ class Plan:
     def __init__(self, spec: StudySpec, workers: int = 1) -> None:
         if not (spec.vehicles and spec.tracks and spec.speeds and all(spec.grid.values())):
             raise input_error("study", "no combination", "give a vehicle, a track, a speed")
+        check_analyses(spec.analyses)
         self._spec = spec
         self._loader = Loader({*spec.grid, *(k for t in spec.linked for k in t)}, spec.analyses)
         self._fingerprints = Fingerprints()
@@ -293,7 +294,7 @@ def faults_of_file(file: str, *, assignments: bool = True) -> Iterator[None]:
 
     `assignments`: all of them are the file's.
     """
-    names = [*OF_FILE, "optimise", *(["set"] if assignments else [])]
+    names = [*OF_FILE, "optimise", "analyses", *(["set"] if assignments else [])]
     options = {f"--{name}" for name in names}
     try:
         yield

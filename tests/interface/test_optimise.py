@@ -39,6 +39,7 @@ high = 0.9
 """
 VEHICLE = 'format = "railsim-vehicle/1"\nname = "mine"\nextends = "coach_manchester"\n'
 X = "vehicle.primary.stiffness.x"
+HUNTING = '[analyses.hunting]\nkind = "critical_speed"\n'
 DAMPER = "vehicle.secondary_vertical_damper.damping"
 
 
@@ -151,6 +152,11 @@ def test_another_file_is_refused(found, capsys):
             "'vehicle.carbody.mass' is varied twice",
         ),
         ("primary.stiffness.x", "primary.stiffness.q", "study.toml: vehicle.primary"),
+        ("radius = 300.0", "radius = 3.0", "study.toml: analyses.curve.radius: found 3 m; 20 m"),
+        ("0.15", "0.15\ncant_deficiency = 90.0", "analyses.curve.cant_deficiency: found 90 m"),
+        ("[opt", f"{HUNTING}conicity = 9.0\n[opt", "analyses.hunting.conicity: found 9.0; 0.005"),
+        ("[opt", f"{HUNTING}low = 130.0\n[opt", "analyses.hunting.low: found 130 m/s; less than"),
+        ("[opt", f"{HUNTING}amplitude = 1e-3\n[opt", "analyses.hunting.amplitude: found 0.001 m;"),
         (
             'low = 5e6, high = 40e6, scale = "log"',
             "low = -5e6, high = 1e6",
@@ -198,6 +204,18 @@ def test_columns_of_a_run_with_a_number_are_quantities(tmp_path, capsys, quantit
     file = written(tmp_path, text.replace("curve.Y_over_Q", "Y_over_Q_peak"))
     assert main(["validate", file]) == (0 if there else 2)
     assert (f"no run has '{quantity}'" in capsys.readouterr().err) is not there
+
+
+def test_what_comes_last_is_looked_at_first(tmp_path, capsys, monkeypatch):
+    """The number of a design; files that the pictures and tables would replace."""
+    command = ["optimise", written(tmp_path), "--workers", "1", "--out", str(tmp_path / "o")]
+    monkeypatch.setattr("railsim.studies.carry_out.State", None)
+    assert main([*command, "--choose", "7"]) == 2
+    assert "--choose: design 7; 1 to 6" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+    (tmp_path / "o" / "front.png").mkdir(parents=True)
+    assert main(command) == 2
+    assert "front.png: is not of a study; choose another --out" in capsys.readouterr().err
 
 
 def test_labels_that_no_run_has_are_found_before_any(tmp_path, capsys):
