@@ -8,6 +8,7 @@ import hashlib
 import inspect
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -104,4 +105,10 @@ def _loaded(name: str, _: str) -> Function:
     loaded: Function | None = getattr(module, function, None)
     if not callable(loaded):
         raise argument_error(PARAMETER, f"no function '{function}'", ALLOWED, key=file)
+    try:
+        with suppress(ValueError):  # of one that is not written in Python
+            inspect.signature(loaded).bind(None)
+    except TypeError as error:
+        found = f"'{function}' cannot be called with one argument ({error})"
+        raise argument_error(PARAMETER, found, "a function of a result", key=file) from None
     return loaded

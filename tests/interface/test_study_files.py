@@ -339,6 +339,15 @@ def test_own_quantities_that_go_wrong_fail_their_run_only(tmp_path, simulated, c
     assert "no function 'other'" in capsys.readouterr().err
 
 
+def test_function_of_something_else_is_refused_before_any_run(tmp_path, simulated, capsys):
+    file = tmp_path / "own.py"
+    file.write_text("def mine(result, limit):\n    return {'x': limit}\n")
+    assert main(arguments(tmp_path / "s", 10, more=["--quantities", f"{file}:mine"])) == 2
+    assert "'mine' cannot be called with one argument (missing" in capsys.readouterr().err
+    assert simulated == []
+    assert not (tmp_path / "s").exists()
+
+
 def test_definitions_in_python_are_written_and_run(tmp_path, simulated):
     vehicle = load_vehicle(COACH)
     soft = vehicle.replace(name="Soft coach")
