@@ -172,6 +172,9 @@ def assess_track(
     check_folder(folder)
     track = recorded(recording)
     tested = {short_name(name): load_vehicle(name) for name in vehicles}
+    if len(tested) < len(vehicles):
+        found = f"found {', '.join(map(short_name, vehicles))}"
+        raise argument_error("vehicles", found, "each vehicle once; files of different names")
     for speed in speeds:
         check_range(track, speed, 0.0, None, None)
     missing = [n for n, v in tested.items() if v.service is None]

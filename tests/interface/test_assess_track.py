@@ -182,6 +182,18 @@ def test_wrong_input(recording, tmp_path, capsys):
     assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
 
 
+def test_vehicles_of_one_name_are_told_before_any_run(recording, tmp_path, capsys, monkeypatch):
+    """One would stand for the other."""
+    monkeypatch.setattr(module, "carry_out_cases", None)
+    (tmp_path / "coach_25t.toml").write_text(
+        'format = "railsim-vehicle/1"\nname = "mine"\nextends = "coach_25t"\n'
+    )
+    both = ["--vehicles", "coach_25t", str(tmp_path / "coach_25t.toml"), "--speeds", "20"]
+    assert main(["assess-track", str(recording), *both, "--out", str(tmp_path / "o")]) == 2
+    assert "--vehicles: found coach_25t, coach_25t; each vehicle once" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
 @pytest.mark.parametrize(
     "changes",
     [
