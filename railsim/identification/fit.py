@@ -97,7 +97,7 @@ def identify(
     ModelError
         A variant without equilibrium.
     """
-    _checked(band, form, loss)
+    _checked(band, form, loss, workers)
     files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
     places = [Path(one).resolve() for one in files if not isinstance(one, Measurement)]
     for twice in {one.name for one in places if places.count(one) > 1}:
@@ -126,11 +126,13 @@ def identify(
         return _solved(problem, loss)
 
 
-def _checked(band: tuple[float, float], form: str, loss: str) -> None:
+def _checked(band: tuple[float, float], form: str, loss: str, workers: int | None) -> None:
     faults = Faults()
     words = f"{band[0]:g} to {band[1]:g} Hz"
     rising = 0.0 < band[0] < band[1] < np.inf
     faults.require(rising, "band", words, "two frequencies above 0 that rise")
+    whole = workers is None or workers >= 1
+    faults.require(whole, "workers", f"found {workers}", "a whole number above 0")
     for name, value, allowed in (("form", form, FORMS), ("loss", loss, LOSSES)):
         faults.require(value in allowed, name, value, "one of " + ", ".join(allowed))
     faults.check()

@@ -24,7 +24,7 @@ from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections, is_uniform
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Faults, ModelError, input_error, nearest
+from railsim.errors import Faults, ModelError, argument_error, input_error, nearest
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
@@ -122,6 +122,8 @@ def irregularity(
     """
     assumed = assumed or Assumed()
     assumed.check()
+    if simulations < 0:
+        raise argument_error("simulations", f"found {simulations}", "0 or more")
     known = all_sensors(vehicle)
     used = used_channels(measurement, known)
     remarks = list(measurement.remarks)

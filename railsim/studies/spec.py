@@ -159,7 +159,9 @@ class Execution:
     on_remark: Callable[[str], None] | None = None
 
     def __post_init__(self) -> None:
-        """Raise InputError: `workers` is no number of processes, or beside a scheduler's own."""
+        """Raise InputError: numbers of processes or of runs in one call that are none."""
+        if self.together < 1:
+            raise argument_error("together", f"found {self.together}", "a whole number above 0")
         if self.workers is not None and not (
             isinstance(self.workers, Integral) and self.workers > 0
         ):

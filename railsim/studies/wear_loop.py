@@ -181,7 +181,8 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
     """Run, subtract what has worn, and run again."""
     _check(wearing, how)
     law, settings = wear_law(how.law), how.settings or Settings()
-    outputs = settings.outputs.model_copy(update=dict.fromkeys(wearing.outputs, True))
+    needed = {**dict.fromkeys(wearing.outputs, True), "quantities": ()}  # all of the usual ones
+    outputs = settings.outputs.model_copy(update=needed)
     settings = settings.model_copy(update={"outputs": outputs})
     tell, remark = how.progress or (lambda _: None), how.on_remark or _LOG.warning
     profiles, whole = dict(wearing.new), how.steps * how.step

@@ -771,6 +771,12 @@ def test_workers_that_are_no_number_of_processes_are_refused(tmp_path, workers):
     assert not (tmp_path / "s").exists()
 
 
+def test_no_runs_in_one_call_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"together: found 0; a whole number above 0"):
+        railsim.study(COACH, CURVE, 20.0, out=tmp_path / "s", together=0)
+    assert not (tmp_path / "s").exists()
+
+
 def test_a_key_that_changes_nothing_is_told(tmp_path, capsys):
     """Friction beside a table of it; cells of FASTSIM do change something."""
     table = "track.friction_table=[[0.0, 0.4], [50.0, 0.1]]"

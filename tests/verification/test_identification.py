@@ -330,6 +330,7 @@ def test_tables_scale_their_forces_only():
         ([PRIMARY], {"band": (0.5, 1.0)}, "band: 0.5 to 1 Hz: 3 frequencies, 0.154 Hz apart"),
         ([PRIMARY], {"band": (0.5, 2.0), "form": "spectra"}, "in a third-octave band at least"),
         ([PRIMARY], {"form": "shapes"}, "history, spectra, sections"),
+        ([PRIMARY], {"workers": -3}, "workers: found -3; a whole number above 0"),
         ([PRIMARY + ":2:3"], {}, "factors below and above 1"),
         ([PRIMARY, f"elements.{PRIMARY}"], {}, "z is given twice; each value once"),
         (["primary.stiffness", PRIMARY], {}, "z is given twice"),
@@ -340,7 +341,7 @@ def test_tables_scale_their_forces_only():
 )
 def test_bad_input_is_one_line(found, keys, how, words):
     with pytest.raises(railsim.InputError) as caught:
-        railsim.identify(quarter(), found[1], keys, workers=1, **how)
+        railsim.identify(quarter(), found[1], keys, **{"workers": 1} | how)
     assert len(caught.value.faults) == 1
     assert words in str(caught.value)
 

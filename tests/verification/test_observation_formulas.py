@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from railsim.definitions.loading import load_track
+from railsim.definitions.loading import load_track, load_vehicle
 from railsim.errors import InputError
 from railsim.linear.track_response import QUANTITIES
+from railsim.measurement import load_measurement
+from railsim.observation import irregularity
 from railsim.observation.contact import Noise, _smoothed
 from railsim.observation.estimate import BANDS, Estimate, estimate_of, joined
 from railsim.observation.innovations import Powers, Sizes, disagreeing, level_of, spectra_of
@@ -300,3 +302,9 @@ def test_a_recording_beyond_100_km_is_read_as_it_was_written(tmp_path):
     y_left, z_left, y_right, z_right = displacement(track)(far.s[inner])[0]
     read = 0.5 * (y_left + y_right), 0.5 * (z_left + z_right), z_right - z_left, y_right - y_left
     np.testing.assert_allclose(read, far.values[:, inner], atol=1e-7)
+
+
+def test_fewer_simulations_than_none_are_refused():
+    run, coach = load_measurement("coach_25t_run"), load_vehicle("coach_25t")
+    with pytest.raises(InputError, match="simulations: found -1; 0 or more"):
+        irregularity(run, coach, load_track("straight"), simulations=-1)

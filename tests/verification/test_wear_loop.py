@@ -8,6 +8,8 @@ import pytest
 import railsim
 from railsim.assessment.wear_depth import SPACING, deepest, spread
 from railsim.contact import contact_geometry
+from railsim.definitions import Settings
+from railsim.errors import ModelError
 from railsim.profiles import load_profile
 from railsim.studies import wear_loop
 
@@ -44,6 +46,22 @@ def worn(monkeypatch):
         return wear_loop.wear_loop(COACH, routes, step=STEP, **how), runs
 
     return carried_out
+
+
+def test_quantities_of_the_settings_leave_the_loop_what_it_needs(monkeypatch):
+    """Else its first run lacks them."""
+    seen = []
+
+    def simulate(*_given, settings, **_how):
+        seen.append(settings.outputs)
+        raise ModelError("here")
+
+    monkeypatch.setattr(wear_loop, "simulate", simulate)
+    own = Settings(outputs={"quantities": ["Q"]})
+    with pytest.raises(ModelError, match="here"):
+        wear_loop.wear_loop(COACH, [(CURVE, 20.0, 1.0)], step=STEP, steps=1, settings=own)
+    assert seen[0].quantities == ()
+    assert seen[0].contact_patches
 
 
 @pytest.mark.parametrize("parts", [1, 3])
