@@ -12,6 +12,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.geometry import ContactGeometry, geometry_of
+from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.bogies import bogie_name
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, InputError
@@ -22,6 +23,10 @@ from railsim.track.alignment import Alignment
 
 FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
 WIDE_ENOUGH = 40.0  # Hz, low pass of a run: twice the corner of the filters of EN 14363 and UIC 518
+ENOUGH = (
+    f"at least {FINE_ENOUGH:g} samples per second (settings.output_rate=1000), or values low-pass "
+    f"filtered by the run at {WIDE_ENOUGH:g} Hz or more (settings.outputs.low_pass)"
+)
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
 AMPLITUDE = 3e-3  # m, of the equivalent conicity
@@ -51,6 +56,21 @@ class _Readings:
         return _Readings(begin, self.speed[own], self.acceleration[own], self.roll[own])
 
 
+def coarseness(settings: Settings, rate: float) -> tuple[str, str]:
+    """Return how values of a run are too coarse, and what that loses; empty where they are not.
+
+    `rate`: Of its output [1/s].
+    """
+    low_pass = settings.outputs.low_pass
+    if low_pass is not None and low_pass.frequency < WIDE_ENOUGH:
+        lost = "what the filters of the standards pass above is missing"
+        return f"low-pass filtered at {low_pass.frequency:g} Hz by the run", lost
+    if low_pass is None and rate < FINE_ENOUGH * (1.0 - 1e-3):
+        lost = "components above half this rate may be aliased into the result"
+        return f"{rate:.4g} samples per second", f"too few for instantaneous values, {lost}"
+    return "", ""
+
+
 class Record:
     """A result as a measured record.
 
@@ -71,22 +91,9 @@ class Record:
         if float(np.max(np.abs(steps[:-1] - step))) > 1e-3 * step:
             allowed = "a run with settings.output_rate, not output_spacing"
             raise self.fault("time", "unequal time steps", allowed)
-        low_pass, self.coarse, self._loss = result.settings().outputs.low_pass, "", ""
-        if low_pass is not None and low_pass.frequency < WIDE_ENOUGH:
-            self.coarse = f"low-pass filtered at {low_pass.frequency:g} Hz by the run"
-            self._loss = "what the filters of the standards pass above is missing"
-        elif low_pass is None and self.rate < FINE_ENOUGH * (1.0 - 1e-3):
-            self.coarse = f"{self.rate:.4g} samples per second"
-            self._loss = (
-                "too few for instantaneous values, components above half this rate may be aliased "
-                "into the result"
-            )
+        self.coarse, self._loss = coarseness(result.settings(), self.rate)
         if self.coarse and not coarse:
-            allowed = (
-                f"at least {FINE_ENOUGH:g} samples per second (settings.output_rate=1000), or "
-                f"values low-pass filtered by the run at {WIDE_ENOUGH:g} Hz or more "
-                "(settings.outputs.low_pass); `coarse` assesses it nevertheless"
-            )
+            allowed = f"{ENOUGH}; `coarse` assesses it nevertheless"
             raise self.fault("time", self.coarse, allowed)
         self._last: _Readings | None = None
 

@@ -303,6 +303,24 @@ def test_small_campaign_ends_in_its_assessment_and_is_not_done_twice(tmp_path, c
     assert again.computed == 0
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ('settings.outputs.quantities=["Q"]', "outputs.quantities: without Y, wheelset_distance;"),
+        ("settings.outputs={}", "outputs: 200 samples per second; at least 1000"),
+    ],
+)
+def test_outputs_that_cannot_be_assessed_are_refused_before_any_run(
+    tmp_path, capsys, monkeypatch, change, words
+):
+    monkeypatch.setattr("railsim.studies.campaign.carry_out_cases", None)
+    (tmp_path / "small.toml").write_text(SMALL)
+    given = ["study", "--scenario", str(tmp_path / "small.toml"), "--vehicles", "coach_manchester"]
+    assert main([*given, "--out", str(tmp_path / "out"), "--set", change]) == 2
+    assert f"settings: {words}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_wrong_campaigns_are_refused(tmp_path, capsys):
     bare = tmp_path / "bare.toml"
     bare.write_text(
