@@ -34,7 +34,7 @@ from railsim.notation import SIDES
 from railsim.result import Result, open_result
 from railsim.result.hunting import HUNTS
 from railsim.result.sensors import sensors
-from railsim.simulation.conditions import check_range
+from railsim.simulation.conditions import SPEED_RANGE
 from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, short_name
 from railsim.studies.geometry_limits import CELL, SECTION, RecordedGeometry
@@ -175,8 +175,9 @@ def assess_track(
     if len(tested) < len(vehicles):
         found = f"found {', '.join(map(short_name, vehicles))}"
         raise argument_error("vehicles", found, "each vehicle once; files of different names")
-    for speed in speeds:
-        check_range(track, speed, 0.0, None, None)
+    low, high = SPEED_RANGE
+    if wrong := [speed for speed in speeds if not low <= speed <= high]:
+        raise argument_error("speeds", f"found {wrong[0]:g} m/s", f"{low:g} to {high:g} m/s")
     missing = [n for n, v in tested.items() if v.service is None]
     if missing:
         allowed = "add [service] with admissible_speed and cant_deficiency"

@@ -182,6 +182,12 @@ def test_wrong_input(recording, tmp_path, capsys):
     assert recorded(recording).length == pytest.approx(LENGTH - 0.25)
 
 
+def test_speed_out_of_range_is_told_at_its_option(recording, tmp_path, capsys):
+    given = ["--vehicles", "coach_25t", "--speeds", "20", "900", "--out", str(tmp_path / "o")]
+    assert main(["assess-track", str(recording), *given]) == 2
+    assert "--speeds: found 900 m/s; 0.5 to 150 m/s" in capsys.readouterr().err
+
+
 def test_vehicles_of_one_name_are_told_before_any_run(recording, tmp_path, capsys, monkeypatch):
     """One would stand for the other."""
     monkeypatch.setattr(module, "carry_out_cases", None)
