@@ -114,8 +114,8 @@ def _ranges(
         key, equals, values = text.partition("=")
         if not equals:
             raise input_error("--over", f"found '{text}'", "KEY.PATH=first:last:number")
-        if key in found:
-            raise input_error("--over", "given twice", "each key once", key=key)
+        if key in found or (key.startswith("track.friction") and "friction" in found):
+            raise input_error("--over", "given twice", "each key once, or by its option", key=key)
         found[key] = cli.values_of(values, "--over")
     several = [name for name, values in found.items() if len(values) > 1]
     if len(several) > 2:

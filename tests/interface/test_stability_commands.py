@@ -298,6 +298,17 @@ def test_curving_over_a_grid(capsys, tmp_path):
                 "critical-speed",
                 "coach_manchester",
                 "--friction",
+                "0.1",
+                "--over",
+                "track.friction=0.2,0.3",
+            ],
+            "--over: track.friction: given twice; each key once, or by its option",
+        ),
+        (
+            [
+                "critical-speed",
+                "coach_manchester",
+                "--friction",
                 "0.2,0.3",
                 "--conicity",
                 "0.1,0.2",
