@@ -106,7 +106,9 @@ def in_the_mean(
     hidden = np.setdiff1d(np.arange(len(A)), places)
     forcing = A[np.ix_(hidden, places)] @ x[places] + driven[hidden]
     own = 1j * tangent.speed * k[:, None, None] * np.eye(len(hidden)) - A[np.ix_(hidden, hidden)]
-    x[hidden] = np.linalg.solve(own, forcing.T[:, :, None])[:, :, 0].T
+    x[hidden, 1:] = np.linalg.solve(own[1:], forcing.T[1:, :, None])[:, :, 0].T
+    # at rest, elements that keep their state have no equation
+    x[hidden, 0] = np.linalg.lstsq(own[0], forcing[:, 0], rcond=None)[0]
     inner = slice(int(TAPER / STEP), -int(TAPER / STEP))
     power = np.zeros((len(COMPONENTS), len(k)))
     common = np.zeros((len(COMPONENTS), len(k)), dtype=complex)
