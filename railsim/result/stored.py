@@ -18,27 +18,36 @@ LOST, LEAST = 0.05, 1e3  # share of a peak, and force [N], that are worth a rema
 
 
 class StoredPeaks(SinkBefore):
-    """Hands everything on, and remembers the largest magnitudes.
+    """Hands everything on, and remembers the largest magnitudes of what tables of peaks list.
 
+    `evaluation`: When the part of the run begins that is evaluated [s]; until then all counts.
     `largest`: Largest magnitudes of the quantities in `LOOKED_AT` so far [SI]. `remark`: Returns
-    at the end what there is to remark on, or nothing.
+    at the end what there is to remark on, or nothing, from whether that part has begun.
     """
 
-    def __init__(self, sink: Sink) -> None:
+    def __init__(self, sink: Sink, evaluation: float) -> None:
         super().__init__(sink)
+        self._evaluation, self._evaluates = evaluation, False
         self.largest: dict[str, float] = {}
-        self.remark: Callable[[], str] = str
+        self.remark: Callable[[bool], str] = lambda _: ""
 
     def append(self, chunk: Mapping[str, Floats]) -> None:
         """See `Sink.append`."""
+        time, first = chunk["time"], 0
+        if len(time) and time[-1] > self._evaluation:
+            first = int(np.searchsorted(time, self._evaluation - 1e-9))
+            if not self._evaluates:
+                self.largest.clear()
+            self._evaluates = True
         for name in LOOKED_AT:
-            if name in chunk and len(chunk[name]):
-                most = float(np.abs(chunk[name]).max())
+            if name in chunk and len(time):
+                most = float(np.abs(chunk[name][first:]).max())
                 self.largest[name] = max(self.largest.get(name, 0.0), most)
         self._sink.append(chunk)
 
     def _ended(self, attributes: Attributes) -> Attributes:
-        remarks = "\n".join(filter(None, [str(attributes.get("remarks", "")), self.remark()]))
+        remark = self.remark(self._evaluates)
+        remarks = "\n".join(filter(None, [str(attributes.get("remarks", "")), remark]))
         return {**attributes, "remarks": remarks}
 
 
@@ -48,8 +57,8 @@ def lost_peak(
     """Sentence on the peak of which most is lost in what is stored; empty where none loses much.
 
     `stored`: Largest magnitudes in what is stored. `of_steps`: Largest and smallest values over
-    all steps. `outputs`: How often is stored, in words. `filtered`: Whether what is stored is
-    filtered; then its peaks are those that tables list.
+    all steps, both of the part that is evaluated. `outputs`: How often is stored, in words.
+    `filtered`: Whether what is stored is filtered; then its peaks are those that tables list.
 
     Examples
     --------

@@ -152,7 +152,7 @@ def begin(
     for remark in prepared.remarks:
         _START.warning(remark)
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
-    stored = StoredPeaks(sink)
+    stored = StoredPeaks(sink, prepared.evaluation)
     sink = filtering(stored, settings)
     sink.begin(plan.coordinates, plan.quantities)
     run = Run(
@@ -164,10 +164,11 @@ def begin(
         wall_time=time.perf_counter() - began,
     )
     # which holds neither the sink nor the run: a circle would keep the tables in memory
-    largest, extremes, Q0 = stored.largest, run.extremes, prepared.balance.Q0
-    stored.remark = lambda: lost_peak(
+    largest, Q0 = stored.largest, prepared.balance.Q0
+    of_part = run.extremes, run.evaluated
+    stored.remark = lambda evaluates: lost_peak(
         largest,
-        run_extremes(extremes, Q0),
+        run_extremes(of_part[evaluates], Q0),
         output_words(settings),
         filtered=settings.outputs.low_pass is not None,
     )

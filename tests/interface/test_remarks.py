@@ -3,6 +3,7 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 import xarray
 from example_result import COORDINATES, PROFILES, arrays, attributes
@@ -101,3 +102,23 @@ def test_what_outputs_and_filters_cost_a_peak_is_said(assignment, words):
     if found:
         name = found[0].split("the largest ")[1].split()[0].rstrip(":")
         assert f"{1e-3 * abs(result[name]).max():.2f} kN in" in found[0]
+
+
+@pytest.mark.parametrize("second", [0.0, 0.003])
+def test_lost_peak_is_one_that_tables_list(second):
+    """They leave out the start, with the larger of two dips."""
+    dips = [{"type": "dip", "s": 8.0, "length": 1.0, "depth": 0.004}]
+    dips += [{**dips[0], "s": 34.0, "depth": second}] if second else []
+    result = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"),
+        railsim.load_track("straight").replace(irregularities=dips),
+        speed=20.0, duration=1.9,
+        settings=railsim.load_settings(None, ["output_rate=20", "outputs.evaluate_after=1.2"]),
+    )  # fmt: skip
+    found = [text for text in result.remarks if text.startswith("Between two outputs")]
+    assert len(found) == (second > 0.0)
+    if found:
+        (listed,) = railsim.peaks(result, ["Q"])
+        stored = np.abs(result["Q"][result["time"] > 1.2 - 1e-9]).max()
+        assert f"{1e-3 * listed.value:.2f} kN over all steps" in found[0]
+        assert f"{1e-3 * stored:.2f} kN in the stored" in found[0]
