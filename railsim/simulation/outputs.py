@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions.settings import Settings
+from railsim.definitions.settings import Outputs, Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, InputError, nearest
@@ -204,6 +204,15 @@ class Chunk(Mapping[str, Floats]):
 READINGS = ("sensor_acceleration", "sensor_roll_rate")
 
 
+def requested(outputs: Outputs, track: Track) -> list[Quantity]:
+    """Quantities beyond the usual ones of a run; `element_command` is there of actuators alone."""
+    asked = {**dict(outputs), "check_rail": track.check_rail}
+    found = [q for q in REQUESTED.values() if asked[q.request]]
+    if outputs.sensors == "readings":
+        found = [q for q in found if q.request != "sensors" or q.name in READINGS]
+    return found
+
+
 class OutputPlan:
     """What a run outputs: which elements, patches and track quantities beyond the usual ones.
 
@@ -257,17 +266,9 @@ class OutputPlan:
         return tuple(q for q in every if q.name in asked or q.name not in QUANTITIES)
 
     def _known(self) -> tuple[Quantity, ...]:
-        asked = {
-            **dict(self._asked),
-            "elements": self.elements,
-            "sensors": self._sensors,
-            "check_rail": self._track_file.check_rail,
-        }
-        more = [q for q in REQUESTED.values() if asked[q.request]]
+        more = requested(self._asked, self._track_file)
         if not set(self.elements) & set(self._model.index.actuators):
             more = [q for q in more if q.name != "element_command"]
-        if self._readings_only:
-            more = [q for q in more if q.request != "sensors" or q.name in READINGS]
         return (*QUANTITIES.values(), *more)
 
     @property

@@ -22,6 +22,7 @@ from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import Storage
 from railsim.result.sinks import matches
+from railsim.simulation.outputs import requested
 from railsim.studies import execute
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Journal, Records
@@ -278,13 +279,11 @@ class State:
 
     def _lacks(self, case: Case, result: Result, known: Record) -> bool:
         """Whether a file lacks quantities to be kept, or those of a summary that is not known."""
-        recorded = case.settings.outputs.quantities or ("*",)
+        outputs = case.settings.outputs
+        recorded = {n for n in QUANTITIES if matches(n, outputs.quantities or ("*",))}
+        recorded |= {q.name for q in requested(outputs, case.track)} - {"element_command"}
         wanted = [*kept_quantities(self._spec.keep), *(() if known else OF_FACTS)]
-        return any(
-            name not in result
-            for name in QUANTITIES
-            if all(matches(name, some) for some in (recorded, wanted))
-        )
+        return any(name not in result for name in recorded if matches(name, wanted))
 
     def settle(self, journal: Journal) -> list[str]:
         """Record existing results, rename damaged files; return remarks for the user."""

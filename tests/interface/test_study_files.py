@@ -122,6 +122,20 @@ def test_reduced_results_do_not_count_as_whole_ones(tmp_path, simulated):
     assert remarks == [f"{words}: {COACH}_{CURVE}_20"]
 
 
+def test_requested_quantities_that_were_not_kept_have_the_run_computed_again(tmp_path):
+    asked = ["settings.outputs.contact_patches=true", 'settings.outputs.sensors="readings"']
+    how = {"out": tmp_path, "workers": 1, "duration": 0.05, "assignments": asked, "resume": True}
+    sensors = {"sensor_acceleration", "sensor_roll_rate"}
+    for keep, computed, more in (
+        ("Q", 1, {"Q"}), ("Q,patch_N", 1, {"Q", "patch_N"}), ("Q", 0, {"Q", "patch_N"}),
+        ("patch_N,sensor_*", 1, {"patch_N", *sensors}), ("sensor_*", 0, {"patch_N", *sensors}),
+    ):  # fmt: skip
+        outcome = railsim.study([COACH], [CURVE], [20.0], keep=keep, **how)
+        assert outcome.computed == computed
+        (result,) = outcome.results().values()
+        assert set(result) == {"time", "distance", "Q0", *more}
+
+
 def test_kept_quantities_are_those_of_the_whole_result(tmp_path):
     """With the name and key of the run, its state and what it started from."""
     for folder, keep in (("whole", "all"), ("part", "Q,body_*")):
