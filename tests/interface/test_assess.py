@@ -595,3 +595,16 @@ def test_comfort_is_drawn_over_the_speed_with_classes_and_a_legend_beside():
     figure.draw_without_rendering()
     legend = figure.legends[0].get_window_extent()
     assert all(legend.x0 >= axes.get_window_extent().x1 for axes in figure.axes)  # hides nothing
+
+
+def test_transitions_count_while_a_place_is_on_them():
+    """At 20 m/s, clothoids of 80 m from 120 m and 300 m on: each place has its own times."""
+    on = track(*curve(500.0, 100.0))
+    run = made(on, 20.0, lateral=lambda t: 0.0 * t)
+    (assessment,) = assess(run, "comfort")
+    (points,) = assessment.comfort.values()
+    assert len({point.place for point in points}) == 3
+    for point in points:
+        times = [(one.begin, one.end) for one in point.transitions]
+        ends = np.array([(120.0, 200.0), (300.0, 380.0)])
+        np.testing.assert_allclose(times, (ends - point.place) / 20.0, atol=1e-9)

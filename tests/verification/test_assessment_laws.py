@@ -358,6 +358,39 @@ def test_a_linear_ramp_has_its_own_slope_as_jerk():
     assert transition_comfort(t, ramp, roll_rate, 8.0, 19.0) is None
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_windows_of_a_transition_are_those_of_en_12299(sign):
+    """P_CT counts 1 s means from its begin to 1.6 s after its end, jerks from 1 s before.
+
+    The mean over 1 s of a square about t is t^2 + 1/12, its change within 1 s is 2 t + 1; the
+    zero-phase filter lets polynomials pass.
+    """
+    t, begin, end = np.arange(0.0, 40.0, 0.01), 15.0, 21.0
+    grows, fades = sign * 0.01 * t**2, sign * 0.01 * (40.0 - t) ** 2
+    found = transition_comfort(t, grows, sign * 0.002 * t, begin, end)
+    assert found.acceleration == pytest.approx(0.01 * (22.6**2 + 1.0 / 12.0), rel=2e-4)
+    assert found.jerk == pytest.approx(0.01 * (2.0 * 21.6 + 1.0), rel=1e-3)
+    assert found.roll_rate == pytest.approx(np.degrees(0.002 * 21.0), rel=2e-3)
+    found = transition_comfort(t, fades, sign * 0.002 * (40.0 - t), begin, end)
+    assert found.acceleration == pytest.approx(0.01 * (25.0**2 + 1.0 / 12.0), rel=1e-3)
+    assert found.jerk == pytest.approx(0.01 * (2.0 * 25.0 + 1.0), rel=1e-3)
+    assert found.roll_rate == pytest.approx(np.degrees(0.002 * 25.0), rel=2e-3)
+    for first, last in ((1.9, 21.0), (15.0, 37.95)):  # 2 s before and 2.1 s behind are needed
+        assert transition_comfort(t, grows, grows, first, last) is None
+    assert transition_comfort(t, grows, grows, 2.05, 37.85) is not None
+
+
+def test_transition_is_felt_below_two_hertz():
+    """A tone of 2.5 Hz: Butterworth of order 4, then sin(2.5 pi)/(2.5 pi) of a mean over 1 s."""
+    t = np.arange(0.0, 40.0, 0.005)
+    tone = np.sin(2.0 * np.pi * 2.5 * t)
+    found = transition_comfort(t, tone, tone, 15.0, 21.0)
+    mean = 1.0 / np.sqrt(1.0 + 1.25**8) / (2.5 * np.pi)
+    assert found.acceleration == pytest.approx(mean, rel=5e-3)
+    assert found.jerk == pytest.approx(2.0 * mean, rel=5e-3)  # half a period apart
+    assert found.roll_rate == pytest.approx(np.degrees(mean), rel=5e-3)
+
+
 def test_event_of_a_slow_swing():
     """0.2 Hz, amplitude 1: within 2 s at most 1.18 peak to peak with a mean of 0, and so on."""
     found = event_comfort(sine(0.2, 60.0), RATE)
