@@ -12,6 +12,7 @@ import railsim
 from railsim.assessment import Assessment, assess
 from railsim.assessment.comfort import MeanComfort, event_comfort
 from railsim.assessment.comfort_report import PointComfort
+from railsim.assessment.safety import flange_angle
 from railsim.assessment.tables import tables
 from railsim.cli import main
 from railsim.cli.assess import FILES
@@ -20,6 +21,7 @@ from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
 from railsim.plot.assessment import assessment_figure
+from railsim.profiles import load_profile
 from railsim.result import Result
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
@@ -608,3 +610,36 @@ def test_transitions_count_while_a_place_is_on_them():
         times = [(one.begin, one.end) for one in point.transitions]
         ends = np.array([(120.0, 200.0), (300.0, 380.0)])
         np.testing.assert_allclose(times, (ends - point.place) / 20.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_climb_of_a_wheel_is_that_above_its_rail_with_its_friction(side):
+    """The wheelset rises by 1 mm and rolls by 2 mrad, its rail sinks by 0.5 mm."""
+    friction = 0.3, 0.5
+    on = track({"type": "STR", "length": 300.0}).replace(friction=friction)
+    out = (-1.0, 1.0)[side]
+
+    def climbing(time, at):
+        force = np.zeros((*at.shape, 2))
+        there = (at[:, 0] > 150.0) & (at[:, 0] < 160.0)
+        force[there, 0, side] = out * 1.5 * Q0
+        return force
+
+    profiles = {name: load_profile(name) for name in ("S1002", "60E1")}
+    run = made(on, 20.0, Y=climbing, profiles=profiles)
+    share = np.clip((run["wheelset_distance"][:, 0] - 150.0) / 10.0, 0.0, 1.0)
+    arrays = {name: np.array(run[name]) for name in run}
+    body = run.bodies.index(run.wheelsets[0])
+    arrays["body_position"][:, body, 2] = -1e-3 * share
+    arrays["body_position"][:, body, 3] = -out * 2e-3 * share
+    arrays["rail_vertical"] = np.zeros(run["Q"].shape)
+    arrays["rail_vertical"][:, 0, side] = 0.5e-3 * share
+    quantities = {**run.quantities, "rail_vertical": REQUESTED["rail_vertical"]}
+    found = Result(arrays, quantities, run.coordinates, run.attributes, run.profiles)
+    (report,) = assess(found, "safety")[0].safety.values()
+    wheel = report.wheels[side]
+    assert wheel.climb_distance == pytest.approx(10.0, abs=0.2)
+    slope = math.tan(flange_angle(profiles["S1002"]))
+    nadal = (slope - friction[side]) / (1.0 + friction[side] * slope)
+    assert wheel.limit == pytest.approx(nadal)
+    assert wheel.rise == pytest.approx((1.0 + 2.0 * on.rail_base / 2.0 + 0.5) * 1e-3, rel=0.03)
