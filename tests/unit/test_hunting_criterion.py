@@ -127,3 +127,42 @@ def test_waves_of_one_length_are_followed():
     swinging = record(6e-3 * wave(times(30.0)))
     assert hunting(swinging, waves) is None
     assert hunting(swinging, random).wheelsets == (0, 1, 2, 3)
+
+
+@pytest.mark.parametrize(("amplitude", "ratio", "hunts"), [
+    (0.09e-3, 1.0, False), (0.11e-3, 1.0, True), (6e-3, 0.86, False), (6e-3, 0.94, True),
+])  # fmt: skip
+def test_a_limit_cycle_has_a_tenth_of_a_millimetre_and_keeps_nine_tenths(amplitude, ratio, hunts):
+    """Of 30 cycles of 0.2 s the second half is 3 s behind the first."""
+    time = times(30.0)
+    found = hunting(record(amplitude * wave(time) * ratio ** (time / 3.0)))
+    assert (found is not None) == hunts
+
+
+@pytest.mark.parametrize(("rate", "hunts"), [(28.0, False), (34.0, True)])
+def test_a_cycle_of_fewer_than_six_instants_is_not_judged(rate, hunts):
+    found = hunting(record(6e-3 * wave(times(30.0, rate)), rate=rate))
+    assert (found is not None) == hunts
+
+
+def test_the_farthest_wheelset_gives_frequency_and_amplitude():
+    """What swings less than half as far does not hunt; 1 s before the end all is over."""
+    time = times(20.0)
+    swings = time < 19.0
+    waves = wave(time, 4.0), wave(time), 0.6 * wave(time), 0.4 * wave(time)
+    amplitudes = np.array([4e-3, 6e-3, 6e-3, 6e-3])
+    found = hunting(record(np.stack(waves, axis=-1) * amplitudes * swings[:, None]))
+    assert found.frequency == pytest.approx(5.0, rel=0.01)
+    assert found.amplitude == pytest.approx(6e-3, rel=0.03)
+    assert found.wheelsets == (0, 1, 2)
+    assert not found.lasts
+
+
+@pytest.mark.parametrize("right", [-1.0, 1.0])
+def test_waves_of_the_cross_level_are_followed_and_those_of_the_level_not(right):
+    def waves(s):
+        moved = 1e-3 * np.sin(2.0 * np.pi * s / (SPEED / FREQUENCY))
+        return np.stack([0.0 * s, moved, 0.0 * s, right * moved]), np.zeros((4, len(s)))
+
+    found = hunting(record(6e-3 * wave(times(30.0))), waves)
+    assert (found is None) == (right < 0.0)
