@@ -24,6 +24,7 @@ PEAK_QUANTITIES = (*FORCES, "wheelset_lateral", "wheelset_roll", "wheelset_yaw",
 LOW_PASS = 20.0  # low pass of forces in EN 14363 [Hz]
 
 LEAST_RATE = 2.5  # outputs per period of the low pass at least
+EDGE = 2.0  # periods of the low pass at either end of a record that depend on what is beyond
 LOADED = 0.05  # of the static load; below it the low pass's ringing decides on Y/Q
 DEVIATION = (15.87, 84.13)
 """Percentiles that are one standard deviation from the median of a normal distribution."""
@@ -110,9 +111,9 @@ def _extreme(array: Floats, kind: str) -> tuple[Any, ...]:
 def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats]) -> Floats | None:
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
-    Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
-    has lifted does not spoil the rest, where `LOADED` of the static load are left.  None where
-    there are gaps.
+    Butterworth of order 4; without the `EDGE` of the record, whose last value is unfiltered.  Y/Q
+    is the quotient of both after the low pass, so that a wheel that has lifted does not spoil the
+    rest, where `LOADED` of the static load are left.  None where there are gaps.
 
     `rate`: outputs per second; `known` keeps what has been filtered of this result, and is filled.
     """
@@ -133,7 +134,8 @@ def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats
         smooth = passed("Y")[..., 0] + passed("Y")[..., 1]
     else:
         smooth = passed(name)
-    return np.asarray(smooth[evaluated(result)])
+    edge = math.ceil(EDGE / LOW_PASS * rate)
+    return np.asarray(smooth[max(edge, evaluated(result).start) : -edge])
 
 
 def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...]:

@@ -78,6 +78,41 @@ def test_peaks_after_the_low_pass_of_20_hz():
     assert found["Y_over_Q"].smooth == pytest.approx(-0.1, rel=1e-6)  # left: outwards negative
 
 
+@pytest.mark.parametrize("part", [slice(5, None), slice(None, -14)])
+def test_low_pass_of_20_hz_is_none_at_the_ends_of_a_record(part):
+    """Where it begins or ends at a crest of 60 Hz its mirror image leaves 130 instead of 110 kN."""
+    whole = waves(1200.0)  # 20 instants a wave, crests from the sixth on
+    about = whole.quantities, whole.coordinates, whole.attributes
+    (found,) = peaks(Result({name: whole[name][part] for name in whole}, *about), ["Q"])
+    assert found.smooth == pytest.approx(1e5 + 1e4 + 3e4 / np.sqrt(1.0 + 3.0**8), rel=2e-3)
+
+
+def test_low_pass_of_20_hz_of_sums_and_changes_of_load():
+    """At 25 Hz 1/sqrt(1 + 1.25^8) is left; wheels of a wheelset have static loads of their own."""
+    time = np.arange(0.0, 20.0, 1e-3)
+    wave, left = np.sin(50.0 * np.pi * time), 1.0 / np.sqrt(1.0 + 1.25**8)
+    Q0 = np.array([[1e5, 6e4]])
+    Q = Q0 * (1.0 + np.array([0.1, 0.3]) * wave[:, None, None])
+    Y = np.array([[5e3, 2e3]]) * wave[:, None, None]
+    values = {
+        "time": time, "distance": 20.0 * time, "Q": Q, "Q0": Q0, "Y": Y, "dQ_over_Q0": Q / Q0 - 1.0,
+        "sum_Y": Y.sum(axis=-1), "sum_abs_Y": np.abs(Y).sum(axis=-1),
+    }  # fmt: skip
+    labels = {"wheelset": ["lead"], "side": ["left", "right"]}
+    facts = {**attributes(), "evaluation_start": 2.0}
+    result = Result(values, {name: QUANTITIES[name] for name in values}, labels, facts)
+    found = {(each.quantity.name, each.kind): each for each in peaks(result)}
+    assert abs(found["sum_Y", "abs"].smooth) == pytest.approx(left * 7e3, rel=2e-3)
+    assert found["dQ_over_Q0", "max"].smooth == pytest.approx(left * 0.3, rel=2e-3)
+    assert found["dQ_over_Q0", "min"].smooth == pytest.approx(-left * 0.3, rel=2e-3)
+    # |sin| is 2/pi and waves of 50 Hz and above
+    assert found["sum_abs_Y", "abs"].smooth == pytest.approx(2.0 / np.pi * 7e3, rel=0.02)
+    early = {name: x.copy() if name == "Q" else x for name, x in values.items()}
+    early["Q"][:500] *= 3.0  # before the part that is evaluated
+    (late,) = peaks(Result(early, result.quantities, labels, facts), ["Q"])
+    assert late.smooth == pytest.approx(1e5 * (1.0 + 0.1 * left), rel=2e-3)
+
+
 def test_a_lifted_wheel_has_no_quotient_of_the_ringing_of_the_low_pass():
     """Y is 0.4 Q and 3 kN at 15 Hz: at 5 % of 100 kN static load 1.0 at most, without load any."""
     result = waves(1000.0)
@@ -102,6 +137,10 @@ def test_no_low_pass_of_outputs_that_are_too_seldom(result):
     (found,) = (each for each in peaks(result, ["Q"]) if each.quantity.name == "Q")
     assert np.isnan(found.smooth)
     assert "low_pass_20_hz" not in found.record()
+
+
+def test_low_pass_needs_outputs_two_and_a_half_times_a_period():
+    assert [np.isnan(peaks(waves(rate), ["Q"])[0].smooth) for rate in (49.0, 51.0)] == [True, False]
 
 
 def test_full_curve_values_are_medians_with_their_scatter():
