@@ -1,14 +1,16 @@
 """Sensors of a vehicle: standard ones and those of its table, against the motion of the bodies."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import railsim
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.result.sensors import MOTIONS, Sensor, readings
+from railsim.result.sensors import MOTIONS, Sensor, all_sensors, readings
 from railsim.track.alignment import Alignment
 
 
@@ -155,6 +157,72 @@ def test_attitude_counts_from_the_track_frame_of_a_body_wherever_it_stands_in_it
     lean = alignment.cant_angle(s[ramp : ramp + 1] + 3.0)
     assert abs(lean) > 1e-3
     assert found[0, 0, 1] == pytest.approx(-9.81 * np.sin(lean).item(), rel=1e-9)
+
+
+@pytest.mark.parametrize("hand", [1.0, -1.0])
+def test_readings_are_those_of_a_point_of_a_turning_body(hand):
+    """In a curve, on a cant ramp and a vertical curve, the body leans and turns in its frame.
+
+    a - g + alpha x r + w x (w x r), with w of the frame from the change of its axes along the way.
+    """
+
+    def frame(s):
+        def turn(axis, angle):
+            c, d = np.cos(angle), np.sin(angle)
+            return np.array(
+                {
+                    0: [[1, 0, 0], [0, c, -d], [0, d, c]],
+                    1: [[c, 0, d], [0, 1, 0], [-d, 0, c]],
+                    2: [[c, -d, 0], [d, c, 0], [0, 0, 1]],
+                }[axis]
+            )
+
+        return (
+            turn(2, hand * s / 250.0) @ turn(1, 0.03 - 5e-4 * s) @ turn(0, hand * (0.1 + 2e-3 * s))
+        )
+
+    laws = {
+        "curvature": hand / 250.0, "cant_angle": hand * 0.1, "cant_angle_rate": hand * 2e-3,
+        "grade_angle": 0.03, "grade_angle_rate": -5e-4,
+    }  # fmt: skip
+    alignment = SimpleNamespace(**{n: lambda s, x=x: np.full_like(s, x) for n, x in laws.items()})
+    roll, pitch, yaw = angles = 0.02, 0.3, -0.1
+    own, turning = np.array([0.1, -0.2, 0.05]), np.array([0.3, 0.5, -0.7])
+    absolute, arm, speed = np.array([0.4, -0.6, 0.8]), np.array([2.0, 0.7, -1.1]), 40.0
+    values = {
+        "body_position": [0.0, 0.0, 0.0, *angles], "body_velocity": [0.0, 0.0, 0.0, *own],
+        "body_acceleration": [*absolute, *turning],
+    }  # fmt: skip
+    motion = {name: np.array(some).reshape(1, 1, 6) for name, some in values.items()}
+    motion["distance"] = np.zeros(1)
+    placed = {
+        "box": Sensor("b", 0.0, tuple(arm), axlebox=True),
+        "seat": Sensor("b", 0.0, tuple(arm)),
+    }
+    found, rates = readings(placed, motion, ("b",), alignment, np.array([speed]))
+    change = frame(0.0).T @ (frame(1e-3) - frame(-1e-3)) / 2e-3 * speed
+    of_frame = np.array([change[2, 1], change[0, 2], change[1, 0]])
+    for k, spins in enumerate((0.0, 1.0)):
+        body = Rotation.from_euler("ZXY", [yaw, roll, spins * pitch]).as_matrix()
+        pitches = np.array([1.0, spins, 1.0])
+        w, alpha = pitches * own + body.T @ of_frame, pitches * turning
+        g = body.T @ frame(0.0).T @ np.array([0.0, 0.0, 9.81])
+        expected = absolute - g + [0.0, 0.0, 9.81] + np.cross(alpha, arm)
+        expected += np.cross(w, np.cross(w, arm))
+        np.testing.assert_allclose(found[0, k], expected, atol=1e-5)
+        assert rates[0, k] == pytest.approx(w[0], abs=1e-7)
+
+
+def test_frames_are_felt_above_the_axles_and_axleboxes_a_metre_aside():
+    """The Manchester benchmark: bogies 9.5 m from the middle, axles 1.28 m from theirs."""
+    found = all_sensors(load_vehicle("coach_manchester"))
+    for number, x in enumerate((10.78, 8.22, -8.22, -10.78), start=1):
+        assert found[f"frame_{number}"].along == pytest.approx(x)
+        for side, y in (("left", -1.0), ("right", 1.0)):
+            box = found[f"axlebox_{number}_{side}"]
+            assert (box.along, *box.arm) == pytest.approx((x, 0.0, y, 0.0))
+    with_arms = all_sensors(load_vehicle("coach_25t"))
+    assert with_arms["axlebox_1_right"].arm == pytest.approx((0.0, 1.0, 0.0))
 
 
 def test_an_axlebox_does_not_spin():
