@@ -7,6 +7,7 @@ import railsim
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.result.hdf5 import Hdf5Sink
+from railsim.track.irregularity import displacement
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +107,45 @@ def test_file_of_some_quantities_can_be_read_again(tmp_path):
     found = railsim.open_result(tmp_path / "kept.h5")
     assert {"Q", "Y", "Q0"} <= set(found.quantities)
     assert {name.split("_")[0] for name in found.groups["peaks"]} == {"Q", "Y"}
+
+
+def test_peaks_over_all_steps_are_those_of_histories_of_all_steps():
+    """With an output at every step; into a transition; axles have loads of their own."""
+    vehicle = railsim.load_vehicle("coach_manchester", ["bodies.carbody.position=[0.4, 0, -1.8]"])
+    settings = Settings(step=1e-3, output_rate=1000.0, outputs={"evaluate_after": 0.1})
+    result = railsim.simulate(
+        vehicle, railsim.load_track("curve_r250"), speed=20.0, start=289.0, duration=0.3,
+        settings=settings,
+    )  # fmt: skip
+    assert np.ptp(result["Q0"]) > 1e3
+    peaks, rows = result.groups["peaks"], result["time"] > 0.1 - 1e-9
+    names = {name for name in peaks if name in result}
+    assert names == {
+        "Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y", "T_gamma", "wheelset_lateral",
+        "wheelset_roll", "wheelset_yaw",
+    }  # fmt: skip
+    for name in names:
+        values = result[name][rows]
+        ends = (values.max(axis=0), values.argmax(0)), (values.min(axis=0), values.argmin(0))
+        for row, (most, at) in enumerate(ends):
+            scale = np.abs(values).max()
+            np.testing.assert_allclose(peaks[name][row], most, atol=1e-6 * scale, err_msg=name)
+            for of in ("time", "distance"):
+                found = peaks[f"{name}_{of}"][row]
+                np.testing.assert_allclose(found, result[of][rows][at], atol=0.021, err_msg=name)
+
+
+def test_rails_are_displaced_each_as_the_track_says():
+    track = railsim.load_track(
+        "straight", ["irregularities=[{type='random', spectrum='erri_b176_low', seed=3}]"]
+    )
+    settings = Settings(outputs={"track": True}, output_rate=50.0)
+    vehicle = railsim.load_vehicle("coach_manchester")
+    result = railsim.simulate(vehicle, track, speed=20.0, start=50.0, duration=0.1,
+                              settings=settings)  # fmt: skip
+    y_left, z_left, y_right, z_right = displacement(track)(result["wheelset_distance"].ravel())[0]
+    shape = result["rail_vertical"].shape
+    for name, sides in (("rail_lateral", (y_left, y_right)), ("rail_vertical", (z_left, z_right))):
+        expected = np.stack(sides, axis=-1).reshape(shape)
+        assert np.ptp(expected, axis=-1).max() > 1e-5
+        np.testing.assert_allclose(result[name], expected, atol=1e-12)
