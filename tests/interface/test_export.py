@@ -99,6 +99,25 @@ def test_a_wheel_that_lifts_spoils_no_other_values_at_a_lower_rate(result):
     np.testing.assert_allclose(part.contact_y[there], whole.contact_y[there], atol=1e-3)
 
 
+def test_a_lower_rate_is_a_butterworth_at_two_fifths_of_it_up_to_the_end(result):
+    """At 18 Hz and 40 a second, corner 16 Hz, 1/sqrt(1 + (18/16)^8) is left of a tone."""
+    time = np.arange(0.0, 10.0 + 1e-9, 1.0 / 400.0)
+    tone, gap = np.sin(36.0 * np.pi * time), (time > 4.0) & (time < 6.0)
+    arrays = {
+        "time": time, "distance": 20.0 * time, "sum_Y": np.tile(tone[:, None], 4),
+        "contact_y": np.where(gap[:, None, None], np.nan, 0.75 * np.ones((len(time), 4, 2))),
+    }  # fmt: skip
+    about = {n: result.quantities[n] for n in arrays}, result.coordinates, result.attributes
+    part = selected(railsim.Result(arrays, *about), rate=40.0)
+    np.testing.assert_allclose(part.time, np.arange(401) / 40.0, atol=1e-9)
+    left = np.sin(36.0 * np.pi * part.time) / np.sqrt(1.0 + 1.125**8)
+    inner = slice(20, -20)
+    np.testing.assert_allclose(part.sum_Y[inner, 0], left[inner], atol=2e-3)
+    there = (part.time <= 4.0 + 1e-9) | (part.time >= 6.0 - 1e-9)
+    np.testing.assert_array_equal(np.isnan(part.contact_y[:, 0, 0]), ~there)
+    np.testing.assert_allclose(part.contact_y[there], 0.75, rtol=1e-6)
+
+
 def test_a_rate_of_more_values_than_a_file_should_hold_is_refused(result):
     with pytest.raises(InputError, match=r"instants; 1e\+07 at most"):
         selected(result, ["Q"], rate=1e9)

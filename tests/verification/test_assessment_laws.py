@@ -52,6 +52,7 @@ from railsim.result.filters import (
     band_passed,
     butterworth,
     distance_means,
+    even_step,
     filtered,
     low_passed,
     window_centres,
@@ -147,6 +148,15 @@ def test_means_over_distance_are_exact_for_straight_lines(steps, length):
     centres = window_centres(s[0], s[-1], length, 0.3)
     means = distance_means(s, 3.0 - 2.0 * s, centres, length)
     np.testing.assert_allclose(means, 3.0 - 2.0 * centres, rtol=1e-9, atol=1e-9)
+
+
+def test_windows_reach_the_end_of_a_section_and_steps_are_equal_up_to_the_last_one():
+    """0.4 m less 0.1 m is less than three windows in floating point numbers."""
+    np.testing.assert_allclose(window_centres(0.1, 0.4, 0.1, 0.1), [0.15, 0.25, 0.35])
+    time = np.array([0.0, 0.1, 0.2, 0.3])
+    assert even_step(np.append(time, 0.32)) == pytest.approx(0.1)
+    assert even_step(np.append(time, [0.4001, 0.5])) is None
+    assert even_step(time[:1]) is even_step(time[:0]) is None
 
 
 @given(st.integers(0, 2**31), st.floats(0.1, 1e4), st.sampled_from([0.15, 50.0, 95.0, 99.85]))
