@@ -197,3 +197,13 @@ def test_every_value_of_a_section_is_that_of_its_filtered_tones(turn, zone, spee
     for key, value in values.items():
         near = 1e-3 * scales[CRITERIA[key[0]].unit]
         assert value == pytest.approx(wanted[key], rel=1e-3, abs=near), key
+
+
+@pytest.mark.parametrize(("speed", "begin"), [(20.0, 60.0 + 10.78), (5.0, 2 * 10.78 + 10.78)])
+def test_a_record_covers_what_the_whole_vehicle_passed_after_the_start(speed, begin):
+    """Axles 10.78 m ahead and behind; after 3 s, and where the last one was the first had been.
+
+    The last instant, which may lie between two outputs, does not count.
+    """
+    record = Record(made(track({"type": "STR", "length": 200.0}), speed, **FINE), "run")
+    assert record.covered() == pytest.approx((begin, 200.0 - speed / RATE - 10.78))

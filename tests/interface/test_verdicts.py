@@ -413,3 +413,21 @@ def test_regression_over_cant_deficiency_and_curvature_of_all_curves():
     assert row.regression.value == pytest.approx(40e3, rel=1e-4)
     assert row.regression.coefficients[2] == pytest.approx(6e6, rel=1e-3)
     assert found.record()["regression"][0]["radius"] == 300.0
+
+
+def test_regression_takes_curves_of_both_hands_and_no_straight_track():
+    """Right-hand ones of zone 4 and left-hand ones, 20 kN + 6 kN m/R; 9 kN on the straight."""
+
+    def run(radius, cant):
+        def Y(t, s):
+            outer = np.where((s > 640.0) & (s < 1300.0), 20e3 + 6e6 / abs(radius), 9e3)
+            each = (-outer, 0.0 * s) if radius > 0.0 else (0.0 * s, outer)
+            return np.stack(each, axis=-1)
+
+        return made(track(*curve(radius, 500.0, run=600.0), cant=cant), 23.0, Y=Y)
+
+    radii = {"a": (290.0, 0.12), "b": (-300.0, -0.11), "c": (-290.0, -0.125)}
+    (found,) = assess({name: run(*one) for name, one in radii.items()}, all_sections=True)
+    rows = {(one.criterion.name, one.place): one.regression for one in found.influences}
+    for row in rows["Y_qst", "wheelset 1 outer"], rows["sum_Y", "wheelset 1"]:
+        assert row.value == pytest.approx(40e3, rel=1e-4)

@@ -224,6 +224,15 @@ def test_multiple_regression_finds_the_plane_and_its_scatter():
     assert multiple_regression(np.ones((9, 2)), y[:9], np.ones(2)) is None
 
 
+def test_scatter_of_a_regression_has_as_many_degrees_of_freedom_as_values_less_coefficients():
+    """y = 1 + 2 x1 - x2 and, orthogonal to it on the corners of a square, 0.3 x1 x2."""
+    x = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] * 2)
+    found = multiple_regression(x, 1.0 + x @ [2.0, -1.0] + 0.3 * x.prod(axis=1), np.zeros(2))
+    assert found.coefficients == pytest.approx((1.0, 2.0, -1.0))
+    assert found.error == pytest.approx(0.3 * np.sqrt(8.0 / (8 - 3)))
+    assert found.determination == pytest.approx(1.0 - 0.09 / (0.09 + 5.0))
+
+
 def test_steering_index_of_cones_is_proportional_to_the_curvature():
     """Cones 1:20: delta_r = 0.1 y; e r0/R = 0.69 m2/R: 3.45 mm at R 2000 m (Redtenbacher)."""
     wheel, rail = load_profile("cone_1in20"), load_profile("60E1")
