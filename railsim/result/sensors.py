@@ -81,8 +81,8 @@ def _placed(body: FlatBody, point: tuple[float, float, float], origin: float) ->
 def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     """Sensors of `sensors`, on the axleboxes, and those of the vehicle's table ``sensors``.
 
-    ``axlebox_1_left``, ... on each wheelset at the height of its axle, where elements of the
-    primary suspension are joined to it or its axleboxes, or 1 m from the middle.
+    ``axlebox_1_left``, ... on each wheelset at the height of its axle, as far from the middle as
+    bodies that it carries, such as axle arms, or 1 m.
     """
     flat = flatten(vehicle)
     bodies = {body.name: body for body in flat.bodies}

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from railsim.assessment import track_quality
 from railsim.assessment.comfort import (
     en12299_mean_comfort,
     event_comfort,
@@ -33,7 +34,7 @@ from railsim.assessment.safety import (
 )
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
-from railsim.assessment.track_quality import quality_class
+from railsim.assessment.track_quality import TrackQuality, quality_class
 from railsim.assessment.wear import (
     Patches,
     WholeLifeRailModel,
@@ -612,3 +613,27 @@ def test_track_quality_changes_at_the_values_of_uic_518(km_h, alignment, level):
             assert quality_class(km_h / 3.6, a, 0.0) == expected
             assert quality_class(km_h / 3.6, 0.0, z) == expected
             assert quality_class((km_h - 1.0) / 3.6, a, z) == expected
+
+
+@pytest.mark.parametrize("worse", [0, 1])
+def test_track_quality_is_that_of_the_worse_rail_between_3_and_25_m(worse, monkeypatch):
+    """Waves of 20 m across and of 4 m up and down; of one of 40 m 0.03 are left."""
+    sizes = np.array([[2.0, 3.0, 1.0, 1.5], [1.0, 1.5, 2.0, 3.0]])[worse] * 1e-3
+    lengths = np.array([20.0, 4.0, 20.0, 4.0])
+
+    def rails(s):
+        waves = sizes[:, None] * np.sin(2.0 * np.pi * s / lengths[:, None])
+        return waves + 5e-3 * np.sin(2.0 * np.pi * s / 40.0), np.zeros((4, len(s)))
+
+    def left(length):
+        f, low, high = 1.0 / length, 1.0 / 25.0, 1.0 / 3.0
+        return 1.0 / np.sqrt(1.0 + ((f**2 - low * high) / (f * (high - low))) ** 8)
+
+    monkeypatch.setattr(track_quality, "displacement", lambda _: rails)
+    quality = TrackQuality(Mock(), 100.0, 500.0)
+    for begin in (100.0, 220.0, 380.0):  # at the ends of what was filtered, too
+        found = quality.deviations(begin, begin + 120.0)
+        rest = (5e-3 * left(40.0)) ** 2
+        across, along = (np.sqrt(((size * left(of)) ** 2 + rest) / 2.0)
+                         for size, of in ((2e-3, 20.0), (3e-3, 4.0)))  # fmt: skip
+        assert found == pytest.approx((across, along), rel=0.01)
