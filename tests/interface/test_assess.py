@@ -2,6 +2,7 @@
 
 import json
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from example_result import example_result
 from made_record import FINE, Q0, curve, made, track
 
 import railsim
-from railsim.assessment import Assessment, assess
+from railsim.assessment import Assessment, assess, running
 from railsim.assessment.comfort import MeanComfort, event_comfort
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.safety import flange_angle
@@ -187,6 +188,19 @@ def test_track_quality_stands_beside_the_sections():
     alignment = np.mean([q.alignment for q in found.quality])
     # 0.71 mm of the whole spectrum in 3 to 25 m; the worse rail, six sections of 250 m
     assert alignment == pytest.approx(0.71e-3, rel=0.2)
+
+
+def test_track_quality_is_judged_at_the_admissible_speed(monkeypatch):
+    """Level of 1.3 mm: QN1 is 1.4 mm up to 160 km/h and 1.2 mm up to 200 km/h; run at 1.1 V."""
+    quality = Mock(**{"return_value.deviations.return_value": (0.5e-3, 1.3e-3)})
+    monkeypatch.setattr(running, "TrackQuality", quality)
+    random = {"type": "random", "spectrum": "erri_b176_low", "seed": 3}
+    on = track(STRAIGHT, irregularities=[random])
+    for admissible, better in ((44.0, True), (48.0, False)):
+        service = Service(admissible_speed=admissible, cant_deficiency=0.15)
+        (found,) = assess(made(on, 1.1 * admissible), service=service)
+        classes = {row.quality for row in found.quality}
+        assert classes == {"better than QN1" if better else "between QN1 and QN2"}
 
 
 @pytest.mark.parametrize(("change", "message"), [
