@@ -58,6 +58,19 @@ def test_instability_of_a_sine_against_half_the_limit_of_the_sum_of_y(hunting):
     assert found.hunting_frequency == pytest.approx(5.0, abs=0.02)
 
 
+def test_frequency_of_the_instability_is_that_of_the_sum_of_both_wheels():
+    """40 kN apart at 3 Hz, 5 kN aside at 6 Hz."""
+
+    def Y(t, s):
+        apart, aside = (np.sin(2.0 * np.pi * f * t)[:, None] + 0.0 * s for f in (3.0, 6.0))
+        return np.stack([40e3 * apart + 5e3 * aside, -40e3 * apart + 5e3 * aside], axis=-1)
+
+    (found,) = assess(made(track(STRAIGHT), FAST, Y=Y))
+    assert found.hunting_frequency == pytest.approx(6.0, abs=0.02)
+    row = rows_of(found, "1", "instability")["wheelset 2"]
+    assert row.estimate.value == pytest.approx(10e3 / np.sqrt(2.0), rel=0.01)
+
+
 def test_straight_track_gives_both_percentiles_of_signed_quantities(hunting):
     (found,) = assess(hunting)
     report = found.zones[0]
