@@ -112,14 +112,14 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     files = [job.path if job.whole else None for job in batch]
     found: list[Result | Exception]
     try:
+        # the quantities that records and files need
+        wants_all = any(job.function or job.case.analyses or job.picture for job in batch)
+        only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *first.keep}
         if len(batch) == 1:
-            # the quantities that the record and the file need
-            wants_all = first.function or first.case.analyses or first.picture
-            only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *first.keep}
             found = [run_case(first.case, files[0], overwrite=True, progress=progress, only=only)]
         else:
             cases = [job.case for job in batch]
-            found = run_cases(cases, files, overwrite=True, progress=progress)
+            found = run_cases(cases, files, overwrite=True, progress=progress, only=only)
     except Stopped:
         raise
     except Exception as error:

@@ -60,15 +60,19 @@ def run_cases(
     *,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
+    only: Collection[str] = EVERYTHING,
 ) -> list[Result | Exception]:
-    """Run cases that differ only in the vehicle in one call; failures do not affect the others."""
+    """Run cases that differ only in the vehicle in one call; failures do not affect the others.
+
+    Arguments as of `run_case`.
+    """
     found: dict[int, Result | Exception] = {}
     sinks: dict[int, Hdf5Sink | MemorySink] = {}
     with ExitStack() as stack:
         for number, (case, path) in enumerate(zip(cases, paths, strict=True)):
             facts = {"run": case.name, "inputs_hash": case.key}
             try:
-                sink = _sink(path, overwrite, facts)
+                sink = _sink(path, overwrite, facts, only)
             except InputError as error:
                 found[number] = error
             else:

@@ -12,6 +12,7 @@ from planned import combinations
 import railsim
 import railsim.studies.run
 from railsim.cli import main
+from railsim.studies import execute
 from railsim.studies.execute import Job, batches
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
@@ -61,6 +62,27 @@ def test_results_are_those_of_runs_apart(tmp_path, calls):
         for peak, expected in zip(run["peaks"], alone["peaks"], strict=True):
             # round-off of the compiler's vectors, see tests/verification/test_ensemble.py
             assert peak["value"] == pytest.approx(expected["value"], rel=1e-9, abs=1e-9)
+
+
+def test_runs_together_hold_no_more_in_memory_than_what_is_kept_and_summed_up(
+    tmp_path, monkeypatch
+):
+    held, finished = [], execute.finished_record
+
+    def noted(case, result, *more):
+        held.append(set(result))
+        return finished(case, result, *more)
+
+    monkeypatch.setattr(execute, "finished_record", noted)
+    for together in ("2", "1"):
+        more = ["--keep", "Q,xi_x"]
+        assert main(arguments(tmp_path / together, 40e3, 42e3, together=together, more=more)) == 0
+    assert held == [held[-1]] * 4
+    assert {"xi_x", "T_gamma"} <= held[0]
+    assert not {"body_position", "phi"} & held[0]
+    files = [railsim.open_result(tmp_path / n / runs(tmp_path / n)[0]["file"]) for n in "12"]
+    assert set(files[0]) == set(files[1]) == {"time", "distance", "Q0", "Q", "xi_x"}
+    np.testing.assert_array_equal(files[0]["xi_x"], files[1]["xi_x"])
 
 
 def test_only_runs_on_the_same_track_at_the_same_speed_share_calls():
