@@ -4,13 +4,15 @@ A tone passes a zero-phase Butterworth filter with its gain alone, so that every
 known in closed form; percentiles and means over distance are taken of that.
 """
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 from example_result import BODIES, OFFSETS
 from made_record import FINE, Q0, curve, made, track
 from scipy import signal
 
-from railsim.assessment.criteria import CRITERIA
+from railsim.assessment.criteria import CRITERIA, steering
 from railsim.assessment.en14363 import section_values
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection
@@ -207,3 +209,15 @@ def test_a_record_covers_what_the_whole_vehicle_passed_after_the_start(speed, be
     """
     record = Record(made(track({"type": "STR", "length": 200.0}), speed, **FINE), "run")
     assert record.covered() == pytest.approx((begin, 200.0 - speed / RATE - 10.78))
+
+
+def test_steering_index_is_that_of_the_gauge_in_the_middle_of_the_section():
+    """Both rails moved apart: 6 and 4 mm at 300 m, nothing at 200 m; the middle is at 250 m."""
+    widening = [[200.0, 0.0, 0.0], [300.0, 6e-3, 4e-3]]
+    on = track({"type": "CIR", "length": 400.0, "radius": 300.0}).replace(gauge_widening=widening)
+    record = Record(made(on, 20.0, **FINE), "run")
+    asked = []
+    record.geometry_with = asked.append
+    section = TestSection("4", 220.0, 280.0, 300.0, 0.1, 20.0)
+    assert steering(Mock(record=record), section) == {}
+    assert asked == [pytest.approx(5e-3)]
