@@ -361,6 +361,21 @@ def test_laws_of_wear_hold_for_each_patch():
     assert wheel.rail_damage == pytest.approx(7e-6)
 
 
+@pytest.mark.parametrize(("strong", "damage"), [(285.0, -10e-6), (197.0, 5e-6)])
+def test_rail_damage_is_that_of_the_part_with_the_largest_magnitude(strong, damage):
+    """One part at 40 N, +5e-6; the other wears: (175 - T)/110 of 1e-5."""
+    whole = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(2.0 * strong + 0.0 * s))
+    each = np.zeros((*whole.T_gamma.shape, 3))
+    each[..., 0], each[..., 1] = 40.0, strong
+    loaded = np.sign(each)
+    patches = {
+        "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
+        "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
+    }  # fmt: skip
+    (found,) = assess(with_patches(whole, patches), "wear")
+    assert next(iter(found.wear.values()))[0].rail_damage == pytest.approx(damage)
+
+
 def by_hand(T, area, against, D):
     """Pearce and Sherratt [mm2/km], USFD [ug/m] and WLRM [1e-6] of wear numbers, as printed."""
     pearce = np.where(T < 100.0, 0.25 * T, np.where(T < 200.0, 25.0, 1.19 * T - 154.0)) / D
