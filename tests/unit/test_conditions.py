@@ -14,10 +14,12 @@ from railsim.assessment.conditions import (
     NOT_MET,
     SectionRow,
     _independent,
+    _quality,
     vehicle_conditions,
     zone_conditions,
 )
 from railsim.assessment.sections import TestSection
+from railsim.assessment.verdict import Verdict, overall
 from railsim.definitions.loading import load_running_limits
 from railsim.definitions.vehicle.tables import Service
 
@@ -122,3 +124,18 @@ def test_conditions_of_a_zone(change, name, met):
         )
         share = 0 if worst is None else 100 / count
         assert f"{share:.0f} % worse than QN2" in found[name].found
+
+
+def test_nine_sections_of_ten_have_the_quality_that_is_stated():
+    """0.1 to 1.1 mm in steps of 0.1 mm: one of eleven is above 1.0 mm."""
+    rows = [row(k, alignment=1e-4 * (k + 1), level=2e-4 * (k + 1)) for k in range(11)]
+    found = _quality("zone 4", rows, None, SERVICE).found
+    assert found.startswith("90 % of the sections below 1.00 mm alignment and 2.00 mm level; 0 %")
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_overall_verdict_is_the_worst_one(place):
+    order = "derailed", "fail", "not assessed", "incomplete", "pass"
+    verdicts = {name: Verdict(name, ()) for name in order[place:]}
+    assert overall(verdicts, order[:place:-1]) == order[place + 1]
+    assert overall(verdicts, order[place:][::-1]) == order[place]
