@@ -159,3 +159,9 @@ def test_total_indices_of_a_product_hold_its_interaction_and_errors_are_root_mea
         fit = RBFInterpolator(designs[others], z[others], kernel="thin_plate_spline", degree=1)
         missed.append(fit(designs[i : i + 1])[0] - z[i])
     assert found.error == pytest.approx(np.sqrt(np.mean(np.square(missed))), rel=1e-6)
+
+
+def test_knee_counts_distances_over_the_range_of_the_front_wherever_it_lies():
+    front = np.array([[0.0, 1.0], [4.0, 0.3], [10.0, 0.0]])
+    for offset in (-200.0, 0.0, 100.0):
+        assert knee(front + np.array([offset, 0.0])) == 1
