@@ -8,7 +8,7 @@ import pytest
 
 from railsim.errors import InputError
 from railsim.studies.records import read_record, write_record
-from railsim.studies.summary import _write_rows
+from railsim.studies.summary import _write_rows, summary_row, unit_of
 
 RECORD = {"speed": 61.7, "modes": [1.0, None, "hunting"], "nested": {"b": 2, "a": 1e-300}}
 
@@ -81,3 +81,16 @@ def test_summary_reads_back_as_what_was_written_whatever_it_holds():
     assert {one[f"n{i}"] for i in range(len(numbers))} == {""}
     assert [float(two[f"n{i}"]) for i in range(len(numbers))] == numbers
     assert (two["name"], two["t3"]) == ("'=2+3", "")
+
+
+def test_summary_has_columns_of_each_curve_in_their_order():
+    """Those of the first curve without a number, those of further ones with theirs."""
+    curves = [{"largest": {"Q": x}, "largest_medians": {"Q": x + 0.5}} for x in (1, 2, 3)]
+    record = {"name": "a", "labels": {}, "file": "a.h5", "mid_curves": curves}
+    row = {name: cell for name, cell in summary_row(record).items() if name.startswith("Q_")}
+    assert row == {
+        "Q_mid": 1, "Q_median": 1.5, "Q_mid2": 2, "Q_median2": 2.5, "Q_mid3": 3, "Q_median3": 3.5,
+    }  # fmt: skip
+    assert [unit_of(name) for name in ("Q_median3", "Q_peak_20hz", "Q_peak_distance")] == [
+        "N", "N", "m",
+    ]  # fmt: skip
