@@ -8,6 +8,6 @@ python benchmarks/peers.py --out "$results/peers.json"
 python benchmarks/growth.py --out "$results/growth.json"
 python benchmarks/irregular.py --repeats 3 --out "$results/speeds.json"
 python benchmarks/study_cost.py "${TMPDIR:-/tmp}/study_cost" --json "$results/study.json"
-python benchmarks/study_cost.py "${TMPDIR:-/tmp}/study_files" --frictions 3 --keep all --json "$results/study_files.json"
+python benchmarks/study_cost.py "${TMPDIR:-/tmp}/study_files" --frictions 8 --keep all --json "$results/study_files.json"
 rm -r "${TMPDIR:-/tmp}/study_cost" "${TMPDIR:-/tmp}/study_files"
 python benchmarks/tables.py

@@ -54,7 +54,7 @@ MOST_MEMBERS = 1000
 FILTERS = {h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 DEFLATE_RATIO = 100  # what compression may save at most, over the whole file
 SPARE_BYTES = 64_000_000  # and what may be saved beyond, for constant quantities
-MOST_HELD = 256_000_000  # of arrays that were read, beside those in use
+MOST_HELD = 64_000_000  # of arrays that were read, beside those in use
 AS_WRITTEN = "a result as railsim wrote it"
 
 
