@@ -15,7 +15,7 @@ from railsim.linear.track_response import QUANTITIES, RAILS, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
 from railsim.measurement.counterpart import amplified, amplifier
-from railsim.observation import Assumed, irregularity
+from railsim.observation import Assumed, contact, irregularity
 from railsim.observation.estimate import BANDS, Estimate, joined
 from railsim.observation.estimate import rms as deviation
 from railsim.observation.pieces import Piece, on_grid
@@ -339,6 +339,19 @@ def test_twins_through_curves(coach, radius, cant, speed):
     by = holds(found, result, track)
     inside = [np.abs(e) < 1.96 * sd for (_, e, sd) in by.values()]
     assert 0.90 < np.mean(inside) < 0.99
+
+
+@pytest.mark.further
+def test_friction_elements_that_keep_their_state_have_no_equation_at_rest(monkeypatch):
+    """Those of a wagon in sticking; the contact in the mean ended in a singular matrix."""
+    monkeypatch.setattr(contact, "LENGTH", 300.0)
+    wagon, track = railsim.load_vehicle("wagon_y25"), railsim.load_track("straight")
+    linear = LinearVehicle(wagon, track)
+    rough = {"spectrum": "erri_b176_low", "wavelengths": [3.0, 100.0]}
+    tangent = track_response(linear, {}, 25.0)
+    found, noise = contact.in_the_mean(wagon, track, linear, tangent, rough)
+    assert np.isfinite(found.A).all()
+    assert np.isfinite(noise.power).all()
 
 
 @pytest.mark.further
