@@ -81,11 +81,12 @@ def validate_model(
     InputError
         Channels that the vehicle or the result does not have; no section; unequal numbers.
     """
-    runs, limits = inputs(measured, limits)
+    files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
     found = [results] if isinstance(results, Result) else list(results)
-    if len(found) != len(runs) or not runs:
-        words = f"{len(found)} results for {len(runs)} measured run{'s' * (len(runs) != 1)}"
+    if len(found) != len(files) or not files:
+        words = f"{len(found)} results for {len(files)} measured run{'s' * (len(files) != 1)}"
         raise argument_error("results", words, "one for each", option="RESULT.h5")
+    runs, limits = inputs(files, limits)
     tests = load_running_limits(zones)
     pairs: list[Pair] = []
     overlays: list[Overlay] = []
@@ -115,12 +116,10 @@ def validate_model(
 
 
 def inputs(
-    measured: Measurement | str | Path | Sequence[Measurement | str | Path],
-    limits: ValidationLimits | str | Path,
+    measured: Sequence[Measurement | str | Path], limits: ValidationLimits | str | Path
 ) -> tuple[list[Measurement], ValidationLimits]:
     """Return measured runs and limits; raises InputError: what is wrong with them."""
-    files = [measured] if isinstance(measured, Measurement | str | Path) else list(measured)
-    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in files]
+    runs = [one if isinstance(one, Measurement) else load_measurement(one) for one in measured]
     names = [run.name for run in runs]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         words, allowed = f"two runs named '{twice[0]}'", "a name for each run"
