@@ -1,6 +1,6 @@
 """Speed of the tool for linkages: kinematics with force, search, the whole command.
 
-    python benchmarks/mechanisms.py [--starts 20] [--search atr95_lift_5]
+    python benchmarks/mechanisms.py [--starts 20] [--search atr95_lift_5] [--repeats 20]
 
 Times are CPU times of this process where one does the work, else wall times; the machine is told.
 A loop of Python with the closed form of lift 5 and its force is the peer in the same run.
@@ -20,27 +20,28 @@ from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
 from railsim.mechanisms.optimisation import optimise
 
-POSITIONS, REPEATS = 1000, 20
+POSITIONS = 1000
 
 
-def best(function):
+def best(function, repeats):
     """Least CPU time of several calls [s]."""
     function()
     times = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         begin = time.process_time()
         function()
         times.append(time.process_time() - begin)
     return min(times)
 
 
-def kinematics():
+def kinematics(repeats):
     model = build(load_mechanism("atr95_lift_5"))
     s = np.linspace(model.start, model.end, POSITIONS)
-    return best(lambda: solve(model, s)), best(lambda: actuator_force(solve(model, s), "lift"))
+    with_force = best(lambda: actuator_force(solve(model, s), "lift"), repeats)
+    return best(lambda: solve(model, s), repeats), with_force
 
 
-def closed_form_in_python():
+def closed_form_in_python(repeats):
     """Length of lift 5 at every position in a loop of Python, by its closed form."""
     p = build(load_mechanism("atr95_lift_5")).values
     a1, a2, a3, a4, d = (p[name] for name in ("a1", "a2", "a3", "a4", "d"))
@@ -56,7 +57,7 @@ def closed_form_in_python():
             x = a1 * np.cos(A) + a4 * np.cos(angle) - p["d_x"]
             np.hypot(x, a1 * np.sin(A) + a4 * np.sin(angle) + p["d_y"])
 
-    return best(loop)
+    return best(loop, repeats)
 
 
 def search(name, starts, workers):
@@ -67,12 +68,12 @@ def search(name, starts, workers):
     return time.perf_counter() - begin, time.process_time() - busy
 
 
-def command():
+def command(repeats):
     """CPU time of the whole command, warm, and of one that only tells its version [s]."""
     times = []
     for arguments in (["mechanism", "atr95_lift_5", "--json"], ["--version"]):
         found = []
-        for _ in range(3):
+        for _ in range(repeats):
             before = os.times()
             subprocess.run(
                 [sys.executable, "-m", "railsim", *arguments], check=True, stdout=subprocess.DEVNULL
@@ -90,13 +91,14 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--search", default="atr95_lift_5")
+    parser.add_argument("--repeats", type=int, default=20)
     asked = parser.parse_args()
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
-    positions, with_force = kinematics()
-    loop = closed_form_in_python()
+    positions, with_force = kinematics(asked.repeats)
+    loop = closed_form_in_python(asked.repeats)
     print(f"{POSITIONS} positions: {positions * 1e3:.2f} ms, with force {with_force * 1e3:.2f} ms")
     print(f"closed form of the lift alone in a loop of Python: {loop / positions:.1f} times that")
-    whole, version = command()
+    whole, version = command(min(3, asked.repeats))
     print(f"whole command {whole:.2f} s of CPU, --version {version:.2f} s")
     one, two = (search(asked.search, asked.starts, workers) for workers in (1, 2))
     print(f"{asked.starts} starts of {asked.search} in one process: {one[1]:.1f} s of CPU")

@@ -33,6 +33,8 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "verification/test_steady_curving.py::"
+        "test_where_steady_rolling_is_unstable_values_are_means_of_the_motion",
         "interface/test_mechanism.py::test_out_writes_a_self_contained_page_pictures_and_positions",
         "interface/test_study.py::test_pictures_of_runs_and_of_vehicles_against_each_other",
         "reference/test_gritti_pantograph.py::test_a19_linear_ratio_new",
