@@ -33,6 +33,29 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[springs.py]",
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[optimise.py]",
+        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[whole.py]",
+        "verification/test_track_from_accelerations.py::"
+        "test_filters_of_the_amplifier_do_not_move_the_track[filters0]",
+        "interface/test_study.py::test_first_run_compiles_alone[compiled before]",
+        "interface/test_run.py::test_interrupt_leaves_nothing[4.0]",
+        "interface/test_stationary.py::"
+        "test_guiding_takes_the_worse_of_both_hands[vehicle1-friction1]",
+        "verification/test_track_from_accelerations.py::"
+        "test_a_curve_without_simulated_runs_is_said",
+        "verification/test_mechanism_search.py::"
+        "test_an_optimum_keeps_its_limits_between_the_positions_too[2]",
+        "verification/test_out_of_round.py::test_measured_flat_as_contact_finds_it",
+        "interface/test_stationary.py::test_load_to_one_side_is_leant_to_its_own_side",
+        "verification/test_model_validation.py::test_one_late_channel_does_not_move_the_others",
+        "verification/test_rail_wear.py::test_every_vehicle_of_a_mix_that_hunts_is_named",
+        "interface/test_examples.py::test_example_runs_and_draws_its_picture[11_skyhook]",
+        "interface/test_stability_commands.py::"
+        "test_damaged_point_of_a_map_is_computed_again_and_told",
+        "unit/test_kernel_cache.py::test_without_a_folder_to_write_to_kernels_run_uncached",
+        "verification/test_crossing_runs.py::"
+        "test_short_ramps_are_what_the_formula_leaves_out[10.0]",
         "verification/test_steady_curving.py::"
         "test_where_steady_rolling_is_unstable_values_are_means_of_the_motion",
         "interface/test_mechanism.py::test_out_writes_a_self_contained_page_pictures_and_positions",
