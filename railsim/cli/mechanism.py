@@ -70,8 +70,10 @@ def command(
         with cli.faults_in(file, "mechanism", mechanism.name):
             if searched:
                 chosen, cores = mechanism.in_case(case), available_cores()
-                for _, name, _ in wanted:  # before the search
-                    analyse(chosen).result(name)
+                if wanted:  # before the search
+                    before = analyse(chosen)
+                    for _, name, _ in wanted:
+                        before.result(name)
                 optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
             at_values.append(_values_at(results[-1], wanted))

@@ -171,7 +171,7 @@ class Hdf5Sink(sinks.Sink):
             wanted, self.path = self.path, self._partial.finish(overwrite=self._overwrite)
         if self.path != wanted:
             _LOG.warning(f"{wanted} has appeared in the meantime; the result is {self.path}")
-        return opened(self.path, lambda _: True)  # sealed just now
+        return opened(self.path, just_sealed=True)
 
     def _write_rest(self, statics: Named, profiles: Named, groups: Named) -> None:
         if not self._datasets:

@@ -64,11 +64,11 @@ def open_result(path: str | Path) -> Result:
     `path`: File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote. Raises InputError:
     there is no such file, it is not a result of railsim, or it is damaged.
     """
-    return opened(Path(path), sealed)
+    return opened(Path(path))
 
 
-def opened(path: Path, is_whole: Callable[[Path], bool]) -> Result:
-    """Open a result file as `open_result`; `is_whole`: whether its digest need not be looked at."""
+def opened(path: Path, *, just_sealed: bool = False) -> Result:
+    """Open a result file as `open_result`; `just_sealed`: its seal need not be looked at again."""
     if not is_file(path):
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
         found = "a folder" if os.path.isdir(path) else found
@@ -77,7 +77,7 @@ def opened(path: Path, is_whole: Callable[[Path], bool]) -> Result:
         if path.stat().st_size == 0:
             raise input_error(str(path), "the file is empty", AS_WRITTEN)
         stamp = _stamp(os.stat(path))
-        whole = is_whole(path)
+        whole = just_sealed or sealed(path)
         with h5py.File(path, "r") as file:
             _refuse_another(path, file, stamp)
             return _Reader(file, path, stamp).result(whole=whole)

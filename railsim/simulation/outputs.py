@@ -38,6 +38,7 @@ from railsim.model.time_step import empty_recorder
 from railsim.model.work import against_rails, first_rail, parts_of_wheel
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
+from railsim.result.sinks import matches
 from railsim.simulation.own_outputs import OwnOutputs
 from railsim.track.alignment import alignment_of
 from railsim.track.irregularity import displacement
@@ -375,7 +376,7 @@ def _matching(
     ]
     if faults:
         raise InputError(faults)
-    return tuple(n for n in names if any(fnmatchcase(n, pattern) for pattern in patterns))
+    return tuple(name for name in names if matches(name, patterns))
 
 
 def _elements(raw: Floats) -> dict[str, Floats]:

@@ -52,12 +52,8 @@ class Dimensions:
     @classmethod
     def joined(cls, some: Sequence["Dimensions"]) -> "Dimensions":
         """Nests of several."""
-        return cls(
-            *(
-                np.concatenate([vars(one)[name] for one in some], axis=-1)
-                for name in cls.__annotations__
-            )
-        )
+        parts = zip(*(vars(one).values() for one in some), strict=True)
+        return cls(*(np.concatenate(part, axis=-1) for part in parts))
 
 
 @dataclass(frozen=True)

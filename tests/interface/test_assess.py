@@ -339,22 +339,26 @@ def with_patches(whole, patches):
     )  # fmt: skip
 
 
+def wheel_with_patches(*T_gamma):
+    """Wear of a wheel whose patches have these wear numbers [N], each of 4 mm by 4 mm if any."""
+    run = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(sum(T_gamma) + 0.0 * s))
+    each = np.broadcast_to(T_gamma, (*run.T_gamma.shape, 3))
+    loaded = np.sign(each)
+    patches = {
+        "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
+        "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
+    }  # fmt: skip
+    (found,) = assess(with_patches(run, patches), "wear")
+    return next(iter(found.wear.values()))[0]
+
+
 def test_laws_of_wear_hold_for_each_patch():
     """150 N and 50 N on 12.57 mm2 each, D 920 mm, by hand.
 
     Pearce and Sherratt (25 + 12.5)/D; USFD 55 ug/(m mm2) A and 5.3 ug/(m N) 50 N; WLRM 2.27e-6 and
     7e-6, of which one part of the rail has the larger.
     """
-    whole = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(200.0 + 0.0 * s))
-    each = np.zeros((*whole.T_gamma.shape, 3))
-    each[..., 0], each[..., 2] = 150.0, 50.0
-    loaded = np.sign(each)
-    patches = {
-        "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
-        "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
-    }  # fmt: skip
-    (found,) = assess(with_patches(whole, patches), "wear")
-    wheel = next(iter(found.wear.values()))[0]
+    wheel = wheel_with_patches(150.0, 0.0, 50.0)
     assert wheel.worn_area["pearce_sherratt"] == pytest.approx(37.5 / 920.0 * 1e-9)
     mass = (55.0 * np.pi * 2.0**2 + 5.3 * 50.0) * 1e-9  # kg/m
     assert wheel.worn_area["usfd"] == pytest.approx(mass / (7850.0 * np.pi * 0.92))
@@ -364,16 +368,7 @@ def test_laws_of_wear_hold_for_each_patch():
 @pytest.mark.parametrize(("strong", "damage"), [(285.0, -10e-6), (197.0, 5e-6)])
 def test_rail_damage_is_that_of_the_part_with_the_largest_magnitude(strong, damage):
     """One part at 40 N, +5e-6; the other wears: (175 - T)/110 of 1e-5."""
-    whole = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(2.0 * strong + 0.0 * s))
-    each = np.zeros((*whole.T_gamma.shape, 3))
-    each[..., 0], each[..., 1] = 40.0, strong
-    loaded = np.sign(each)
-    patches = {
-        "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
-        "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
-    }  # fmt: skip
-    (found,) = assess(with_patches(whole, patches), "wear")
-    assert next(iter(found.wear.values()))[0].rail_damage == pytest.approx(damage)
+    assert wheel_with_patches(40.0, strong, 0.0).rail_damage == pytest.approx(damage)
 
 
 def by_hand(T, area, against, D):
