@@ -7,8 +7,9 @@ import time
 
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.state import TIME
-from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, STATUS
+from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, ROLL_RANGE, STATUS, WHEEL_LIFT
 from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS
+from railsim.notation import ROLL
 from railsim.result import Result
 from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run
@@ -16,6 +17,8 @@ from railsim.simulation.conditions import Inputs, TakenUp
 from railsim.simulation.outputs import run_extremes
 from railsim.simulation.remarks import beyond_experience, run_remarks
 from railsim.simulation.sampling import low_pass_remark
+
+FLANGE_HEIGHT = 0.028  # m, of wheel profiles of EN 13715
 
 _LOG = logging.getLogger(__name__)
 
@@ -88,20 +91,34 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
 def verdict(run: Run) -> dict[str, str]:
     """How a run ended, and why: attributes `status` and `status_reason`.
 
-    A wheelset is derailed if it stands over its rail, which the loop has looked at, and if the
-    forces on the way there can have been those of a railway.
+    A wheelset is derailed if it stands over its rail, which the loop has looked at, or far above
+    it, as where a vehicle overturns, and if the forces on the way there can have been those of a
+    railway.
     """
     model, Q0 = run.prepared.model, run.prepared.balance.Q0
     if run.stopped:
         return {"status": "stopped", "status_reason": run.stopped}
-    if run.status == DERAILED:
+    if run.status == DERAILED or stands_above_rail(run):
         where = model.index.wheelsets[run.where]
-        if beyond_experience(run_extremes(run.extremes, Q0), Q0, model.index.wheelsets):
+        thrown = beyond_experience(run_extremes(run.extremes, Q0), Q0, model.index.wheelsets)
+        if run.status == DERAILED and thrown:
             why = "left its rail under forces beyond all experience"
             cause = "the step is too long or the model is unstable"
             return {"status": "stopped", "status_reason": f"{where} {why}: {cause}"}
+        if run.status != DERAILED and not thrown:
+            why = "lifted a wheel higher above its rail than its flange reaches"
+            return {"status": "derailed", "status_reason": f"{where} {why}"}
     return {
         "status": STATUS[run.status][0],
         "status_reason": model.index.sentence(run.status, run.where)
         + (f" at {run.state[TIME]:.6g} s" if run.status == LAW_NOT_FINITE else ""),
     }
+
+
+def stands_above_rail(run: Run) -> bool:
+    """Whether the run ended with a wheel higher above its rail than its flange reaches."""
+    if run.status != ROLL_RANGE:
+        return run.status == WHEEL_LIFT
+    system = run.prepared.model.system
+    roll = run.state[6 * system.contact.body[run.where] + ROLL]
+    return bool(abs(roll) * system.track.rail_base > FLANGE_HEIGHT)

@@ -6,6 +6,7 @@ import pytest
 from railsim.contact.elastic import TableArrays
 from railsim.contact.table import TableGrid, build_contact_table
 from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_track
 from railsim.definitions.settings import Settings
 from railsim.kernels.table_ends import has_climbed
 from railsim.kernels.wheel_contact import WheelOnRail
@@ -38,6 +39,30 @@ def test_wheelset_that_is_thrown_off_the_rails_is_not_derailed():
     result = simulate(COACH, track, speed=20.0, until=5.0, settings=settings)
     assert result.status == "stopped"
     assert "under forces beyond all experience" in result.attributes["status_reason"]
+
+
+def overturning_speed(vehicle, radius, cant, base=1.5):
+    """Speed at which the resultant of weight and centrifugal force passes the outer rail [m/s].
+
+    A rigid vehicle, h its centre of mass: (v^2/R cos p - g sin p) h = (g cos p + v^2/R sin p) b/2.
+    """
+    mass = np.array([body.mass for body in vehicle.bodies.values()])
+    h = -mass @ [body.position[2] for body in vehicle.bodies.values()] / mass.sum()
+    s, c = cant / base, np.sqrt(1.0 - (cant / base) ** 2)
+    return np.sqrt(9.81 * radius * (c * base / 2 + s * h) / (c * h - s * base / 2))
+
+
+@pytest.mark.parametrize("hand", ["right", "left"])
+def test_vehicle_that_overturns_is_derailed(hand):
+    """A verdict "stopped" had left it unassessed."""
+    right = load_track("curve_r250")
+    track = right if hand == "right" else mirrored_track(right)
+    speed = overturning_speed(COACH, 250.0, 0.15)
+    stands, falls = (simulate(COACH, track, speed=f * speed, until=400.0) for f in (0.9, 1.05))
+    assert stands.status == "complete"
+    assert falls.status == "derailed"
+    assert "higher above its rail than its flange" in falls.attributes["status_reason"]
+    assert falls.distance[-1] > 300.0  # in the full curve
 
 
 @pytest.mark.parametrize("roll", [-0.002, 0.0, 0.002])
