@@ -23,6 +23,7 @@ from railsim.assessment.conditions import MET, Condition
 from railsim.assessment.criteria import SAFETY, VERDICTS, WORDS
 from railsim.assessment.zones import ZoneReport
 from railsim.result import Result
+from railsim.table import beside
 
 PASS, FAIL, INCOMPLETE = "pass", "fail", "incomplete"
 NOT_ASSESSED, DERAILED = "not assessed", "derailed"
@@ -90,9 +91,10 @@ def _ended(name: str, result: Result) -> str:
 def _exceeded(report: ZoneReport, criterion: str) -> list[str]:
     """Return limits exceeded and wheels lifted, a sentence each."""
     found = [
-        f"{report.title}: {about.words}, {row.place}: {100.0 * row.share:.0f} % of the limit"
+        f"{report.title}: {row.criterion.words}, {row.place}: {beside(100.0 * row.share, 100.0)} % "
+        "of the limit"
         for row in report.exceeded
-        if (about := row.criterion).group == criterion
+        if row.criterion.group == criterion
     ]
     if criterion == SAFETY:
         lifted = [f"{wheel} without load over {m:.1f} m" for wheel, m in report.lifted.items()]

@@ -19,6 +19,7 @@ from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table
 from railsim.report.inputs import differing
 from railsim.result import Result
 from railsim.result.sensors import sensors
+from railsim.table import beside
 from railsim.text import printable
 
 KINDS = {PASS: PASSED, FAIL: FAILED, DERAILED: FAILED}
@@ -311,15 +312,15 @@ def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
     if pair is None:
         return ""
     zone, row = pair
-    words = [f"{100.0 * row.share:.0f} %", row.place, METHOD[row.estimate.method]]
+    words = [f"{beside(100.0 * row.share, 100.0)} %", row.place, METHOD[row.estimate.method]]
     if row.uncorrected is not None:
         words.append(f"uncorrected {row.criterion.scale * row.uncorrected.value:.3g}")
     if math.isnan(row.share):
         mean = f"{row.estimate.N} value, mean {row.criterion.scale * row.estimate.mean:.3g}"
         words = [mean, row.place]
     small = ", ".join(filter(None, [*words, zone.population.name]))
-    value = row.criterion.scale * row.estimate.value
-    return "-" if math.isnan(value) else f"{value:.3g}", small
+    value, limit = (row.criterion.scale * of for of in (row.estimate.value, row.limit))
+    return "-" if math.isnan(value) else beside(value, limit, 3, "g"), small
 
 
 def _limit(row: Row) -> tuple[str, str]:
@@ -346,7 +347,7 @@ def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:
         known = [x for x in report.overturning.values() if not math.isnan(x)]
         tilt = f"{max(known):.2f}" if known else ""
         rows.append([run, worst.place, f"{worst.Y_over_Q:.3f}", f"{worst.limit:.3f}",
-                     f"{100.0 * share:.0f} %", climb, tilt, lifted])  # fmt: skip
+                     f"{beside(100.0 * share, 100.0)} %", climb, tilt, lifted])  # fmt: skip
     header = ["run", "wheel", "largest Y/Q", "limit", "share", "climb", "overturning", "lifted"]
     caption = "Derailment: the wheel nearest to Nadal's limit"
     return Table(header, rows, caption, (0, 1, 7), failed, NADAL), above
