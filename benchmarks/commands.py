@@ -50,6 +50,7 @@ def run_command(*arguments: str, folder: Path, cache: Path | None = None) -> dic
         `wall` and `cpu` [s], `memory` of the largest process [B], exit `status`.
     """
     environment = dict(os.environ)
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's Python keeps what it has compiled
     if cache is not None:
         environment |= {"RAILSIM_CACHE_DIR": str(cache)}
         environment.pop("NUMBA_CACHE_DIR", None)
