@@ -5,7 +5,7 @@ from pathlib import Path
 
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import caused_by_hunting, comfort_report, short_of_blocks
-from railsim.assessment.record import Record
+from railsim.assessment.record import RUNNING, Record
 from railsim.assessment.running import assess_running, by_vehicle, running_limits
 from railsim.assessment.safety import safety_report
 from railsim.assessment.wear_report import wear_report
@@ -15,7 +15,6 @@ from railsim.definitions.vehicle.tables import Service
 from railsim.errors import argument_error
 from railsim.result import Result
 
-RUNNING = ("en14363", "uic518")
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
 # what uses an option; others are used by those of running behaviour
 USED_BY = {"limits": (*RUNNING, "comfort"), "law": ("wear",)}

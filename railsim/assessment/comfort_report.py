@@ -65,6 +65,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
     `record`: Run with sensor readings, or with the motion of the bodies. Raises InputError: there
     are no measuring points, or the run is shorter than one block of 5 s.
     """
+    record.need_quantities("comfort")
     names = [name for name in record.sensors if not name.startswith("frame_")]
     if not names:
         flat = flatten(record.result.vehicle())

@@ -20,8 +20,6 @@ from railsim.assessment.signals import Signals, wheel_load
 FREQUENCIES = np.arange(0.4, 20.0, 0.01)  # Hz, among which that of the instability is sought
 LONGEST = 60.0  # s, duration of the sections that are evaluated together
 
-NEEDED = ("Q", "Y", "wheelset_distance")
-
 
 @dataclass
 class SectionValues:
@@ -43,7 +41,7 @@ def section_values(
 ) -> list[SectionValues]:
     """Values of the given sections of a run.
 
-    `record`: Run with all that is `NEEDED`, and accelerations or body motions. `sections`: In the
+    `record`: Run with all that is needed, and accelerations or body motions. `sections`: In the
     order of the track. `f0`: Frequency of the instability [Hz]; without it the instability is not
     judged. `causal`: Use causal filters, as in a measuring amplifier, instead of zero-phase
     filters.

@@ -27,6 +27,14 @@ ENOUGH = (
     f"at least {FINE_ENOUGH:g} samples per second (settings.output_rate=1000), or values low-pass "
     f"filtered by the run at {WIDE_ENOUGH:g} Hz or more (settings.outputs.low_pass)"
 )
+RUNNING = ("en14363", "uic518")
+NEEDED = {
+    **dict.fromkeys(RUNNING, ("Q", "Y", "wheelset_distance")),
+    "comfort": ("wheelset_distance",),
+    "wear": ("T_gamma", "xi_x"),
+    "safety": ("Q", "Y_over_Q", "wheelset_distance"),
+}
+"""Quantities by standard, beside accelerations or the motion of the bodies."""
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
 AMPLITUDE = 3e-3  # m, of the equivalent conicity
@@ -107,6 +115,11 @@ class Record:
         if missing:
             words = "is not in the result", f"run it with {output}"
             raise InputError(Fault(self.name, name, *words) for name in missing)
+
+    def need_quantities(self, standard: str) -> None:
+        """Refuse a result without the quantities of a standard."""
+        names = NEEDED[standard]
+        self.need(names, f"settings.outputs.quantities with {', '.join(names)}")
 
     @cached_property
     def alignment(self) -> Alignment:

@@ -15,7 +15,6 @@ from railsim.assessment.conditions import (
 )
 from railsim.assessment.criteria import CRITERIA, INFORMATION
 from railsim.assessment.en14363 import (
-    NEEDED,
     SectionValues,
     hunting_frequency,
     hunting_spectrum,
@@ -195,7 +194,7 @@ def _service(runs: Mapping[str, Result]) -> Service:
 
 def _sections(record: Record, limits: RunningLimits, service: Service) -> list[TestSection]:
     """Return the sections of a run; raises InputError where it lacks a quantity."""
-    record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
+    record.need_quantities(limits.standard)
     if "Q0" not in record.result:
         raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
     covered, track = record.covered(), record.result.track()

@@ -128,8 +128,7 @@ class SafetyReport:
 
 def safety_report(record: Record) -> SafetyReport:
     """Nadal, climb distance and overturning of a run with Q, Y_over_Q and positions."""
-    needed = ["Q", "Y_over_Q", "wheelset_distance"]
-    record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
+    record.need_quantities("safety")
     result = record.result
     track, wheels = result.track(), []
     flat = flatten(result.vehicle())

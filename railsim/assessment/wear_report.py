@@ -52,7 +52,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
     `law`: Only this law of `LAWS`, or that of a file, which needs `contact_patches`; by default
     all.
     """
-    record.need(["T_gamma", "xi_x"], "settings.outputs.quantities with T_gamma, xi_x")
+    record.need_quantities("wear")
     model = wear.WholeLifeRailModel()
     flat = flatten(record.result.vehicle())
     radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])

@@ -51,7 +51,8 @@ def command(
       railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
     """
     from railsim.assessment import assess
-    from railsim.assessment.assess import RUNNING, check_options
+    from railsim.assessment.assess import check_options
+    from railsim.assessment.record import RUNNING
     from railsim.assessment.running import OF_LIMITS, by_vehicle
     from railsim.assessment.tables import assessment_lines
     from railsim.cli.gathered import opened

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from railsim.assessment import Assessment, assess
-from railsim.assessment.assess import RUNNING
 from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.influences import RADIUS
+from railsim.assessment.record import RUNNING
 from railsim.assessment.running import by_vehicle
 from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row

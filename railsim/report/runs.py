@@ -13,8 +13,8 @@ from typing import Any
 
 from markupsafe import Markup
 
-from railsim.assessment.assess import RUNNING
 from railsim.assessment.assessment import Assessment
+from railsim.assessment.record import RUNNING
 from railsim.assessment.tables import tables
 from railsim.errors import listed
 from railsim.notation import QUANTITIES

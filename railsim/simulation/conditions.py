@@ -3,17 +3,24 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions.elements.rows import Act, Link, Mount
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.definitions.vehicle.flatten import flatten
+from railsim.errors import Fault, Faults, InputError, argument_fault, nearest
+from railsim.model.assembly import check_fixed
+from railsim.notation import QUANTITIES
 from railsim.result import Result
+from railsim.simulation.sampling import sampled
+from railsim.simulation.step_choice import WRITTEN, output_interval
 from railsim.text import shortened
 from railsim.units import speed_in_si
 
@@ -132,6 +139,47 @@ def check_range(
         )
     if faults:
         raise InputError(faults)
+
+
+def check_agreement(
+    vehicle: Vehicle, track: Track, settings: Settings, speed: float, called: str = ""
+) -> None:
+    """Check what can be known of a vehicle, its track and its settings before a model is made.
+
+    `called`: the vehicle in messages; by default by its name. Raises InputError: the settings name
+    bodies, elements or quantities that are not there, or give a step between two outputs; bodies
+    that cannot be fixed on this track.
+    """
+    flat, faults = flatten(vehicle), Faults()
+    with faults.caught():
+        check_fixed(flat, track, settings.drive.mode)
+    there, outputs = f" in vehicle '{called or vehicle.name}'", settings.outputs
+    bodies = [body.name for body in flat.bodies]
+    for name in settings.initial:
+        if name not in bodies:
+            key, found = f"initial.{name}", f"no such body{there}"
+            faults.append(Fault("settings", key, found, nearest(name, bodies)))
+    recorded = [
+        element.name
+        for element in (flat.elements if outputs.elements else ())
+        if any(isinstance(row, Link | Mount | Act) for row in element.definition.rows())
+    ]
+    for word, patterns, names, where in (
+        ("element", outputs.elements, recorded, there),
+        ("quantity", outputs.quantities, [*QUANTITIES], ""),
+    ):
+        for pattern in patterns:
+            if not any(fnmatchcase(name, pattern) for name in names):
+                key = "outputs.elements" if where else "outputs.quantities"
+                found = f"no {word} is called '{pattern}'{where}"
+                faults.append(Fault("settings", key, found, nearest(pattern, names)))
+    interval = output_interval(sampled(settings), speed)
+    if settings.step is not None and settings.drive.mode == "constant":
+        count = max(1, round(interval / settings.step))
+        if abs(count * settings.step - interval) > WRITTEN * interval:
+            allowed = f"an integer fraction of the output interval {interval:g} s"
+            faults.append(Fault("settings", "step", f"found {settings.step:g} s", allowed))
+    faults.check()
 
 
 def state_before(

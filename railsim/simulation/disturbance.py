@@ -4,7 +4,6 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.settings import InitialState, Settings
-from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
@@ -36,21 +35,9 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
     settings : Settings
     state : float64[n_state]
         Changed in place.
-
-    Raises
-    ------
-    InputError
-        There is no such body.
     """
     if not settings.initial:
         return ()
-    faults = [
-        Fault("settings", f"initial.{name}", "no such body", nearest(name, model.index.bodies))
-        for name in settings.initial
-        if name not in model.index.bodies
-    ]
-    if faults:
-        raise InputError(faults)
     before = _wheel_loads(model, state)
     for name, change in settings.initial.items():
         _add(model, name, change, state)

@@ -1,7 +1,6 @@
 """From raw records of the time loop to the quantities of a result (see `railsim.notation`)."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -9,7 +8,6 @@ from railsim.arrays import Floats
 from railsim.definitions.settings import Outputs, Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import contact_columns as patch
 from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
@@ -225,11 +223,6 @@ class OutputPlan:
     ----------
     irregularity : callable, optional
         Displacements of the rails over the arc length, see `railsim.track.irregularity`.
-
-    Raises
-    ------
-    InputError
-        The settings name an element that the vehicle does not have, or no quantity.
     """
 
     def __init__(self, model: Model, settings: Settings, track: Track, vehicle: Vehicle) -> None:
@@ -249,7 +242,7 @@ class OutputPlan:
             )
             for index, name in enumerate(names)
         }
-        self.elements = _matching("element", "elements", self._asked.elements, list(known))
+        self.elements = tuple(name for name in known if matches(name, self._asked.elements))
         # torques of actuators about axles are recorded beyond the elements that are asked for
         on_axles = np.flatnonzero(model.system.actuators.which[:, ACTION] == AXLE)
         self._on_axles = on_axles if self._asked.drives else on_axles[:0]
@@ -263,8 +256,8 @@ class OutputPlan:
         every, patterns = self._known(), self._asked.quantities
         if not patterns:
             return every
-        asked = {*NEEDED, *_matching("quantity", "quantities", patterns, list(QUANTITIES))}
-        return tuple(q for q in every if q.name in asked or q.name not in QUANTITIES)
+        asked = (*NEEDED, *patterns)
+        return tuple(q for q in every if matches(q.name, asked) or q.name not in QUANTITIES)
 
     def _known(self) -> tuple[Quantity, ...]:
         more = requested(self._asked, self._track_file)
@@ -358,25 +351,6 @@ class OutputPlan:
             "rail_lateral": np.stack((rails[0], rails[2]), axis=-1),
             "rail_vertical": np.stack((rails[1], rails[3]), axis=-1),
         }
-
-
-def _matching(
-    word: str, key: str, patterns: Sequence[str], names: Sequence[str]
-) -> tuple[str, ...]:
-    """Names that match one of the patterns of a key of the outputs."""
-    faults = [
-        Fault(
-            "settings",
-            f"outputs.{key}",
-            f"no {word} is called '{pattern}'",
-            nearest(pattern, names),
-        )
-        for pattern in patterns
-        if not any(fnmatchcase(name, pattern) for name in names)
-    ]
-    if faults:
-        raise InputError(faults)
-    return tuple(name for name in names if matches(name, patterns))
 
 
 def _elements(raw: Floats) -> dict[str, Floats]:

@@ -15,7 +15,7 @@ from railsim.kernels.controllers import START
 from railsim.kernels.state import TIME
 from railsim.model.assembly import SharedTables, assemble
 from railsim.model.control import periods, with_control
-from railsim.model.equilibrium import stored_equilibrium
+from railsim.model.equilibrium import Equilibrium, stored_equilibrium
 from railsim.model.plausibility import gauge_remarks, vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
@@ -23,7 +23,7 @@ from railsim.result import Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.simulation.advance import Preparation, Run
 from railsim.simulation.auxiliary_track import Progress as SettlingProgress
-from railsim.simulation.conditions import Inputs, TakenUp
+from railsim.simulation.conditions import Inputs, TakenUp, check_agreement
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.first_start import compiled_beside
 from railsim.simulation.outputs import OutputPlan, run_extremes
@@ -54,20 +54,8 @@ def prepare(
     on_run_in: SettlingProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
-    with compiled_beside():
-        model = assemble(vehicle, track, settings, profiles, shared)
-    inputs = inputs_hash(vehicle, track, settings, model)
-    balance = stored_equilibrium(model, speed, inputs)
+    balance, steps = _balanced(vehicle, track, settings, speed, profiles, shared, on_judgement)
     model = balance.model
-    steps = StepChoice(
-        model,
-        sampled(settings),
-        track,
-        {speed: balance.state},
-        inputs,
-        on_judgement,
-        periods(vehicle),
-    )
     step, _ = steps.at(speed)
     unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
@@ -104,6 +92,30 @@ def prepare(
     return replace(prepared, evaluation=_evaluation(prepared, settings))
 
 
+def _balanced(
+    vehicle: Vehicle,
+    track: Track,
+    settings: Settings,
+    speed: float,
+    profiles: Mapping[str, Profile] | None = None,
+    shared: SharedTables | None = None,
+    on_judgement: SettlingProgress | None = None,
+) -> tuple[Equilibrium, StepChoice]:
+    """Return the model in its equilibrium, and what chooses its steps."""
+    with compiled_beside():
+        model = assemble(vehicle, track, settings, profiles, shared)
+    inputs = inputs_hash(vehicle, track, settings, model)
+    balance = stored_equilibrium(model, speed, inputs)
+    known = {speed: balance.state}
+    how = sampled(settings), track, known, inputs, on_judgement, periods(vehicle)
+    return balance, StepChoice(balance.model, *how)
+
+
+def check_step(vehicle: Vehicle, track: Track, settings: Settings, speed: float) -> None:
+    """Raise InputError: the step of the settings is not stable; or ModelError, as `simulate`."""
+    _balanced(vehicle, track, settings, speed)[1].at(speed)
+
+
 def _evaluation(prepared: Preparation, settings: Settings) -> float:
     """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
     begin = float(prepared.state[TIME])
@@ -135,6 +147,7 @@ def begin(
     """Prepare a run and tell its sink what will come."""
     began = time.perf_counter()
     settings = inputs.settings
+    check_agreement(vehicle, inputs.track, settings, inputs.speed)
     prepared = prepare(
         vehicle,
         inputs.track,

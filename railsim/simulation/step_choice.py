@@ -115,20 +115,8 @@ class StepChoice:
             inputs = f"{self._digest(self._model)} {speed!r} {interval!r}"
             step = solution("step", inputs, lambda: {"step": self._stable(speed, interval)})
             return float(step["step"])
-        if not self.varies:
-            count = max(1, round(interval / requested))
-            if abs(count * requested - interval) > WRITTEN * interval:
-                raise InputError(
-                    [
-                        Fault(
-                            "settings",
-                            "step",
-                            f"found {requested:g} s",
-                            f"an integer fraction of the output interval {interval:g} s",
-                        )
-                    ]
-                )
-            requested = interval / count
+        if not self.varies:  # as written, perhaps with few digits
+            requested = interval / max(1, round(interval / requested))
         if self._stability(self._model, speed, self._states.get(speed)).holds(requested):
             return requested
         stable = self._stable(speed, interval)  # taken where none is given

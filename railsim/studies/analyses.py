@@ -83,6 +83,7 @@ def _check(analysis: Analysis) -> None:
 def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Outcome:
     """Largest share of each limit; values of comfort, wear and safety."""
     from railsim.assessment import assess
+    from railsim.assessment.outputs import coarse_remarks
 
     assert result is not None  # a case with this analysis has a run
     (found,) = assess(result, analysis.standard, limits=analysis.limits, coarse=True)
@@ -96,7 +97,8 @@ def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Ou
         numbers["largest_share"] = max(shares.values())
     if found.verdict:
         numbers["exceeded"] = float(found.exceeded)
-    return {**numbers, **_largest(found.record(), analysis.standard)}, ()
+    said = coarse_remarks(case.settings, case.speed)
+    return {**numbers, **_largest(found.record(), analysis.standard)}, said
 
 
 def _largest(record: Mapping[str, Any], standard: str) -> Numbers:

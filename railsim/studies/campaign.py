@@ -17,10 +17,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from railsim.assessment import Assessment, assess
-from railsim.assessment.assess import RUNNING
 from railsim.assessment.conditions import SHARE
-from railsim.assessment.en14363 import NEEDED
-from railsim.assessment.record import ENOUGH, START, coarseness
+from railsim.assessment.outputs import check_outputs
+from railsim.assessment.record import START
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality
 from railsim.cant import curve_speed
@@ -38,7 +37,6 @@ from railsim.processes import available_cores
 from railsim.profiles import load_profile
 from railsim.result import Result, open_result
 from railsim.result.sensors import sensors
-from railsim.result.sinks import matches
 from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, Loader, load_case, short_name
 from railsim.studies.plan import ROUGH_DURATION, check_number, faults_of_file
@@ -92,7 +90,7 @@ def campaign(
         with faults.caught():
             cases = scenario_cases(plan, names, assignments)
         with faults.caught():
-            _check_outputs(cases if plan.standard in RUNNING else ())
+            _check_outputs(cases, plan.standard)
         Faults(dict.fromkeys(faults)).check()
     spec = StudySpec(
         folder=os.path.relpath(Path.cwd(), folder),
@@ -114,18 +112,18 @@ def campaign(
     return Campaign(folder, tuple(assessments), results, outcome.computed)
 
 
-def _check_outputs(cases: Iterable[Case]) -> None:
-    """Raise InputError: what an assessment of running behaviour would refuse in the settings."""
+def _check_outputs(cases: Sequence[Case], standard: str) -> None:
+    """Raise InputError: what the assessment would refuse, in settings by assignments alone."""
     faults = Faults()
-    for settings in (case.settings for case in cases):
-        coarse, _ = coarseness(settings, settings.output_rate)
-        kept = settings.outputs.quantities or ("*",)
-        if lacking := [name for name in NEEDED if not matches(name, kept)]:
-            found, allowed = f"without {', '.join(lacking)}", f"with {', '.join(NEEDED)}"
-            faults.append(Fault("settings", "outputs.quantities", found, allowed))
-        if coarse and settings.output_spacing is None:
-            faults.append(Fault("settings", "outputs", coarse, ENOUGH))
-    faults.check()
+    for case in cases:
+        with faults.caught():
+            check_outputs(case.vehicle, case.settings, case.speed, standard)
+    Faults(
+        replace(one, file="assignments", key=f"settings.{one.key}", option="--set")
+        if one.file == "settings"
+        else one
+        for one in faults
+    ).check()
 
 
 def scenario_cases(

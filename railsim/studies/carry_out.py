@@ -13,8 +13,16 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, argument_error, argument_fault, listed
-from railsim.files.access import is_file, make_folder, sweep
+from railsim.errors import (
+    Fault,
+    Faults,
+    InputError,
+    ModelError,
+    argument_error,
+    argument_fault,
+    listed,
+)
+from railsim.files.access import check_folder, is_file, make_folder, sweep
 from railsim.laws.permission import check_laws
 from railsim.notation import QUANTITIES
 from railsim.processes import available_cores
@@ -23,6 +31,7 @@ from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import Storage
 from railsim.result.sinks import matches
 from railsim.simulation.outputs import requested
+from railsim.simulation.preparation import check_step
 from railsim.studies import execute
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Journal, Records
@@ -33,6 +42,7 @@ from railsim.studies.spec import Execution, RunSpec, StudySpec, kept_quantities
 from railsim.studies.summary import finished_record, read_index, waiting_record, write_index
 
 _LOG = logging.getLogger(__name__)
+FILES = (JOURNAL, "study.json", "summary.csv")
 MANY = 10_000  # number of runs from which an index that is up to date is not written again
 # errors after which no other run could be written either
 NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
@@ -66,6 +76,7 @@ def carry_out(
     a folder of another study; as `State`.
     """
     inputs, keep = spec.stored(), kept_quantities(spec.keep)
+    check_folder(folder, FILES, overwrite=True)
     remark = execution.on_remark or _LOG.warning
     with ExitStack() as stack:
         known = None
@@ -231,6 +242,7 @@ class State:
             for definition in (case.vehicle, case.track, case.settings)
             for law in (definition.laws or {}).items()
         )
+        _check_steps([case for case in self.cases if case.file_name])
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""
@@ -313,6 +325,31 @@ class State:
         names = [point.name for point in self._points]
         found = [journal.entries.get(name) or waiting_record(waiting[name]) for name in names]
         return Records(journal.path, found)
+
+
+def _check_steps(cases: Sequence[Case]) -> None:
+    """Raise InputError: a given step that is too long for a vehicle at its highest speed.
+
+    Other runs with that step may fail, but few do: whether it is stable takes a second to find out.
+    """
+    longest: dict[tuple[object, ...], Case] = {}
+    for case in cases:
+        if case.settings.step is not None:
+            key = case.labels.get("vehicle"), case.settings.scheme, case.settings.step
+            if key not in longest or case.speed > longest[key].speed:
+                longest[key] = case
+    faults, stable = Faults(), set[tuple[object, ...]]()
+    for (*of, _), case in sorted(longest.items(), key=lambda one: -(one[1].settings.step or 0.0)):
+        if tuple(of) in stable:
+            continue  # with a longer step
+        try:
+            check_step(case.vehicle, case.track, case.settings, case.speed)
+            stable.add(tuple(of))
+        except ModelError:
+            continue  # the outcome of the run
+        except InputError as error:
+            faults += [replace(one, key=f"{case.name}, settings.{one.key}") for one in error.faults]
+    Faults(replace(one, file="study") for one in faults).check()
 
 
 def _moved_aside(path: Path) -> Path:

@@ -11,14 +11,14 @@ from typing import Any
 
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.study.analyses import Analysis, needs_run, needs_speed
+from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run, needs_speed
 from railsim.errors import Fault, Faults, InputError
 from railsim.files.key_paths import AXES
 from railsim.files.overrides import split_overrides
 from railsim.files.sources import OVERRIDE
 from railsim.profiles import load_profile
 from railsim.profiles.used import profile_faults, used_profiles
-from railsim.simulation.conditions import check_range, initial_speed
+from railsim.simulation.conditions import check_agreement, check_range, initial_speed
 from railsim.studies.spec import RunSpec
 from railsim.version import __version__
 
@@ -168,8 +168,37 @@ class Loader:
                 check_range(track, speed, run.start, run.duration, run.until)
         if not (vehicle and track and settings) or speed is None:
             return None
+        if needs_run(self._analyses) and speed > 0.0:
+            self.faults += self._disagreements(vehicle, track, settings, speed, run)
         inputs = vehicle, track, settings, speed, run.start, run.duration, run.until
         return Case(name, *inputs, labels, self._analyses)
+
+    def _disagreements(
+        self, vehicle: Vehicle, track: Track, settings: Settings, speed: float, run: RunSpec
+    ) -> list[Fault]:
+        """Return in what settings do not fit the vehicle, the track or an assessment of the run."""
+        found = Faults()
+        with found.caught():
+            check_agreement(vehicle, track, settings, speed, short_name(run.vehicle))
+        for name, analysis in self._analyses.items():
+            if isinstance(analysis, AssessAnalysis):
+                from railsim.assessment.outputs import check_outputs
+
+                own = Faults()
+                with own.caught():
+                    check_outputs(vehicle, settings, speed, analysis.standard, coarse=True)
+                found += [replace(one, found=f"{one.found}, for analyses.{name}") for one in own]
+        return [self._of_settings(fault, run) for fault in found]
+
+    def _of_settings(self, fault: Fault, run: RunSpec) -> Fault:
+        """Return a fault of the settings with the file or the assignment that gives them."""
+        if fault.file != "settings":
+            return fault
+        key = f"settings.{fault.key}"
+        given = (text.partition("=")[0].strip() for text in run.assignments)
+        if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in given):
+            return self._as_written(replace(fault, file=OVERRIDE), "settings")
+        return fault if run.settings is None else replace(fault, file=str(run.settings))
 
 
 def load_case(run: RunSpec) -> Case:

@@ -227,7 +227,10 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
             ["--set", 'settings.outputs.elements=["nothing*"]'],
             "outputs.elements: no element is called 'nothing*'",
         ),
-        (["--set", "settings.initial.carbdy.y=0.1"], "initial.carbdy: no such body; did you mean"),
+        (
+            ["--set", "settings.initial.carbdy.y=0.1"],
+            "no such body in vehicle 'coach_manchester'; did you mean",
+        ),
         (["--set", "settings.drive.mode=fast"], "drive.mode: 'fast'; must be 'constant'"),
         (
             ["--set", "settings.step=0.0007"],

@@ -307,7 +307,7 @@ def test_small_campaign_ends_in_its_assessment_and_is_not_done_twice(tmp_path, c
     ("change", "words"),
     [
         ('settings.outputs.quantities=["Q"]', "outputs.quantities: without Y, wheelset_distance;"),
-        ("settings.outputs={}", "outputs: 200 samples per second; at least 1000"),
+        ("settings.outputs={}", "output_rate: 200 samples per second; at least 1000"),
     ],
 )
 def test_outputs_that_cannot_be_assessed_are_refused_before_any_run(
@@ -317,7 +317,7 @@ def test_outputs_that_cannot_be_assessed_are_refused_before_any_run(
     (tmp_path / "small.toml").write_text(SMALL)
     given = ["study", "--scenario", str(tmp_path / "small.toml"), "--vehicles", "coach_manchester"]
     assert main([*given, "--out", str(tmp_path / "out"), "--set", change]) == 2
-    assert f"settings: {words}" in capsys.readouterr().err
+    assert f"--set: settings.{words}" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
@@ -340,6 +340,7 @@ def test_wrong_campaigns_are_refused(tmp_path, capsys):
 TWO = """format = "railsim-scenario/1"
 name = "two"
 standard = "wear"
+assignments = ["settings.output_rate=1000"]
 [grid]
 "track.name" = ["../../outside", "b c"]
 [parts.one]

@@ -12,10 +12,12 @@ from test_study import CURVE, arguments, index, rows
 from test_study import simulated as simulated
 
 import railsim
+from railsim.assessment.outputs import check_outputs, coarse_remarks
 from railsim.cli import main
+from railsim.definitions import Settings
 from railsim.definitions.loading import load_study, load_track, load_vehicle
 from railsim.definitions.study.definition import Sample, Spread
-from railsim.errors import InputError
+from railsim.errors import InputError, input_error
 from railsim.studies import user_function
 from railsim.studies.plan import Plan
 from railsim.studies.rows import made_rows, quantile, sampled
@@ -417,3 +419,84 @@ def test_too_many_runs_are_refused_with_the_time_that_they_would_take(given, wor
     )
     with pytest.raises(InputError, match=f"250,000 runs, {words}"):
         Plan(spec, workers)
+
+
+NO_QUANTITY = """[grid]\n"settings.outputs.quantities" = ["['Q']", "['QQ']"]\n"""
+
+
+def judged(standard, assignment):
+    analysis = f'[analyses.a]\nkind = "assess"\nstandard = "{standard}"\n'
+    return f'assignments = ["settings.{assignment}"]\n{analysis}'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('assignments = ["settings.step=0.0007"]', "step: found 0.0007 s; an integer fraction of"),
+        ('assignments = ["settings.initial.carbdy.y=0.1"]',
+         f"initial.carbdy: no such body in vehicle '{COACH}'; did you mean 'carbody'?"),
+        (NO_QUANTITY, "outputs.quantities: no quantity is called 'QQ'; did you mean 'Q'?"),
+        (judged("en14363", "outputs.quantities=['Y']"),
+         "outputs.quantities: without Q, wheelset_distance, for analyses.a; with Q, Y,"),
+        (judged("en14363", "output_rate=99"),
+         "output_rate: 99 samples per second, for analyses.a; at least 100"),
+        (judged("en14363", "outputs.low_pass={frequency=30}"),
+         "outputs.low_pass.frequency: low-pass filtered at 30 Hz by the run, for analyses.a; 40"),
+        (judged("comfort", "outputs.quantities=['wheelset_distance', 'body_position']"),
+         "outputs.quantities: without body_velocity, body_acceleration, for analyses.a; with"),
+        (judged("wear", "outputs.quantities=['xi_x']"), "outputs.quantities: without T_gamma, for"),
+        (judged("safety", "outputs.quantities=['Q*']"), "quantities: without Y_over_Q, wheelset_"),
+    ],
+)  # fmt: skip
+def test_what_every_run_would_refuse_is_refused_before_the_first(tmp_path, capsys, text, words):
+    file = written(tmp_path, f"speeds = [20.0]\nuntil = 20.0\n{text}")
+    assert main(["study", file, "--out", str(tmp_path / "s"), "--quiet"]) == 2
+    err = capsys.readouterr().err
+    assert "mine.toml: settings." in err
+    assert words in err
+    assert not (tmp_path / "s").exists()
+
+
+def test_the_vehicle_without_an_element_is_named_and_the_file_that_asks_for_it(tmp_path, capsys):
+    settings = tmp_path / "bars.toml"
+    settings.write_text(
+        'format = "railsim-settings/1"\n[outputs]\nelements = ["front.anti_roll_bar"]\n'
+    )
+    vehicles = ["--vehicles", COACH, "wagon_y25", "--tracks", CURVE, "--speeds", "20"]
+    given = ["study", *vehicles, "--settings", str(settings), "--out", str(tmp_path / "s")]
+    assert main(given) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    words = "no element is called 'front.anti_roll_bar' in vehicle 'wagon_y25'"
+    assert line.startswith(f"{settings}: outputs.elements: {words}")
+    assert not (tmp_path / "s").exists()
+
+
+def test_coarse_samples_of_an_assessment_in_a_study_are_told():
+    """40 Hz, twice the corner of EN 14363, with room for the filter: 100 samples per second."""
+    settings = Settings(output_rate=100.0)
+    check_outputs(load_vehicle(COACH), settings, 20.0, "en14363", coarse=True)
+    assert coarse_remarks(settings, 20.0)[0].startswith("100 samples per second: too few")
+    assert coarse_remarks(settings.replace(output_spacing=0.02), 20.0) == ()  # 1000 per second
+
+
+def test_only_the_longest_steps_are_tried_before_a_study_and_at_the_highest_speed(
+    tmp_path, simulated, monkeypatch, capsys
+):
+    tried = []
+
+    def check_step(vehicle, track, settings, speed):
+        tried.append((settings.step, speed))
+        if settings.step > 2e-3:
+            raise input_error("settings", f"found {settings.step} s", "at most 0.002 s", "step")
+
+    monkeypatch.setattr("railsim.studies.carry_out.check_step", check_step)
+    steps = '[grid]\n"settings.step" = [0.0005, 0.005, 0.00125, 0.0025]\n'
+    file = written(tmp_path, f"speeds = [20.0, 30.0]\nuntil = 20.0\n{steps}")
+    assert main(["study", file, "--out", str(tmp_path / "s"), "--workers", "1"]) == 2
+    assert tried == [(0.005, 30.0), (0.0025, 30.0), (0.00125, 30.0)]
+    first, second = capsys.readouterr().err.splitlines()
+    assert f"{COACH}_" in first
+    assert "settings.step: found 0.005 s; at most 0.002 s" in first
+    assert "settings.step: found 0.0025 s" in second
+    assert simulated == []
+    assert not (tmp_path / "s").exists()
