@@ -49,7 +49,7 @@ def command(
     """
     from railsim.identification import identify
 
-    folder, quiet = output.reserve(*FILES), output.quiet or output.as_json
+    folder, quiet = output.reserve(*FILES, f"{KEPT}/"), output.quiet or output.as_json
     keys = [key.strip() for text in parameters for key in text.split(",") if key.strip()]
 
     def progress(count: int) -> None:

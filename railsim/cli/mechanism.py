@@ -63,7 +63,12 @@ def command(
     from railsim.processes import available_cores
 
     mechanisms = [load_mechanism(file, assignments) for file in files]
-    output.reserve(REPORT, *[OPTIMISED] * searched)
+    if output.out is not None:
+        from railsim.report.mechanisms import NAMES, Collected
+        from railsim.report.mechanisms import files as written
+
+        others = (f"drawing_{number}.png" for number in range(2, len(files) + 1))
+        output.reserve(*NAMES, *others, *[OPTIMISED] * searched)
     wanted = _wanted(at)
     optimum, results, at_values, cases = None, [], [], {}
     for file, mechanism in zip(files, mechanisms, strict=True):
@@ -81,9 +86,6 @@ def command(
                 cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
     if output.out is not None:
-        from railsim.report.mechanisms import Collected
-        from railsim.report.mechanisms import files as written
-
         content = written(Collected(results, cases, optimum))
         if optimum is not None:
             from railsim.mechanisms.optimised_file import optimised_text

@@ -55,13 +55,14 @@ def _spring_command(function: Callable[..., Answer]) -> Callable[..., None]:
     def called(file: str, assignments: Sequence[str], output: cli.Output, **how: Any) -> None:
         from railsim.definitions.loading import load_spring
 
-        output.reserve(REPORT)
+        if output.folder:
+            from railsim.report.springs import NAMES, files
+
+            output.reserve(*NAMES)
         suspension = load_spring(file, assignments)
         with cli.faults_in(file, "spring", suspension.name):
             data, parts, found = function(suspension, **how)
             if output.folder:
-                from railsim.report.springs import files
-
                 output.write_all(files(suspension, found))
         output.answer(data, parts, suspension.unusual())
 

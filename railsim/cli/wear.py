@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from railsim.cli import common as cli
+from railsim.notation import SIDES
 
 if TYPE_CHECKING:
     from railsim.definitions import Track
@@ -137,12 +138,13 @@ class Worn(NamedTuple):
     unit: str
     scale: float  # of the unit, to SI
     note: str  # what is averaged, and where y begins
+    sides: tuple[str, ...]  # names of its profiles
 
 
 OF_WHEELS = "mean of all wheels; y from the nominal rolling circle, negative towards the flange"
 OF_RAILS = "both rails; y from the middle of the rail, negative towards the gauge side"
-WHEELS = Worn("distance", "km", 1e3, OF_WHEELS)
-RAILS = Worn("tonnage", "Mt", 1e9, OF_RAILS)
+WHEELS = Worn("distance", "km", 1e3, OF_WHEELS, ("wheel",))
+RAILS = Worn("tonnage", "Mt", 1e9, OF_RAILS, SIDES)
 
 
 def _carry_out(
@@ -167,7 +169,8 @@ def _carry_out(
 
     steps = _number_of_steps(of, distance, step)
     amounts = [of.scale * step * (number + 1) for number in range(steps)]
-    folder = output.reserve(RECORD, PICTURE, *(_file_name(of, at) for at in amounts))
+    profiles = [_file_name(of, at, side) for at in amounts for side in of.sides]
+    folder = output.reserve(RECORD, PICTURE, *profiles, f"{STEPS}/")
     found: list[WearStep] = []
     remarks: list[str] = []
 
@@ -213,7 +216,7 @@ def _carry_out(
         raise ended
 
 
-def _file_name(of: Worn, amount: float, side: str = "wheel") -> str:
+def _file_name(of: Worn, amount: float, side: str) -> str:
     return f"{side}_{amount / of.scale:g}_{of.unit}.csv"
 
 

@@ -70,9 +70,11 @@ def check_file(
 def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = False) -> None:
     """Refuse a folder for output, which need not exist, and in which `names` will be written.
 
-    Raises InputError: it is a file or called like one, cannot be written to, or holds one of
-    `names` and not `overwrite`.
+    Of `names` those that end in a slash are folders, whose content stays. Raises InputError: it is
+    a file or called like one, cannot be written to, holds a folder where a file is to be written or
+    the reverse, or one of `names` and not `overwrite`.
     """
+    names = tuple(names)
     found, allowed = _invalid_name(folder), "choose another name"
     if found:
         pass
@@ -82,9 +84,18 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
         found, allowed = f"{folder.name} is the name of a file", "give the name of a folder"
     elif found := _unwritable(folder):
         allowed = "choose another folder"
-    elif not overwrite and (there := [name for name in names if (folder / name).exists()]):
+    elif unlike := [name for name in names if _is_other_kind(folder / name, name)]:
+        found = f"{folder / unlike[0]} is a {'file' if unlike[0].endswith('/') else 'folder'}"
+        allowed = "rename it, or choose another folder"
+    elif not overwrite and (
+        there := [n for n in names if not n.endswith("/") and (folder / n).exists()]
+    ):
         found, allowed = f"{folder} holds {', '.join(there)}", "give `overwrite` or another folder"
     _refuse(found, allowed, parameter="out")
+
+
+def _is_other_kind(path: Path, name: str) -> bool:
+    return path.exists() and path.is_dir() != name.endswith("/")
 
 
 def write_folder(

@@ -88,6 +88,8 @@ CAPTIONS = {
     "comparison_zone": "The same within the zone; below, the differences from the first.",
     "search": "Objective at the end of the search from each starting point.",
 }  # fmt: skip
+NAMES = (REPORT, "animation.gif", "positions.csv", "motion.csv", *(f"{n}.png" for n in CAPTIONS))
+"""Of all files that there can be of one mechanism."""
 
 
 def files(collected: Collected) -> dict[str, bytes]:

@@ -67,6 +67,9 @@ CAPTIONS = {
     "search": "Mass and fatigue margin of the nests; the numbers are the ranks of the table.",
 }
 
+NAMES = (REPORT, *(f"{name}.png" for name in CAPTIONS))
+"""Of all files that there can be."""
+
 
 @dataclass(frozen=True)
 class Collected:

@@ -24,6 +24,7 @@ from railsim.files import sources
 from railsim.files.access import check_folder, is_file, make_folder, read_text, write_text
 from railsim.files.overrides import apply_overrides, split_overrides
 from railsim.processes import available_cores
+from railsim.studies.carry_out import FILES
 from railsim.studies.designs import (
     INPUTS,
     Design,
@@ -46,6 +47,7 @@ from railsim.text import plain
 
 NEAR_BOUND = 0.01  # tolerance, as a share of a range or a limit, within which it counts as reached
 INPUT_BYTES = 1_000_000
+BESIDE = ("optimise.json", "designs.csv", "front.png")
 
 
 @dataclass(frozen=True)
@@ -183,10 +185,10 @@ def optimise(
         overwrite=overwrite,
         progress=progress,
         on_remark=on_remark,
-        beside=("optimise.json", "designs.csv", "front.png"),
+        beside=BESIDE,
     )
     folder = Path(out)
-    check_folder(folder)
+    check_folder(folder, (*FILES, *BESIDE, INPUTS), overwrite=True)
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)
     evaluation = Evaluation(definition, wanted, folder, execution)
     sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)

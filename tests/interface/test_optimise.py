@@ -215,7 +215,7 @@ def test_what_comes_last_is_looked_at_first(tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "o").exists()
     (tmp_path / "o" / "front.png").mkdir(parents=True)
     assert main(command) == 2
-    assert "front.png: is not of a study; choose another --out" in capsys.readouterr().err
+    assert "front.png is a folder; rename it, or choose another folder" in capsys.readouterr().err
 
 
 def test_labels_that_no_run_has_are_found_before_any(tmp_path, capsys):

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from example_result import example_result
+from example_result import ROOT, example_result
 
 from railsim.cli import main
 from railsim.errors import InputError
@@ -88,6 +88,54 @@ def test_full_folder_is_kept_without_overwrite(tmp_path, inputs, capsys, command
 def test_bad_input_leaves_no_folder(tmp_path, given):
     assert main([*given, "--out", str(tmp_path / "new")]) == 2
     assert not (tmp_path / "new").exists()
+
+
+ROUTE = ["--route", "curve_r250", "20", "1", "--distance", "10", "--step", "10"]
+TRAFFIC = ["--traffic", "coach_manchester", "20", "1", "--tonnage", "1", "--step", "1"]
+OF_STUDY = ["--vehicles", "coach_manchester", "--tracks", "curve_r250", "--speeds", "20"]
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "work"),
+    [
+        (["spring", "design", "turasas_axlebox", "--search"], "arm.png", "springs.search.search"),
+        (["mechanism", "atr95_lift_4", "--optimise"], "kinematics.png",
+         "mechanisms.optimisation.optimise"),
+        (["wear", "coach_manchester", *ROUTE], "wheel_10_km.csv", "studies.wear_loop.carry_out"),
+        (["rail-wear", "curve_r500", *TRAFFIC], "left_1_Mt.csv", "studies.rail_wear.carry_out"),
+    ],
+    ids=lambda given: " ".join(given[:2]) if isinstance(given, list) else given,
+)  # fmt: skip
+def test_any_file_that_is_there_is_told_before_the_work(
+    tmp_path, capsys, monkeypatch, command, name, work
+):
+    monkeypatch.setattr(f"railsim.{work}", None)
+    (tmp_path / name).write_text("mine")
+    assert main([*command, "--out", str(tmp_path)]) == 2
+    assert f"--out: {tmp_path} holds {name}; give --overwrite" in capsys.readouterr().err
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        (["wear", "coach_manchester", *ROUTE], "steps"),
+        (["identify", "coach_25t", "no_such.toml", "-p", "bodies.carbody.mass"], "evaluations"),
+        (["study", *OF_STUDY], "study.json/"),
+        (["optimise", "examples/primary_and_yaw_damper.toml"], "study.json/"),
+    ],
+    ids=lambda given: given[0] if isinstance(given, list) else given,
+)
+def test_file_in_place_of_a_folder_or_the_reverse_is_told_before_the_work(
+    tmp_path, capsys, monkeypatch, command, name
+):
+    monkeypatch.chdir(ROOT)
+    there = tmp_path / name
+    there.mkdir() if name.endswith("/") else there.touch()
+    assert main([*command, "--out", str(tmp_path), "--overwrite"]) == 2
+    kind = "folder" if name.endswith("/") else "file"
+    assert f"--out: {there} is a {kind}; rename it, or choose" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [there]
 
 
 @pytest.fixture
