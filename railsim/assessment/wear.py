@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.loading import load_wear_law
 from railsim.definitions.wear_law import ArchardMap, FrictionWork
-from railsim.errors import input_error
+from railsim.errors import argument_error
 
 YIELD_IN_SHEAR = 300e6  # yield stress in shear k of rail steel, default value [Pa]
 
@@ -111,7 +111,7 @@ def wear_law(name: str) -> WearLaw:
         return LAWS[name]
     if not name.endswith(".toml"):
         allowed = "one of " + ", ".join(LAWS) + ", or a file .toml"
-        raise input_error("wear", f"found '{name}'", allowed, "law")
+        raise argument_error("law", f"found '{name}'", allowed)
     file = load_wear_law(name)
     if file.archard is not None:
         law: Callable[[Patches], Floats] = partial(archard, law=file.archard)

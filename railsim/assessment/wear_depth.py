@@ -18,7 +18,7 @@ from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import inclined_to_track, tape_circle_position
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Wheelset
-from railsim.errors import Fault, Faults, input_error
+from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.profiles import Profile
 from railsim.profiles.profile import FLANGE_BACK
 from railsim.result import Result
@@ -192,7 +192,7 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     if most > DEEPEST:
         allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / most:.4g} km"
         found = f"{1e-3 * distance:g} km wear {1e3 * most:.3g} mm deep"
-        raise input_error("wear", found, allowed, "step")
+        raise argument_error("step", found, allowed)
     smooth = scattered(profile, worn)
     side, lost = upper_side(profile), np.zeros(len(profile.y))
     lost[side] = np.interp(profile.y[side], grid(), smooth, left=0.0, right=0.0)

@@ -101,6 +101,8 @@ def command(
         raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
     if gauges and len(gauges) == 1:
         raise click.UsageError("--gauges needs two gauges at least")
+    if overlay and not output.folder:
+        raise click.UsageError("--overlay goes with --out")
     compared = load_profile(overlay) if overlay else None
     further = CREEP * creep + MAP * bool(gauges) + (OVERLAY,) * bool(compared)
     output.reserve(*PICTURES, *TABLES, *further)

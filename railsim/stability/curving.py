@@ -49,6 +49,8 @@ from railsim.track.tables import track_tables
 Progress = Callable[[float], None]
 
 SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m
+# m, of the deficiency: 6.5 m/s2, in which vehicles overturn, so that millimetres are no metres
+LARGEST_DEFICIENCY = 1.0
 FAILED, NEWTON, TIME, MEAN = range(4)
 SETTLING = 60.0  # s, longest time integration of a point
 SAMPLED, SAMPLES = 20.0, 400  # s, over which means are taken, and number of instants
@@ -280,6 +282,8 @@ def check_grid(
         fine = math.isfinite(value) and all(low <= v <= high for v in speeds)
         found = f"found {value:g} m with a cant of {cant:g} m"
         allowed = f"a sum that gives speeds of {low:g} to {high:g} m/s"
+        if value > LARGEST_DEFICIENCY:
+            fine, allowed = False, f"{LARGEST_DEFICIENCY:g} m at most: 0.1 is 100 mm"
         faults.require(fine, "cant_deficiency", found, allowed)
     for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
         faults.require(len(values), name, "no value", "one at least")

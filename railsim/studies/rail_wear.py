@@ -52,7 +52,8 @@ def rail_wear(
         }
 
     needed: dict[str, Any] = {"outputs": ("contact_patches", "track"), "unit": "Mt", "scale": 1e-9}
-    return carry_out(Wearing(runs, new, sides, depths, **needed), Loop(**how))
+    wearing = Wearing(runs, new, sides, depths, given="traffic", **needed)
+    return carry_out(wearing, Loop(**how))
 
 
 def rail_rows(found: Sequence[WearStep]) -> dict[str, list[dict[str, float | None]]]:

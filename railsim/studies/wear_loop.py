@@ -25,7 +25,7 @@ from railsim.definitions.limits import WheelLimits
 from railsim.definitions.settings import InitialState
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import Fault, Faults, InputError, ModelError, RailsimError, input_error
+from railsim.errors import Faults, InputError, ModelError, RailsimError, input_error
 from railsim.linear.circle import circle
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
@@ -169,6 +169,7 @@ class Wearing:
     # worn profiles to the sentence why the loop ends; empty while it goes on
     ended: Callable[[Mapping[str, Profile]], str] = lambda _: ""
     outputs: Sequence[str] = ("contact_patches",)  # of the runs
+    given: str = "routes"  # parameter of its runs
     unit: str = "km"  # of distance or tonnage in messages
     scale: float = 1e-3  # its factor from SI
 
@@ -295,20 +296,22 @@ def _wheels(vehicle: Vehicle) -> set[str]:
 
 
 def _check(wearing: Wearing, how: Loop) -> None:
-    faults = Faults()
-    faults += [Fault("wear", "routes", "no route", "at least one")] * (not wearing.runs)
+    faults, what = Faults(), wearing.given
+    option = f"--{what.removesuffix('s')}"
+    faults.require(wearing.runs, what, "none", "at least one", option)
     low, high = SPEED_RANGE
     for run in wearing.runs:
-        if not low <= run.speed <= high:
-            found = f"found {run.speed:g} m/s for {run.track.name}"
-            faults.append(Fault("wear", "speed", found, f"{low:g} to {high:g} m/s"))
-        if not (run.share > 0.0 and math.isfinite(run.share)):
-            found = f"found {run.share:g} for {run.track.name}"
-            faults.append(Fault("wear", "share", found, "above 0"))
-    if not (how.step > 0.0 and math.isfinite(how.step)):
-        faults.append(Fault("wear", "step", f"found {wearing.amount(how.step)}", "above 0"))
-    if how.steps < 1:
-        faults.append(Fault("wear", "steps", f"found {how.steps}", "1 or more"))
+        on = f"for {run.vehicle.name} on {run.track.name}"
+        found, allowed = f"found {run.speed:g} m/s {on}", f"{low:g} to {high:g} m/s"
+        faults.require(low <= run.speed <= high, what, found, allowed, option)
+        right = run.share > 0.0 and math.isfinite(run.share)
+        found = f"found a share of {run.share:g} {on}"
+        faults.require(right, what, found, "above 0", option)
+    right = how.step > 0.0 and math.isfinite(how.step)
+    faults.require(right, "step", f"found {wearing.amount(how.step)}", "above 0")
+    with faults.caught():
+        wear_law(how.law)
+    faults.require(how.steps >= 1, "steps", f"found {how.steps}", "1 or more")
     faults.check()
 
 

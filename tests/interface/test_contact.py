@@ -200,6 +200,7 @@ def test_what_was_put_right_in_a_file_is_told(tmp_path, capsys):
         (["--inclination", "1"], "--inclination"),
         (["--back-to-back", "1360"], "--back-to-back"),
         (["--wheel", "none.csv"], "cannot be read"),
+        (["--overlay", "S1002"], "--overlay goes with --out"),
         (["--wheel", "S1002", "--wheel", "S1002", "--wheel", "S1002"], "given 3 times"),
     ],
 )

@@ -419,6 +419,14 @@ def test_steady_curving_in_time_has_neither_given_forces_nor_a_speed_profile(mon
     np.testing.assert_allclose(in_time.Y, found.Y, atol=50.0)
 
 
+def test_a_cant_deficiency_in_millimetres_is_refused(capsys):
+    """1 m is 6.5 m/s2, beyond what any vehicle stands upright in."""
+    given = ["curving", "coach_manchester", "--radius", "300", "--cant-deficiency", "0.1,100"]
+    assert main(given) == 2
+    words = "--cant-deficiency: found 100 m with a cant of 0.15 m; 1 m at most: 0.1 is 100 mm"
+    assert words in capsys.readouterr().err
+
+
 def test_a_map_tells_stable_points_from_those_unstable_throughout():
     """Both have no linear critical speed in the range."""
     points = [(None, False), ({"speed": 41.0}, False), (None, True)]

@@ -177,3 +177,12 @@ def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
     ]
     expected = [{"0.1 Mt": 0.1, "0.2 Mt": 0.2}, {"0.1 Mt": 0.02, "0.2 Mt": 0.05}]
     assert depths == [pytest.approx(one) for one in expected]
+
+
+def test_all_that_is_wrong_is_told_at_once_by_its_option(capsys):
+    given = ["wear", "coach_manchester", "--route", "curve_r250", "400", "-1", "--law", "none"]
+    assert main([*given, "--distance", "1", "--step", "1"]) == 2
+    speed, share, law = capsys.readouterr().err.splitlines()[1:]
+    assert speed.startswith("--route: found 400 m/s for Passenger coach")
+    assert share.startswith("--route: found a share of -1 for Passenger coach")
+    assert law.startswith("--law: found 'none'; one of pearce_sherratt")

@@ -75,7 +75,7 @@ def test_worn_rail_loses_the_area_and_nothing_below_its_head(place):
 
 def test_a_wrong_step_is_named_as_tonnage():
     mix = [Traffic(railsim.load_vehicle("coach_manchester"), 20.0, 1.0)]
-    with pytest.raises(railsim.InputError, match="wear: step: found -1 Mt; above 0"):
+    with pytest.raises(railsim.InputError, match="step: found -1 Mt; above 0"):
         rail_wear(curve(), mix, step=-1e9, steps=1)
 
 
