@@ -96,6 +96,11 @@ def assess(
     """
     if isinstance(results, Result):
         results = {str(results.attributes.get("run", "run")): results}
+    if not isinstance(results, Mapping) or not all(
+        isinstance(one, Result) for one in results.values()
+    ):
+        words = "give what railsim.open_result returns, or several by their names"
+        raise TypeError(f"the results are a {type(results).__name__}; {words}")
     if standard not in STANDARDS:
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
     check_options(

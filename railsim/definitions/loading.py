@@ -211,9 +211,14 @@ def load_any(path: str | Path, overrides: Iterable[str] = ()) -> FileDefinition:
     return loaded(model, sources.read_source(file, model.KIND, data), overrides)
 
 
-def check_types(vehicles: Sequence[object], *tracks: object) -> None:
-    """Raise TypeError where a name or a file is given instead of what it stands for."""
+def check_types(vehicles: Sequence[object], *tracks: object, settings: object = None) -> None:
+    """Raise TypeError where a name or a file is given instead of what it stands for.
+
+    `settings`: None, where there need not be any.
+    """
     wrong = [wrong_type("vehicle", one) for one in vehicles if not isinstance(one, Vehicle)]
     wrong += [wrong_type("track", one) for one in tracks if not isinstance(one, Track)]
+    if not isinstance(settings, Settings | None):
+        wrong.append(wrong_type("settings", settings))
     if wrong:
         raise TypeError(wrong[0])

@@ -144,6 +144,9 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     have no shipped files; `beside`: file that names it: relative paths count from its folder.
     Raises InputError: there is no such file.
     """
+    if not isinstance(name, str | os.PathLike):
+        found = f"a {type(name).__name__}"
+        raise TypeError(f"the file of the {kind} is {found}; give a path, or the name of one")
     folder = beside.parent if beside is not None else Path()
     candidates = [folder / name]
     if beside is not None:

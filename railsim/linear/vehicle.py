@@ -41,6 +41,7 @@ def smooth_law(settings: Settings | None) -> Settings:
     to a force is small, its slope jumps: the tangent critical speed of a coach on 10 x 10 cells by
     2 m/s from friction 0.44 to 0.48, on 100 x 100 by 0.2 m/s.
     """
+    check_types([], settings=settings)
     settings = settings or Settings()
     if not CREEP_LAWS[settings.creep_law].grid:
         return settings

@@ -136,7 +136,7 @@ def assemble(
     something else than a vehicle, a track, profiles by name. ModelError: the wheels do not fit on
     the rails.
     """
-    check_types([vehicle], track)
+    check_types([vehicle], track, settings=settings)
     flat = flatten(vehicle)
     given = _profiles_by_name(profiles)
     check_fixed(flat, track, settings.drive.mode)

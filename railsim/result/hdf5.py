@@ -36,7 +36,7 @@ from railsim.files.access import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result import sinks
-from railsim.result.attributes import Values
+from railsim.result.attributes import Values, check_attributes
 from railsim.result.contents import Contents, Dataset
 from railsim.result.data import Attributes, Result, frozen
 from railsim.result.integrity import seal
@@ -92,6 +92,7 @@ class Hdf5Sink(sinks.Sink):
         self.path = Path(path)
         self._storage = storage
         check_file(self.path, overwrite=overwrite, option=option)
+        check_attributes(attributes)
         self._attributes = dict(attributes)
         self._overwrite = overwrite
         self._quantities: dict[str, Quantity] = {}
@@ -225,6 +226,7 @@ def write(
     storage: Storage = PLAIN,
 ) -> Path:
     """Write a result to a file, or some of its quantities; see `Result.to_hdf5`."""
+    check_attributes(result.attributes)
     wanted = set(result if names is None else names)
     selected = {name: q for name, q in result.quantities.items() if name in wanted}
     with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:

@@ -95,7 +95,10 @@ class Simulation:
         resume: Result | Mapping[str, Floats] | Floats | None = None,
         allow_code: bool = False,
     ) -> None:
-        check_types([vehicle], track)
+        check_types([vehicle], track, settings=settings)
+        if sink is not None and not hasattr(sink, "begin"):
+            words = "; give a sink of railsim.result, or write the result by to_hdf5"
+            raise TypeError(f"the sink is a {type(sink).__name__}{words}")
         settings = settings or Settings()
         before = None if resume is None else state_before(vehicle, track, settings, resume)
         if before is not None:

@@ -105,7 +105,7 @@ def outcomes(
     profiles: Mapping[str, Profile] | None = None,
 ) -> list[Result | Exception]:
     """As `simulate_together`, but with the error instead of the result of a vehicle that fails."""
-    check_types(vehicles, track)
+    check_types(vehicles, track, settings=settings)
     if not vehicles or (sinks is not None and len(sinks) != len(vehicles)):
         count = "no vehicle" if not vehicles else f"{len(sinks or ())} for {len(vehicles)} vehicles"
         name = "sinks" if vehicles else "vehicles"

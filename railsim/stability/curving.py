@@ -20,7 +20,7 @@ import numpy as np
 from railsim.arrays import Floats, Integers
 from railsim.cant import curve_speed
 from railsim.definitions import Settings, Track, Vehicle
-from railsim.definitions.loading import load_track
+from railsim.definitions.loading import check_types, load_track
 from railsim.errors import Faults, ModelError
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
@@ -238,6 +238,7 @@ def curving(
     [[[1]], [[1]]]
     """
     track = track or load_track("straight")
+    check_types([vehicle], track, settings=settings)
     both = track.friction_at(0.0)
     radii, deficiencies = _several(radius), _several(cant_deficiency)
     mus = _several(friction) if friction is not None else [float(np.mean(both))]

@@ -160,12 +160,9 @@ class Execution:
 
     def __post_init__(self) -> None:
         """Raise InputError: numbers of processes or of runs in one call that are none."""
-        if self.together < 1:
-            raise argument_error("together", f"found {self.together}", "a whole number above 0")
-        if self.workers is not None and not (
-            isinstance(self.workers, Integral) and self.workers > 0
-        ):
-            raise argument_error("workers", f"found {self.workers!r}", "a whole number above 0")
+        for name, value in (("together", self.together), ("workers", self.workers)):
+            if not (value is None or (isinstance(value, Integral) and value > 0)):
+                raise argument_error(name, f"found {value!r}", "a whole number above 0")
         if self.workers is not None and self.scheduler is not None:
             allowed = "not with it: the runs are on its own workers"
             raise argument_error("workers", f"{self.workers} beside `scheduler`", allowed)

@@ -142,7 +142,7 @@ def study(
         "sample": sample,
         "quantities": full_name(quantities),
         "analyses": analyses or {},
-        "settings": None if settings is None else as_files(settings, folder)[0],
+        "settings": None if settings is None else as_files([settings], folder)[0],
         "start": start,
         "duration": duration,
         "until": until,
@@ -226,10 +226,13 @@ INPUTS = "inputs"
 
 def as_files(inputs: Any, folder: Path) -> list[str]:
     """Return one or several inputs as files; definitions are written if they do not exist."""
-    single = isinstance(inputs, str | Path | FileDefinition)
+    single = not isinstance(inputs, Iterable) or isinstance(inputs, str | Path | FileDefinition)
     texts: dict[str, str] = {}  # of the definitions, by name
     found = []
     for one in [inputs] if single else inputs:
+        if not isinstance(one, str | Path | FileDefinition):
+            words = "give files, names of shipped ones, or what railsim.load_vehicle returns"
+            raise TypeError(f"one of the inputs of the study is a {type(one).__name__}; {words}")
         if not isinstance(one, FileDefinition):
             found.append(str(one))
             continue

@@ -6,6 +6,7 @@ import math
 import pickle
 import subprocess
 import sys
+from functools import partial
 
 import example_result
 import numpy as np
@@ -208,6 +209,16 @@ def test_results_are_saved_like_definitions(result, tmp_path):
         result.save(tmp_path / "run.h5")
 
 
+def test_a_study_of_what_is_no_input_is_refused(tmp_path):
+    of = {"vehicles": ["coach_manchester"], "tracks": "curve_r250", "speeds": 20.0, "out": tmp_path}
+    for wrong in ({"vehicles": None}, {"tracks": [3]}, {"settings": {"step": 1e-3}}):
+        with pytest.raises(TypeError, match="one of the inputs of the study is a"):
+            railsim.study(**{**of, **wrong})
+    with pytest.raises(InputError, match="together: found '2'; a whole number"):
+        railsim.study(**of, together="2")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -235,9 +246,20 @@ def test_one_vehicle_at_least_and_a_sink_for_each_run_together(coach):
 
 def test_names_instead_of_what_they_stand_for_are_told(coach):
     track = railsim.load_track("straight")
-    for analysis in (railsim.modes, railsim.critical_speed, railsim.static_loads):
+    curving = partial(railsim.curving, radius=300.0)
+    for analysis in (railsim.modes, railsim.critical_speed, railsim.static_loads, curving):
         with pytest.raises(TypeError, match="the vehicle is 'coach'; give what"):
             analysis("coach")
+    for analysis in (railsim.modes, curving, partial(railsim.simulate, track=track, speed=20.0)):
+        with pytest.raises(TypeError, match="the settings are a dict; give what"):
+            analysis(coach, settings={"step": 1e-3})
+    with pytest.raises(TypeError, match="the sink is a str; give"):
+        railsim.simulate(coach, track, speed=20.0, sink="run.h5")
+    with pytest.raises(TypeError, match="the results are a str; give what"):
+        railsim.assess("run.h5")
+    for load in (railsim.load_vehicle, railsim.load_track, railsim.load_settings):
+        with pytest.raises(TypeError, match="is a Vehicle; give a path"):
+            load(coach)
     with pytest.raises(TypeError, match="the track is 'straight'"):
         railsim.simulate(coach, "straight", speed=20.0)
     with pytest.raises(TypeError, match="profiles: give a mapping of names"):

@@ -256,6 +256,22 @@ def test_output_that_cannot_be_written_is_refused_at_the_door(written, path, wor
 
 
 @pytest.mark.parametrize(
+    ("facts", "words"),
+    [
+        ({"note": "a\0b"}, r"attributes: 'note': holds a zero byte; a text without"),
+        ({"n\0te": "b"}, r"attributes: 'n\\x00te': holds a zero byte"),
+        ({"note": {"a": 1}}, "attributes: 'note': found a dict; a text or a number"),
+    ],
+)
+def test_facts_that_a_file_cannot_hold_are_refused_at_the_door(tmp_path, facts, words):
+    with pytest.raises(InputError, match=words):
+        Hdf5Sink(tmp_path / "run.h5", attributes=facts)
+    with MemorySink(facts) as sink, pytest.raises(InputError, match=words):
+        feed(sink).to_hdf5(tmp_path / "run.h5")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
     ("change", "found"),
     [
         (lambda file: file.attrs.pop("track_toml"), "track_toml: missing"),

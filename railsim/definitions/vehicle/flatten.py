@@ -141,7 +141,8 @@ def _frames(group: Group, frame: _Frame) -> Iterator[tuple[Group, _Frame]]:
 def wrong_type(kind: str, value: object) -> str:
     """Return what is wrong where a name or a file is given instead of what it stands for."""
     found = repr(value) if isinstance(value, str) else f"a {type(value).__name__}"
-    return f"the {kind} is {found}; give what railsim.load_{kind} returns"
+    verb = "are" if kind == "settings" else "is"
+    return f"the {kind} {verb} {found}; give what railsim.load_{kind} returns"
 
 
 def flatten(vehicle: "Vehicle") -> FlatVehicle:
