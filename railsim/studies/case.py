@@ -12,6 +12,7 @@ from typing import Any
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run, needs_speed
+from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Fault, Faults, InputError
 from railsim.files.key_paths import AXES
 from railsim.files.overrides import split_overrides
@@ -107,6 +108,7 @@ class Loader:
         self._analyses = dict(analyses or {})
         self.faults = Faults()
         self._loaded = cache(self._load)
+        self._misfits = cache(_misfits)
         self.overrides = cache(self._overrides)
 
     def check(self) -> None:
@@ -180,6 +182,15 @@ class Loader:
         found = Faults()
         with found.caught():
             check_agreement(vehicle, track, settings, speed, short_name(run.vehicle))
+        wheelsets = (body.wheelset for body in flatten(vehicle).of_kind("wheelset"))
+        sides = ((w, side) for w in wheelsets if w for side in range(2))
+        for pair in {
+            (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], track.gauge,
+             track.inclination)
+            for w, k in sides
+        }:  # fmt: skip
+            words = f"{short_name(run.vehicle)} on {short_name(run.track)}"
+            found += [replace(one, file=words) for one in self._misfits(*pair)]
         for name, analysis in self._analyses.items():
             if isinstance(analysis, AssessAnalysis):
                 from railsim.assessment.outputs import check_outputs
@@ -199,6 +210,20 @@ class Loader:
         if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in given):
             return self._as_written(replace(fault, file=OVERRIDE), "settings")
         return fault if run.settings is None else replace(fault, file=str(run.settings))
+
+
+def _misfits(
+    wheel: str, radius: float, back_to_back: float, rail: str, gauge: float, inclination: float
+) -> list[Fault]:
+    """Return why a wheelset cannot run in a track; nothing where a profile cannot be used."""
+    from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
+
+    try:
+        there = rail_curve(load_profile(rail, "rail"), gauge, inclination)
+        own = wheel_curve(load_profile(wheel, "wheel"), radius, tape_circle_position(back_to_back))
+    except InputError:
+        return []  # told with the profile
+    return misfits(own, there, gauge, f"{wheel} on {rail}, gauge {1e3 * gauge:.1f} mm")
 
 
 def load_case(run: RunSpec) -> Case:

@@ -471,6 +471,15 @@ def test_the_vehicle_without_an_element_is_named_and_the_file_that_asks_for_it(t
     assert not (tmp_path / "s").exists()
 
 
+def test_a_gauge_on_which_no_wheelset_stands_is_told_before_any_run(tmp_path, capsys):
+    """Between backs 1.36 m apart, wheels of 135 mm reach 1.63 m at most, less the flange's play."""
+    file = written(tmp_path, 'speeds = [20.0]\n[grid]\n"track.gauge" = [1.44, 1.64]\n')
+    assert main(["study", file, "--out", str(tmp_path / "s")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{COACH} on curve_r250: S1002 on 60E1, gauge 1640.0 mm: the wheelset")
+    assert not (tmp_path / "s").exists()
+
+
 def test_coarse_samples_of_an_assessment_in_a_study_are_told():
     """40 Hz, twice the corner of EN 14363, with room for the filter: 100 samples per second."""
     settings = Settings(output_rate=100.0)
