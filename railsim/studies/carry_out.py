@@ -242,7 +242,8 @@ class State:
             for definition in (case.vehicle, case.track, case.settings)
             for law in (definition.laws or {}).items()
         )
-        _check_steps([case for case in self.cases if case.file_name])
+        if not (execution.resume or execution.trying):
+            _check_steps([case for case in self.cases if case.file_name])
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""

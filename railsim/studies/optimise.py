@@ -186,6 +186,7 @@ def optimise(
         progress=progress,
         on_remark=on_remark,
         beside=BESIDE,
+        trying=True,
     )
     folder = Path(out)
     check_folder(folder, (*FILES, *BESIDE, INPUTS), overwrite=True)

@@ -154,6 +154,7 @@ class Execution:
     plots: bool = False
     longest_first: bool = False  # to balance the load of the cores
     beside: tuple[str, ...] = ()  # files written beside the runs: those of others are refused
+    trying: bool = False  # a run that cannot be computed is an outcome like others
     progress: Callable[[float], None] | None = None
     on_record: Callable[[dict[str, Any]], None] | None = None
     on_remark: Callable[[str], None] | None = None

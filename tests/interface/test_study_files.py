@@ -21,7 +21,8 @@ from railsim.errors import InputError, input_error
 from railsim.studies import user_function
 from railsim.studies.plan import Plan
 from railsim.studies.rows import made_rows, quantile, sampled
-from railsim.studies.spec import StudySpec
+from railsim.studies.spec import Execution, StudySpec
+from railsim.studies.study import run_study
 
 COACH = "coach_manchester"
 HEAD = f'format = "railsim-study/1"\nname = "n"\nvehicles = ["{COACH}"]\ntracks = ["{CURVE}"]\n'
@@ -362,6 +363,11 @@ def test_function_of_something_else_is_refused_before_any_run(tmp_path, simulate
     assert "'mine' cannot be called with one argument (missing" in capsys.readouterr().err
     assert simulated == []
     assert not (tmp_path / "s").exists()
+    # a design of an optimisation that cannot be computed is no fault of its input
+    trying = Execution(workers=1, trying=True)
+    run_study(StudySpec.of_file(load_study(file)), tmp_path / "tried", trying)
+    assert len(simulated) == 8
+    assert len(tried) == 3
 
 
 def test_definitions_in_python_are_written_and_run(tmp_path, simulated):
@@ -509,3 +515,8 @@ def test_only_the_longest_steps_are_tried_before_a_study_and_at_the_highest_spee
     assert "settings.step: found 0.0025 s" in second
     assert simulated == []
     assert not (tmp_path / "s").exists()
+    # a design of an optimisation that cannot be computed is no fault of its input
+    trying = Execution(workers=1, trying=True)
+    run_study(StudySpec.of_file(load_study(file)), tmp_path / "tried", trying)
+    assert len(simulated) == 8
+    assert len(tried) == 3
