@@ -363,11 +363,6 @@ def test_function_of_something_else_is_refused_before_any_run(tmp_path, simulate
     assert "'mine' cannot be called with one argument (missing" in capsys.readouterr().err
     assert simulated == []
     assert not (tmp_path / "s").exists()
-    # a design of an optimisation that cannot be computed is no fault of its input
-    trying = Execution(workers=1, trying=True)
-    run_study(StudySpec.of_file(load_study(file)), tmp_path / "tried", trying)
-    assert len(simulated) == 8
-    assert len(tried) == 3
 
 
 def test_definitions_in_python_are_written_and_run(tmp_path, simulated):
