@@ -14,7 +14,7 @@ from railsim.definitions.elements.rows import Act, Link, Mount
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.flatten import FlatVehicle, flatten, groups
 from railsim.errors import Fault, Faults, InputError, argument_fault, nearest
 from railsim.model.assembly import check_fixed
 from railsim.notation import QUANTITIES
@@ -150,10 +150,15 @@ def check_agreement(
     bodies, elements or quantities that are not there, or give a step between two outputs; bodies
     that cannot be fixed on this track.
     """
-    flat, faults = flatten(vehicle), Faults()
+    faults, outputs = Faults(), settings.outputs
+    there = f" in vehicle '{called or vehicle.name}'"
+    fixed = any(body.fixed for group in groups(vehicle) for body in group.bodies.values())
+    if not (fixed or settings.initial or outputs.elements):
+        flat = FlatVehicle("", (), (), "")
+    else:  # of a copy: a study would keep all its vehicles in this form
+        flat = flatten(vehicle.model_copy())
     with faults.caught():
         check_fixed(flat, track, settings.drive.mode)
-    there, outputs = f" in vehicle '{called or vehicle.name}'", settings.outputs
     bodies = [body.name for body in flat.bodies]
     for name in settings.initial:
         if name not in bodies:
@@ -161,7 +166,7 @@ def check_agreement(
             faults.append(Fault("settings", key, found, nearest(name, bodies)))
     recorded = [
         element.name
-        for element in (flat.elements if outputs.elements else ())
+        for element in flat.elements
         if any(isinstance(row, Link | Mount | Act) for row in element.definition.rows())
     ]
     for word, patterns, names, where in (

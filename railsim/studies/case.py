@@ -12,7 +12,7 @@ from typing import Any
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run, needs_speed
-from railsim.definitions.vehicle.flatten import flatten
+from railsim.definitions.vehicle.flatten import groups
 from railsim.errors import Fault, Faults, InputError
 from railsim.files.key_paths import AXES
 from railsim.files.overrides import split_overrides
@@ -182,8 +182,8 @@ class Loader:
         found = Faults()
         with found.caught():
             check_agreement(vehicle, track, settings, speed, short_name(run.vehicle))
-        wheelsets = (body.wheelset for body in flatten(vehicle).of_kind("wheelset"))
-        sides = ((w, side) for w in wheelsets if w for side in range(2))
+        wheelsets = (w for group in groups(vehicle) for w in group.wheelsets.values())
+        sides = ((w, side) for w in wheelsets for side in range(2))
         for pair in {
             (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], track.gauge,
              track.inclination)

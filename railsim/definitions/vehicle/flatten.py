@@ -131,6 +131,13 @@ class _Frame:
         )
 
 
+def groups(group: Group) -> Iterator[Group]:
+    """Yield a vehicle and its assemblies, each once."""
+    yield group
+    for assembly in group.assemblies.values():
+        yield from groups(assembly)
+
+
 def _frames(group: Group, frame: _Frame) -> Iterator[tuple[Group, _Frame]]:
     yield group, frame
     for name, assembly in group.assemblies.items():
