@@ -74,6 +74,7 @@ class Case:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
+AS_IN_TABLES = 1e-4  # m, between the points of a wheel
 Overrides = tuple[str, ...]
 LOADERS: dict[str, Callable[..., Any]] = {
     "vehicle": load_vehicle,
@@ -184,11 +185,10 @@ class Loader:
             check_agreement(vehicle, track, settings, speed, short_name(run.vehicle))
         wheelsets = (w for group in groups(vehicle) for w in group.wheelsets.values())
         sides = ((w, side) for w in wheelsets for side in range(2))
-        for pair in {
-            (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], track.gauge,
-             track.inclination)
-            for w, k in sides
-        }:  # fmt: skip
+        of_track = track.gauge, track.inclination
+        for pair in dict.fromkeys(
+            (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], *of_track) for w, k in sides
+        ):
             words = f"{short_name(run.vehicle)} on {short_name(run.track)}"
             found += [replace(one, file=words) for one in self._misfits(*pair)]
         for name, analysis in self._analyses.items():
@@ -220,7 +220,8 @@ def _misfits(
 
     try:
         there = rail_curve(load_profile(rail, "rail"), gauge, inclination)
-        own = wheel_curve(load_profile(wheel, "wheel"), radius, tape_circle_position(back_to_back))
+        place = tape_circle_position(back_to_back)
+        own = wheel_curve(load_profile(wheel, "wheel"), radius, place, AS_IN_TABLES)
     except InputError:
         return []  # told with the profile
     return misfits(own, there, gauge, f"{wheel} on {rail}, gauge {1e3 * gauge:.1f} mm")
