@@ -76,8 +76,14 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys,
     [
         (["--distance", "0"], "--distance: found 0"),
         (["--distance", "150"], "--step: found 100 km with a distance of 150 km"),
-        (["--distance", "100", "--route", "straight", "20", "-1"], "share: found -1 for Straight"),
-        (["--distance", "100", "--route", "straight", "900", "1"], "speed: found 900 m/s for Str"),
+        (
+            ["--distance", "100", "--route", "straight", "20", "-1"],
+            "--route: found a share of -1 for",
+        ),
+        (
+            ["--distance", "100", "--route", "straight", "900", "1"],
+            "--route: found 900 m/s for Passen",
+        ),
         (["--distance", "100", "--law", "x"], "found 'x'; one of pearce_sherratt, usfd, or a file"),
         (["--distance", "100", "--route", "nowhere", "20", "1"], "nowhere"),
         (["--distance", "100", "--set", 'vehicle.wheelsets.w.profile="x"'], "w"),
