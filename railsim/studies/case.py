@@ -99,12 +99,18 @@ def _leads_to(name: str, key: str) -> bool:
 class Loader:
     """Loads the definitions of runs, each once, and gathers everything that is wrong with them.
 
-    `grid`: keys whose assignments a user knows by ``--grid``; `analyses`: analyses of all cases.
+    `grid`: keys whose assignments a user knows by ``--grid``; `analyses`: analyses of all cases;
+    `contacts`: whether wheels and rails have to fit, which a run by itself finds out at once.
     """
 
     def __init__(
-        self, grid: Collection[str] = (), analyses: Mapping[str, Analysis] | None = None
+        self,
+        grid: Collection[str] = (),
+        analyses: Mapping[str, Analysis] | None = None,
+        *,
+        contacts: bool = False,
     ) -> None:
+        self._contacts = contacts
         self._grid = grid
         self._analyses = dict(analyses or {})
         self.faults = Faults()
@@ -187,7 +193,9 @@ class Loader:
         sides = ((w, side) for w in wheelsets for side in range(2))
         of_track = track.gauge, track.inclination
         for pair in dict.fromkeys(
-            (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], *of_track) for w, k in sides
+            (w.profile[k], w.radius[k], w.back_to_back, track.rail[k], *of_track)
+            for w, k in sides
+            if self._contacts
         ):
             words = f"{short_name(run.vehicle)} on {short_name(run.track)}"
             found += [replace(one, file=words) for one in self._misfits(*pair)]

@@ -73,7 +73,8 @@ class Plan:
             raise input_error("study", "no combination", "give a vehicle, a track, a speed")
         check_analyses(spec.analyses)
         self._spec = spec
-        self._loader = Loader({*spec.grid, *(k for t in spec.linked for k in t)}, spec.analyses)
+        varied = {*spec.grid, *(k for t in spec.linked for k in t)}
+        self._loader = Loader(varied, spec.analyses, contacts=True)
         self._fingerprints = Fingerprints()
         # what the record of a run depends on besides the run
         self._further = [f"told {told}"] if (told := fingerprint(spec.quantities)) else []
