@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -680,3 +681,18 @@ def test_climb_of_a_wheel_is_that_above_its_rail_with_its_friction(side):
     nadal = (slope - friction[side]) / (1.0 + friction[side] * slope)
     assert wheel.limit == pytest.approx(nadal)
     assert wheel.rise == pytest.approx((1.0 + 2.0 * on.rail_base / 2.0 + 0.5) * 1e-3, rel=0.03)
+
+
+def test_limit_of_each_wheel_is_that_of_its_own_flange():
+    """The right wheels with heights of 0.8, and so a flange of 0.8 the slope, of the left ones."""
+    usual = load_profile("S1002")
+    profiles = {"S1002": usual, "worn.csv": replace(usual, name="worn.csv", z=0.8 * usual.z)}
+    profiles["60E1"] = load_profile("60E1")
+    wheels = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
+    coach = railsim.load_vehicle("coach_manchester").with_values({wheels: ["S1002", "worn.csv"]})
+    on = track({"type": "STR", "length": 100.0}).replace(friction=(0.3, 0.3))
+    run = made(on, 20.0, profiles=profiles, vehicle=coach.to_toml())
+    (report,) = assess(run, "safety")[0].safety.values()
+    slope = math.tan(flange_angle(usual))
+    expected = [(t - 0.3) / (1.0 + 0.3 * t) for t in (slope, 0.8 * slope)]
+    assert [wheel.limit for wheel in report.wheels] == pytest.approx(4 * expected, rel=1e-3)

@@ -132,6 +132,25 @@ def test_a_lifted_wheel_has_no_quotient_of_the_ringing_of_the_low_pass():
     assert 0.5 < found.smooth <= 1.01
 
 
+@pytest.mark.parametrize(("share", "smooth"), [(0.053, 0.9), (0.047, 0.1)])
+def test_quotient_after_the_low_pass_counts_above_a_twentieth_of_the_static_load(share, smooth):
+    """Y/Q is 0.1 under full load and 0.9 while the wheel carries a share of it, for 6 s."""
+    whole = waves(1000.0)
+    time = whole["time"]
+    part = np.interp(time, [4.0, 6.0, 12.0, 14.0], [0.0, 1.0, 1.0, 0.0])
+    part = part**2 * (3.0 - 2.0 * part)  # without kinks, which ring
+    Q = 1e5 * (1.0 - (1.0 - share) * part)
+    Y = Q * np.where(Q / (share * 1e5) < 1.04, 0.9, 0.1)
+    arrays = {
+        "time": time, "distance": whole["distance"], "Q0": np.full((1, 2), 1e5),
+        "Q": np.stack([Q, Q], axis=-1)[:, None], "Y": np.stack([-Y, Y], axis=-1)[:, None],
+    }  # fmt: skip
+    arrays["Y_over_Q"] = np.abs(arrays["Y"] / arrays["Q"])
+    quantities = {name: QUANTITIES[name] for name in arrays}
+    (found,) = peaks(Result(arrays, quantities, whole.coordinates, attributes()), ["Y_over_Q"])
+    assert found.smooth == pytest.approx(smooth, rel=0.2)
+
+
 @pytest.mark.parametrize("result", [waves(40.0), small([[[1.0, 2.0]]] * 3)])
 def test_no_low_pass_of_outputs_that_are_too_seldom(result):
     (found,) = (each for each in peaks(result, ["Q"]) if each.quantity.name == "Q")
@@ -193,16 +212,22 @@ def test_a_vehicle_is_in_the_full_curve_wherever_its_reference_body_stands(offse
     assert words in str(full_curve_table(result, curve))
 
 
-def in_the_curve(course, **track):
-    """Result whose wheel loads follow `course` of the time from the beginning of the full curve."""
+def in_the_curve(*courses, **track):
+    """Result whose wheel loads follow `courses` of the time from the begin of the full curve.
+
+    One of both wheels of a wheelset, or those of the left and the right wheels, one axle after
+    another.  The vehicle is in the full curve for 3 s; of these the last two count.
+    """
     time = np.arange(round(25.0 * 200.0)) / 200.0
-    Q = 60e3 + 1e3 * course(np.maximum(time - 18.0, 0.0))
+    loads = [60e3 + 1e3 * course(np.maximum(time - 18.0, 0.0)) for course in courses]
+    loads = 2 * loads if len(loads) == 1 else loads
     facts = attributes()
     if track:
         facts["track_toml"] = load_track("curve_r250").replace(**track).to_toml()
-    arrays = {"time": time, "distance": 20.0 * time, "Q": np.stack([Q, Q], axis=-1)[:, None]}
+    Q = np.stack(loads, axis=-1).reshape(len(time), -1, 2)
+    arrays = {"time": time, "distance": 20.0 * time, "Q": Q}
     quantities = {name: QUANTITIES[name] for name in arrays}
-    names = {"wheelset": ["lead"], "side": ["left", "right"]}
+    names = {"wheelset": [f"axle {k + 1}" for k in range(Q.shape[1])], "side": ["left", "right"]}
     return mid_curves(Result(arrays, quantities, names, facts))[0]
 
 
@@ -213,6 +238,12 @@ def in_the_curve(course, **track):
         (lambda t: np.exp(-2.0 * t) * np.cos(2.0 * np.pi * 5.0 * t), True),
         (lambda t: 0.1 * t, True),
         (lambda t: np.cos(2.0 * np.pi * 5.0 * t), False),  # hunting
+        # in 2 s through the median five times and six times
+        (lambda t: np.cos(2.0 * np.pi * 1.25 * t - 0.25 * np.pi), True),
+        (lambda t: np.cos(2.0 * np.pi * 1.5 * t), False),
+        # in the second of two seconds 0.37 and 0.44 times the mean square of the first one
+        (lambda t: 0.37 ** (0.5 * t) * np.cos(2.0 * np.pi * 20.0 * t), True),
+        (lambda t: 0.44 ** (0.5 * t) * np.cos(2.0 * np.pi * 20.0 * t), False),
         (lambda t: 0.0 * t, False),
     ],
 )
@@ -221,6 +252,29 @@ def test_scatter_of_values_that_decay_is_called_settling(course, settling):
     assert curve.settling is curve.record()["settling"] is settling
     rough = [{"type": "random", "spectrum": "erri_b176_low"}]
     assert not in_the_curve(course, irregularities=rough).settling
+
+
+@pytest.mark.parametrize(("decaying", "settling"), [(1, False), (2, False), (3, True), (4, True)])
+def test_a_curve_is_settling_where_more_than_half_of_its_values_are(decaying, settling):
+    def decays(t):
+        return np.exp(-2.0 * t) * np.cos(10.0 * np.pi * t)
+
+    def hunts(t):
+        return np.cos(10.0 * np.pi * t)
+
+    courses = decaying * [decays] + (4 - decaying) * [hunts]
+    assert in_the_curve(*courses).settling is settling
+
+
+def test_full_curve_has_both_its_first_and_its_last_instant():
+    """From 380 to 420 m, with instants at both: of 3, 1, 2, 9 the median is 2.5."""
+    distance = [379.0, 380.0, 385.0, 395.0, 420.0, 421.0]
+    arrays = {"time": np.arange(6.0), "distance": distance, "Q": np.zeros((6, 1, 2))}
+    arrays["Q"][:, 0] = np.array([-50.0, 3.0, 1.0, 2.0, 9.0, 80.0])[:, None] * [1.0, -1.0]
+    quantities = {name: QUANTITIES[name] for name in arrays}
+    names = {"wheelset": ["lead"], "side": ["left", "right"]}
+    (curve,) = mid_curves(Result(arrays, quantities, names, attributes()))
+    np.testing.assert_allclose(curve.medians["Q"], [[2.5, -2.5]])
 
 
 def test_peak_leaves_out_what_is_not_a_number():

@@ -227,3 +227,13 @@ def test_a_file_is_there_when_whole(coach, track, tmp_path):
     with railsim.Simulation(coach, track, **way) as sim:
         sim.run()
     assert railsim.open_result(path).status == "complete"
+
+
+def test_a_wheelset_is_ahead_by_its_own_way_in_the_vehicle(coach, track):
+    """Put 5 mm forwards; the axles are 10.78 and 8.22 m from the middle of the car."""
+    settings = railsim.Settings(initial={"front.inner.wheelset": {"x": 5e-3}})
+    run = railsim.simulate(coach, track, speed=20.0, duration=0.02, settings=settings)
+    places, rest = run["wheelset_distance"] - run["distance"][:, None], [10.78, 8.22, -8.22, -10.78]
+    assert places[0] == pytest.approx([10.78, 8.225, -8.22, -10.78], abs=1e-4)
+    wheelsets = [run.coordinates["body"].index(name) for name in run.coordinates["wheelset"]]
+    assert places == pytest.approx(rest + run["body_position"][:, wheelsets, 0], abs=1e-6)

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
+from railsim.contact.geometry import geometry_of
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.model.assembly import assemble
 from railsim.model.statics import static_loads
+from railsim.profiles import load_profile
 from railsim.track.tables import track_tables
 
 RICH = {
@@ -118,3 +122,28 @@ def test_lopsided_load_changes_sides():
     left, right = np.array(here.Q0).T
     assert right.sum() != pytest.approx(left.sum(), rel=0.01)
     np.testing.assert_allclose(np.array(there.Q0)[:, ::-1], here.Q0, rtol=1e-6)
+
+
+PROFILE = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
+
+
+def test_left_and_right_wheel_of_a_wheelset_have_profiles_of_their_own():
+    """The first one is that of the left wheel: moved to the right, it rolls on a smaller radius."""
+    cones = ["cone_1in20", "cone_1in40"]
+    coach, track = load_vehicle("coach_manchester"), load_track("straight")
+
+    def tables(profile):
+        model = assemble(coach.with_values({PROFILE: profile}), track, Settings())
+        return [[model.tables[k].values for k in pair] for pair in model.system.contact.table]
+
+    alone = [tables(cone)[0][0] for cone in cones]
+    assert not np.array_equal(*alone)
+    for wheels in tables(cones):
+        for wheel, same in zip(wheels, alone, strict=True):
+            np.testing.assert_array_equal(wheel, same)
+    axle = flatten(coach.with_values({PROFILE: cones})).of_kind("wheelset")[0].wheelset
+    profiles = {name: load_profile(name) for name in (*cones, *track.rail)}
+    found = geometry_of(axle, track, profiles)
+    middle = np.abs(found.lateral) < 2e-3
+    slopes = np.polyfit(found.lateral[middle], found.rolling_radius[middle], 1)[0]
+    assert slopes == pytest.approx([-0.05, 0.025], rel=0.05)  # and as the wheelset rolls

@@ -8,6 +8,7 @@ import pytest
 import railsim
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
+from railsim.result.stored import lost_peak
 from railsim.simulation.remarks import (
     beyond_experience,
     creep_range,
@@ -45,6 +46,26 @@ def test_sums_of_Y_count_against_three_times_their_limit():
     assert "3.02 times" in words
     (words,) = said([-149e3, -91e3])
     assert words.startswith("The largest sum_Y is 91 kN (trailing, ")
+
+
+@pytest.mark.parametrize(
+    ("whole", "stored", "said"),
+    [
+        (100e3, 94.9e3, True),
+        (100e3, 95.1e3, False),  # below 5 %
+        (10e3, 8.95e3, True),
+        (10e3, 9.05e3, False),  # 9.5 %, but below 1 kN
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_lost_peak_is_told_above_5_percent_and_1_kN(whole, stored, said, sign):
+    of_steps = {"Y": np.sort(np.array([sign * whole, -0.5 * sign * whole]))[::-1]}
+    remark = lost_peak({"Y": stored}, of_steps, "20 per s", filtered=False)
+    assert bool(remark) is said
+    if said:
+        percent = 100.0 * (1.0 - stored / whole)
+        assert f"{whole / 1e3:.2f} kN over all" in remark
+        assert f"{stored / 1e3:.2f} kN in the stored histories, {percent:.0f} % less" in remark
 
 
 def test_patches_outside_the_creep_law_are_a_share_of_all():

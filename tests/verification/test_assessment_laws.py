@@ -454,6 +454,19 @@ def test_event_where_two_parts_of_a_record_meet():
     assert gathered.events["seated"] == pytest.approx(whole["seated"], rel=1e-3)
 
 
+@pytest.mark.parametrize("f", [2.0, 6.0])
+@pytest.mark.parametrize("tone", [0.7, 0.85, 0.93, 1.0, 1.08, 1.15, 1.4])
+def test_share_of_hunting_is_that_within_15_percent_of_its_frequency(f, tone):
+    """Butterworth, order 4: |H|^2 = 1/(1 + ((t^2 - lh)/(t(h - l)))^8), 1/2 at its ends."""
+    low, high = 0.85, 1.15
+    turns = 2.0 * np.pi * tone * f * np.arange(0.0, 100.0, 1.0 / 200.0)
+    a = np.stack([np.zeros_like(turns), np.sin(turns), np.cos(0.9 * turns)], axis=-1)
+    gathered = _Gathered(f)
+    gathered.add(a, slice(6000, 14000), 200.0)
+    passed = 1.0 / (1.0 + ((tone**2 - low * high) / (tone * (high - low))) ** 8)
+    assert gathered.hunting / gathered.iso[1] == pytest.approx(passed, abs=0.01)
+
+
 def test_sperling_of_flat_noise():
     """K3: 0.01 (m/s2)2/Hz from 0.5 to 30 Hz."""
     n, rate = 2**17, 256.0
