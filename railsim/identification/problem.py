@@ -21,6 +21,8 @@ from railsim.identification.parameters import Model, Parameter
 from railsim.identification.residuals import Form
 from railsim.identification.runs import Prepared
 from railsim.identification.variants import Task, Workers
+from railsim.profiles import load_profile
+from railsim.profiles.used import used_profiles
 
 STEP = 0.02  # of a coordinate, for differences: sticking and cells of the contact are not smooth
 STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
@@ -54,9 +56,18 @@ class Problem:
             digest.update(repr(text).encode())
         for one in self.runs:
             parts = (one.run.track.to_toml(), one.run.settings.to_toml(), repr(one.run.load))
-            digest.update(repr((*parts, one.run.speed, one.run.selections)).encode())
+            filters = [(channel.low_pass, channel.high_pass) for channel in one.run.amplifiers]
+            digest.update(repr((*parts, one.run.speed, one.run.selections, filters)).encode())
             digest.update(one.run.at.tobytes())
+        for name in sorted(self._profiles()):
+            digest.update(load_profile(name).key())
         self._inputs = digest.hexdigest()
+
+    def _profiles(self) -> set[str]:
+        """Return the names of all profiles in the runs, whose files may be changed in between."""
+        definitions = self.model.vehicle, *(one.run.track for one in self.runs)
+        used = {name for definition in definitions for _, name, _ in used_profiles(definition)}
+        return used.union(*(parameter.profiles for parameter in self.parameters))
 
     def shortened(self, duration: float) -> "Problem":
         """Return the problem of the first seconds of each run."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
+import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
 from railsim.identification.fit import _counting, _solved
 from railsim.identification.parameters import Parameter
@@ -19,6 +20,7 @@ from railsim.identification.problem import Problem
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import Prepared
 from railsim.identification.variants import Workers
+from railsim.profiles import save_profile
 
 N, STEP, SPEED, BAND = 1200, 0.01, 20.0, (0.5, 8.0)
 FILE = SimpleNamespace(to_toml=lambda: "")
@@ -46,6 +48,7 @@ class Known:
     until: float = 1e4
     load: str | None = None
     selections: tuple[str, ...] = ("one", "other")
+    amplifiers: tuple[SimpleNamespace, ...] = ()
     track: SimpleNamespace = field(default_factory=lambda: FILE)
     settings: SimpleNamespace = field(default_factory=lambda: FILE)
 
@@ -272,3 +275,27 @@ def test_table_of_derivatives_shows_root_mean_squares():
     assert row["derivative"] == pytest.approx(np.sqrt(9.0 / 3.0))
     assert (row["error"], row["step"], row["smooth"]) == (0.02, 1e-2, "yes")
     assert found["Q", "a"] is one.value
+
+
+def test_evaluations_that_are_kept_are_of_these_profiles_and_amplifiers(tmp_path):
+    """What a run gives depends on the points of a profile and on the low pass of a channel."""
+    wheel = tmp_path / "wheel.csv"
+    save_profile(railsim.load_profile("S1002"), wheel)
+    axle = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
+    vehicle = railsim.load_vehicle("coach_manchester").with_values({axle: str(wheel)})
+    keys = [Parameter(one, (one,)) for one in TRUE]
+    ready = runs(np.random.default_rng(7), 1.0)[:1]
+
+    def simulated(ready):
+        how = Form("history", BAND), False, Workers(1), tmp_path, lambda n: None
+        problem = Problem(SimpleNamespace(vehicle=vehicle), keys, ready, *how)
+        problem.series(np.zeros(2))
+        return problem.simulations
+
+    assert [simulated(ready), simulated(ready)] == [1, 0]
+    for corners in ((5.0, None), (None, 5.0)):
+        amplifier = SimpleNamespace(low_pass=corners[0], high_pass=corners[1])
+        run = replace(ready[0].run, amplifiers=(amplifier,))
+        assert simulated([replace(ready[0], run=run)]) == 1
+    save_profile(railsim.load_profile("cone_1in40"), wheel)
+    assert [simulated(ready), simulated(ready)] == [1, 0]
