@@ -79,7 +79,7 @@ class Problem:
             runs.append(replace(one, run=run, measured=one.measured[:, :n]))
         return Problem(
             self.model, self.parameters, runs, self.form, self.place, self.workers, self.folder,
-            self.progress,
+            self.progress, simulations=self.simulations,
         )  # fmt: skip
 
     @property

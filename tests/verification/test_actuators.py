@@ -11,10 +11,13 @@ from test_drives import MASS, RADIUS, TORQUE, WHEELSET, bogie, on_wheels, run, t
 
 import railsim
 from railsim import laws
+from railsim.constants import GRAVITY
 from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.kernels.actuators import COMMAND
+from railsim.model.assembly import assemble
+from railsim.simulation.step_choice import braked_step
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 G = 9.80665
@@ -149,6 +152,40 @@ def test_limited_power_accelerates_by_the_root_of_time():
     time, speed = found["time"], np.gradient(found["distance"], found["time"])
     gained = np.polyfit(time[100:-2], speed[100:-2] ** 2, 1)[0]
     assert gained == pytest.approx(4.0 * power / ROTATING, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("brakes", "actuator", "torque"),
+    [
+        ({"front": [{}], "rear": [{"torque_table": [[0.0, 5e3]]}]}, {}, 20e3),
+        ({"front": [{}], "rear": [{"torque_table": [[0.0, 50e3]]}]}, {}, 50e3),
+        ({"front": [{}, {"torque_table": [[0.0, 6e3]]}], "rear": [{}]}, {}, 26e3),
+        ({"rear": [{"torque_table": [[0.0, 20e3], [9.0, 30e3], [20.0, 8e3]]}]}, {}, 30e3),
+        ({"rear": [{}, {"demand_table": [[0.0, 0.2], [1.0, -0.7], [2.0, 0.0]]}]}, {}, 34e3),
+        ({"front": [{"kind": "traction"}]}, {}, None),  # no brake
+        ({}, {"force_limit": 8e3}, 8e3),
+        ({"front": [{}]}, {"force_limit": 8e3}, 28e3),
+        ({}, {}, 0.5 * LOADED / 2.0 * GRAVITY * RADIUS),  # slides on dry rails
+    ],
+)
+def test_longest_step_holds_the_axle_that_is_braked_most(brakes, actuator, torque):
+    """z = h c/I = 1.6 with the damping c = M r/v of a tread that turns with less than 0.1 m/s."""
+    usual = {"kind": "brake", "torque_table": [[0.0, 20e3]]}
+    elements = {
+        f"{end}_{k}": {**usual, **one, "bodies": ["frame", f"{end}.wheelset"]}
+        for end, found in brakes.items()
+        for k, one in enumerate(found)
+    }
+    if actuator or not brakes:
+        elements["commanded"] = {
+            "kind": "actuator", "acts": "axle", "command": "brake",
+            "bodies": ["frame", "front.wheelset"], **actuator,
+        }  # fmt: skip
+    vehicle = bogie(None).replace(elements=elements)
+    system = assemble(vehicle, load_track("straight"), railsim.Settings()).system
+    wheelset = WHEELSET["inertia"][1]
+    step = np.inf if torque is None else 1.6 * wheelset * 0.1 / (torque * RADIUS)
+    assert braked_step(system) == pytest.approx(step, rel=1e-9)
 
 
 def test_a_brake_by_a_damper_decays():

@@ -299,3 +299,26 @@ def test_evaluations_that_are_kept_are_of_these_profiles_and_amplifiers(tmp_path
         assert simulated([replace(ready[0], run=run)]) == 1
     save_profile(railsim.load_profile("cone_1in40"), wheel)
     assert [simulated(ready), simulated(ready)] == [1, 0]
+
+
+def test_runs_of_the_first_search_by_a_part_count_with_the_others(monkeypatch):
+    """Of runs of 26 s the first 8 s are searched before; every simulated run is counted once."""
+    monkeypatch.setitem(globals(), "N", 2600)
+    calls, simulated = [], Known.simulated
+
+    def counted(run, *arguments):
+        calls.append(len(run.at))
+        return simulated(run, *arguments)
+
+    ready = [one.moved(*at) for one, at in zip(runs(np.random.default_rng(7), 1.0), PLACES,
+                                               strict=True)]  # fmt: skip
+    monkeypatch.setattr(Known, "simulated", counted)
+    told = []
+    form, parameters = Form("history", BAND), [Parameter(name, (name,)) for name in TRUE]
+    model = SimpleNamespace(vehicle=FILE)
+    problem = Problem(model, parameters, ready, form, False, Workers(1), None, told.append)
+    found = _solved(problem, "linear")
+    assert set(calls) == {800, 2600}
+    assert found.simulations == told[-1] == len(calls)
+    assert told == sorted(told)
+    assert found.factors == pytest.approx(list(TRUE.values()), rel=0.02)

@@ -391,3 +391,7 @@ def test_wheelsets_start_on_irregular_rails_at_the_rates_of_their_displacements(
     change = 30.0 * (after - before)[:, lateral_vertical_roll] / 2e-3
     assert np.all(np.abs(change) > 1e-4)
     np.testing.assert_allclose(rate[:, lateral_vertical_roll], change, rtol=1e-2, atol=1e-5)
+    # the nose along the rails: the axle leans with them about their tops, 0.46 m below
+    (place, _), height = started(100.0), model.system.bodies.nominal[axles, 1]
+    middle = [state[:, 1] + height * np.sin(state[:, 3]) for state in (before, after)]
+    np.testing.assert_allclose(place[:, 5], (middle[1] - middle[0]) / 2e-3, rtol=1e-2, atol=1e-6)
