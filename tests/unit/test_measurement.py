@@ -45,6 +45,17 @@ def written(folder: Path, *, cell=lambda row, name, text: text, delimiter=",", t
     return folder / "m.toml"
 
 
+def test_table_of_a_run_shows_the_range_and_the_gaps_of_every_channel(tmp_path):
+    def gap(row, name, text):
+        return "" if name == "load" and 600 <= row < 750 else text
+
+    page = railsim.load_measurement(written(tmp_path, cell=gap))._repr_html_()
+    rows = [re.findall(r"<td[^>]*>([^<]*)</td>", row) for row in page.split("<tr")]
+    found = {row[0]: [float(cell) for cell in row[2:]] for row in rows if len(row) == 5}
+    assert found["box"] == pytest.approx([-5.0, 5.0, 0.0], rel=1e-3)
+    assert found["load"] == pytest.approx([55e3, 65e3, 5.0], rel=1e-3)  # 150 of 3000
+
+
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 def test_units_signs_and_offsets(tmp_path, delimiter):
     run = railsim.load_measurement(written(tmp_path, delimiter=delimiter))

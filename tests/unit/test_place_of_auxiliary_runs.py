@@ -11,7 +11,9 @@ from railsim.definitions import Settings
 from railsim.linear.track_response import track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.observation import Assumed, contact
+from railsim.simulation.run_in import _way_from_constant
 from railsim.studies import wear_loop
+from railsim.track.alignment import Alignment
 
 
 class Seen(Exception):
@@ -110,3 +112,54 @@ def test_a_recording_car_is_linearised_in_the_middle_of_its_record(monkeypatch, 
     with pytest.raises(Seen):
         module._Smooth(coach, track, Assumed(), record, {}, 0)
     assert places == [650.0]
+
+
+BESIDE = {"type": "CST", "length": 100.0}
+CHANGING = {
+    "curvature": {
+        "plan": [
+            {"type": "STR", "length": 100.0},
+            {"type": "CLO", "length": 40.0},
+            {"type": "CIR", "length": 300.0, "radius": 500.0},
+        ]
+    },
+    "cant": {
+        "cant": [
+            {**BESIDE, "cant": 0.0},
+            {"type": "LIR", "length": 40.0},
+            {"type": "CST", "length": 300.0, "cant": 0.1},
+        ]
+    },
+    "gradient": {
+        "vertical": [
+            {**BESIDE, "gradient": 0.0},
+            {"type": "LIR", "length": 40.0},
+            {"type": "CST", "length": 300.0, "gradient": 0.01},
+        ]
+    },
+}
+
+
+@pytest.mark.parametrize("kind", CHANGING)
+@pytest.mark.parametrize(
+    ("start", "room", "way"),
+    [
+        (80.0, 60.0, 0.0),
+        (89.0, 60.0, 0.0),  # the first axle at 94 m
+        (92.0, 60.0, 2.0),
+        (130.0, 60.0, 40.0),
+        (164.0, 140.0, 74.0),  # the last axle at 144 m
+        (164.0, 50.0, 50.0),  # as far as there is track
+        (166.0, 140.0, 0.0),
+    ],
+)
+def test_the_way_to_a_start_begins_where_nothing_changes_under_the_vehicle(kind, start, room, way):
+    """From 100 to 140 m, and 5 m around, by rounded corners, curvature, cant or gradient changes.
+
+    The axles are 5 m ahead and 20 m behind.
+    """
+    plan = [{"type": "STR", "length": 440.0}]
+    track = railsim.load_track("straight").replace(**{"plan": plan, **CHANGING[kind]})
+    found = _way_from_constant(Alignment(track), start, np.array([5.0, -20.0]), room, 10.0)
+    assert found == pytest.approx(way, abs=0.51)
+    assert (found > 0.0) == (way > 0.0)

@@ -196,6 +196,13 @@ def test_standstill_at_the_ends_is_left_out_and_in_between_refused(tmp_path):
     model = model_of(quarter(), [ends])
     said = prepared(ends, model, (0.5, 14.0)).measurement.remarks
     assert [words for words in said if words.startswith("Stands before s = ")]
+    for begin, rest in ((600, 0), (0, 600)):  # at one end only
+        own = slice(600 - begin, len(rows) - 600 + rest)
+        one = standing(rows[own], ((still < 600) | (still >= len(rows) - 600))[own])
+        kept = prepared(one, model, (0.5, 14.0)).measurement
+        assert len(kept.remarks) == 1
+        assert kept.speed.min() > 0.9 * SPEED
+        assert len(kept.time) == pytest.approx(len(run.time), abs=run.rate)
     middle = np.r_[np.arange(700), np.full(600, 700), np.arange(700, len(run.time))]
     stop = standing(middle, (still[: len(middle)] >= 700) & (still[: len(middle)] < 1300))
     with pytest.raises(railsim.InputError, match="run: speed: 0 m/s at s = 70 m; 1 m/s at least"):

@@ -15,6 +15,7 @@ from scipy import optimize, stats
 import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
 from railsim.identification.fit import _counting, _solved
+from railsim.identification.identified import Channel
 from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem
 from railsim.identification.residuals import Form, whiteness
@@ -322,3 +323,13 @@ def test_runs_of_the_first_search_by_a_part_count_with_the_others(monkeypatch):
     assert found.simulations == told[-1] == len(calls)
     assert told == sorted(told)
     assert found.factors == pytest.approx(list(TRUE.values()), rel=0.02)
+
+
+@pytest.mark.parametrize(("probability", "white"), [(0.0105, True), (0.0095, False),
+                                                    (np.nan, True)])  # fmt: skip
+def test_residuals_are_white_where_chance_gives_their_statistic_once_in_a_hundred(
+    probability, white
+):
+    none = np.zeros(3)
+    one = Channel("run", "Q", "Q:1:left", STEP, none, none, none, none, 1.0, 1.6, probability)
+    assert one.is_white is white

@@ -14,7 +14,14 @@ from railsim.measurement import load_measurement
 from railsim.observation import irregularity
 from railsim.observation.contact import Noise, _smoothed
 from railsim.observation.estimate import BANDS, Estimate, estimate_of, joined
-from railsim.observation.innovations import Powers, Sizes, disagreeing, level_of, spectra_of
+from railsim.observation.innovations import (
+    Powers,
+    Sizes,
+    _disagreement,
+    disagreeing,
+    level_of,
+    spectra_of,
+)
 from railsim.observation.pieces import Piece, on_grid, pieces_of
 from railsim.track.irregularity import displacement
 
@@ -146,6 +153,25 @@ def test_the_channel_that_the_others_contradict_is_named(wrong, change, words):
     if wrong is not None:
         assert said[0].startswith(names[wrong])
         assert words in said[0]
+
+
+@pytest.mark.parametrize(
+    ("correlation", "ratio", "beyond", "words"),
+    [
+        (-0.31, 1.0, 0.0, "opposite sign"), (-0.29, 1.0, 0.0, ""),
+        (0.31, 3.1, 0.0, "3.1 times"), (0.31, 2.9, 0.0, ""), (0.31, 0.32, 0.0, "0.32 times"),
+        (0.31, 0.35, 0.0, ""), (0.29, 9.0, 0.0, ""),
+        (0.29, 9.0, 31.0, "does not agree"), (0.29, 9.0, 29.0, ""), (0.31, 1.0, 99.0, ""),
+        (-0.29, 1.0, 31.0, "does not agree"),
+    ],
+)  # fmt: skip
+def test_a_channel_is_wrong_by_sign_by_size_or_by_what_nobody_else_reads(
+    correlation, ratio, beyond, words
+):
+    """From a correlation of 0.3 on, threefold or a third, with thirty times the errors' power."""
+    said = _disagreement(correlation, ratio, beyond)
+    assert words in said
+    assert bool(said) == bool(words)
 
 
 def test_powers_of_sizes_are_those_of_their_parts():
