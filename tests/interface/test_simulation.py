@@ -237,3 +237,12 @@ def test_a_wheelset_is_ahead_by_its_own_way_in_the_vehicle(coach, track):
     assert places[0] == pytest.approx([10.78, 8.225, -8.22, -10.78], abs=1e-4)
     wheelsets = [run.coordinates["body"].index(name) for name in run.coordinates["wheelset"]]
     assert places == pytest.approx(rest + run["body_position"][:, wheelsets, 0], abs=1e-6)
+
+
+def test_counts_of_a_run_are_those_of_its_time(coach, track):
+    """0.3 s in equal steps of a constant speed."""
+    facts = railsim.simulate(coach, track, speed=20.0, duration=0.3).attributes
+    assert facts["duration"] == pytest.approx(0.3, rel=1e-9)
+    assert facts["real_time_factor"] * facts["cpu_time"] == pytest.approx(0.3, rel=1e-9)
+    assert 0.0 < facts["cpu_time"] <= facts["wall_time"]
+    assert facts["steps"] * facts["step"] == pytest.approx(0.3, rel=1e-9)

@@ -1,6 +1,7 @@
 """Remarks on vehicles and starts that are allowed but unlike experience; where they are shown."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.model.plausibility import gauge_remarks, vehicle_remarks
 from railsim.result import peak
+from railsim.simulation import disturbance
 
 BODY = {"mass": 8e3, "inertia": [5e3, 9e3, 9e3], "position": [0.0, 0.0, -1.2]}
 AXLE = {
@@ -183,9 +185,29 @@ def test_a_moved_wheelset_follows_its_contacts(change):
     assert not [remark for remark in result.remarks if "impact" in remark]
 
 
-def test_an_impact_at_the_start_is_remarked():
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ((60e3, 60e3), (60e3, 91e3), "axle, right, is 91 kN at t = 0, at rest 60 kN"),
+        ((60e3, 60e3), (29e3, 60e3), "axle, left, is 29 kN at t = 0, at rest 60 kN"),
+        ((60e3, 60e3), (89e3, 31e3), None),
+        ((90e3, 60e3), (115e3, 60e3), None),  # the outer wheel in a curve
+        ((90e3, 60e3), (121e3, 60e3), "axle, left, is 121 kN at t = 0, at rest 60 kN"),
+    ],
+)
+def test_an_impact_changes_a_load_by_more_than_half_of_the_static_one(
+    before, after, words, monkeypatch
+):
+    monkeypatch.setattr(disturbance, "_wheel_loads", lambda *_: np.array([after]))
+    model = SimpleNamespace(index=SimpleNamespace(wheelsets=("axle",)))
+    said = disturbance._impact(model, np.array([before]), np.full((1, 2), 60e3), np.zeros(1))
+    assert [words in one for one in said] == ([True] if words else [])
+
+
+@pytest.mark.parametrize("given", ["z", "roll"])
+def test_an_impact_at_the_start_is_remarked(given):
     """Who gives `z` or `roll` gets them."""
-    result = disturbed(y=0.003, z=1e-9)
+    result = disturbed(y=0.003, **{given: 1e-9})
     assert np.max(result["Q"][0]) > 5.0 * np.max(result["Q0"])
     found = [remark for remark in result.remarks if "impact" in remark]
     assert found[0].startswith("The initial disturbance is an impact: Q of front.outer.wheelset")
