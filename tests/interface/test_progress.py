@@ -1,11 +1,13 @@
 """What the user hears while something is prepared: once, and only if it is."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from railsim.cli import progress
 from railsim.kernels import cache
+from railsim.simulation.run_progress import RunProgress
 
 
 @pytest.fixture(autouse=True)
@@ -77,3 +79,28 @@ def test_ten_runs_share_a_line_in_large_studies(capsys):
         "remark: run1: hunts at 1 Hz (and 44 similar, in 45 runs altogether)",
         "remark: 45 runs: is too long",
     ]
+
+
+def test_finished_fraction_is_that_of_the_simulated_time():
+    """Two runs of 10 s, each judged for 5 s and run in for 10 s: of 50 s in all."""
+    told = []
+    inputs = SimpleNamespace(
+        track=SimpleNamespace(length=260.0), start=60.0, speed=20.0, until=None, duration=None
+    )
+    course = RunProgress(told.append, 2, inputs)
+    for _ in range(2):
+        course.next_run()
+        course.of_judgement(5.0, 5.0)  # so far the run-in is not known of: of 30 s
+        course.of_run_in(4.0, 10.0)
+        course.of_run_in(10.0, 10.0)
+    for done in (0.0, 0.4, 1.0 - 1e-13):
+        course.of_runs(done)
+    first = [0.0, 5.0 / 30.0, 9.0 / 50.0, 15.0 / 50.0]
+    second = [15.0 / 50.0, 20.0 / 30.0, 20.0 / 30.0, 20.0 / 30.0]
+    assert told == pytest.approx([*first, *second, 20.0 / 30.0, 38.0 / 50.0, 1.0], abs=1e-12)
+    assert told[-1] == 1.0
+    for short in (SimpleNamespace(**{**vars(inputs), "until": 100.0}),
+                  SimpleNamespace(**{**vars(inputs), "duration": 2.0})):  # fmt: skip
+        other = RunProgress(told.append, 1, short)
+        other.of_judgement(6.0, 6.0)
+        assert told[-1] == pytest.approx(6.0 / 8.0)

@@ -34,12 +34,15 @@ from railsim.definitions.vehicle.out_of_round import Sections as WheelSections
 from railsim.definitions.vehicle.tables import Service
 from railsim.definitions.wear_law import ArchardMap, FrictionWork, WearLawFile
 from railsim.errors import InputError
+from railsim.simulation.conditions import check_range, initial_speed
 from railsim.studies.stationary import StationaryValue
 
 TINY = 5e-324  # the smallest number above 0
 PAIR = {"bodies": ["a", "b"]}
 AT = {**PAIR, "point": [0.0, 1.0, -0.5]}
 TRACK = {"format": "railsim-track/1", "name": "x", "plan": [{"type": "STR", "length": 99.0}]}
+LINE = Track.model_validate(TRACK)
+IN_TABLE = Settings(drive={"mode": "table", "speed_table": [[0.0, 10.0], [100.0, 30.0]]})
 LAW = {"format": "railsim-wear-law/1", "name": "x", "source": "x"}
 CURVE = [0.0, 1.0]
 
@@ -143,6 +146,21 @@ def wheel(last):
 
 # what is built of a value, values that are taken, values that are refused
 BORDERS = {
+    "a run has from 0.5 to 150 m/s": (
+        lambda v: check_range(LINE, v, 0.0, None, None), [0.5, 150.0], [below(0.5), above(150.0)]
+    ),
+    "it begins on the track, of 99 m": (
+        lambda s: check_range(LINE, 20.0, s, None, None), [0.0, below(99.0)], [below(0.0), 99.0]
+    ),
+    "ends there too, behind its start": (
+        lambda s: check_range(LINE, 20.0, 9.0, None, s), [above(9.0), 99.0], [9.0, above(99.0)]
+    ),
+    "lasts some time": (
+        lambda t: check_range(LINE, 20.0, 0.0, t, None), [TINY], [0.0, math.inf]
+    ),
+    "has the speed of its table, to a thousandth": (
+        lambda v: initial_speed(IN_TABLE, v, 50.0), [19.981, 20.019], [19.979, 20.021]
+    ),
     "Poisson's ratio is below 0.5": (
         lambda x: Settings(poisson=x), [0.0, below(0.5)], [0.5]
     ),
