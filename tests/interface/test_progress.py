@@ -82,22 +82,24 @@ def test_ten_runs_share_a_line_in_large_studies(capsys):
 
 
 def test_finished_fraction_is_that_of_the_simulated_time():
-    """Two runs of 10 s, each judged for 5 s and run in for 10 s: of 50 s in all."""
+    """Three runs of 10 s, each judged for 5 s and run in for 10 s: of 75 s in all."""
     told = []
     inputs = SimpleNamespace(
         track=SimpleNamespace(length=260.0), start=60.0, speed=20.0, until=None, duration=None
     )
-    course = RunProgress(told.append, 2, inputs)
-    for _ in range(2):
+    course = RunProgress(told.append, 3, inputs)
+    for _ in range(3):
         course.next_run()
-        course.of_judgement(5.0, 5.0)  # so far the run-in is not known of: of 30 s
+        course.of_judgement(5.0, 5.0)  # so far the run-in is not known of: of 45 s
         course.of_run_in(4.0, 10.0)
         course.of_run_in(10.0, 10.0)
-    for done in (0.0, 0.4, 1.0 - 1e-13):
+    for done in (0.0, 0.6, 1.0 - 1e-13):
         course.of_runs(done)
-    first = [0.0, 5.0 / 30.0, 9.0 / 50.0, 15.0 / 50.0]
-    second = [15.0 / 50.0, 20.0 / 30.0, 20.0 / 30.0, 20.0 / 30.0]
-    assert told == pytest.approx([*first, *second, 20.0 / 30.0, 38.0 / 50.0, 1.0], abs=1e-12)
+    first = [0.0, 5.0 / 45.0, 9.0 / 75.0, 15.0 / 75.0]
+    second = [15.0 / 75.0, *3 * [20.0 / 45.0]]  # what was told is not taken back
+    third = [20.0 / 45.0, *3 * [35.0 / 45.0]]
+    preparation = [*first, *second, *third]
+    assert told == pytest.approx([*preparation, 35.0 / 45.0, 63.0 / 75.0, 1.0], abs=1e-12)
     assert told[-1] == 1.0
     for short in (SimpleNamespace(**{**vars(inputs), "until": 100.0}),
                   SimpleNamespace(**{**vars(inputs), "duration": 2.0})):  # fmt: skip

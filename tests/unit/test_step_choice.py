@@ -1,10 +1,14 @@
 """The step of a run: judged for a class of runs, whatever was judged before."""
 
+import math
+from types import SimpleNamespace
+
 import pytest
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
+from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.simulation import step_choice
 from railsim.simulation.preparation import prepare
 
@@ -89,3 +93,49 @@ def test_given_step_that_is_no_longer_than_the_one_taken_without_it_is_not_refus
     assert step(0.5 * usual) == 0.5 * usual
     with pytest.raises(InputError, match=f"at most {usual:g} s"):
         step(2.0 * usual)
+
+
+@pytest.mark.parametrize(
+    ("periods", "braked", "given", "count"),
+    [
+        ((), math.inf, None, 3),
+        ((4e-3,), math.inf, None, 5),  # of 5 and 4 ms: steps of 1 ms
+        ((10e-3, 2.5e-3), math.inf, None, 4),
+        ((4e-3, 2.5e-3), math.inf, None, 3),  # no step of 5/6 ms and more divides both
+        ((1.875e-3,), math.inf, None, 3),  # nor one of 5/6 ms and more this one: 5/8 ms would
+        ((1e-3,), math.inf, None, 5),
+        ((), 0.8e-3, None, 7),
+        ((), 0.8e-3, 1.25e-3, 4),  # what is given is taken
+    ],
+)
+def test_steps_divide_the_output_interval_and_the_periods_of_controllers(
+    periods, braked, given, count
+):
+    """Outputs every 5 ms; 2 ms would be stable, or the step that is given."""
+    steps = step_choice.StepChoice.__new__(step_choice.StepChoice)
+    wheels = SimpleNamespace(longest_step=lambda speed: math.inf)
+    steps._settings, steps._model = Settings(output_rate=200.0, step=given), SimpleNamespace()
+    steps._model.wheels, steps._known, steps._periods = wheels, {20.0: given or 2e-3}, periods
+    steps._braked, steps.varies, steps.smallest = braked, False, math.inf
+    step, every = steps.at(20.0)
+    assert (step, every) == (pytest.approx(5e-3 / count), count)
+    assert steps.smallest == step
+    if count != 3:
+        assert [period / step for period in periods] == pytest.approx(
+            [round(period / step) for period in periods]
+        )
+
+
+def test_other_end_of_a_class_has_its_highest_speed_and_lowest_friction(monkeypatch):
+    """From 1.2^16 to 1.2^17 m/s, from 0.2 to 0.3 and from 0.3 to 0.4."""
+    asked = []
+
+    def judged(self, kind, model, speed, step, judge):
+        asked.append((kind, speed, *model.system.track.rail[0, MU_LEFT : MU_RIGHT + 1, 0]))
+        return False
+
+    monkeypatch.setattr(step_choice.StepChoice, "_judged", judged)
+    track = load_track("straight").replace(friction=(0.24, 0.3001))
+    prepare(load_vehicle("coach_manchester"), track, Settings(), 20.0, duration=1.0).steps.at(20.0)
+    assert asked[0] == ("class", *(pytest.approx(x) for x in (1.2**16, 0.3, 0.4)))
+    assert asked[1] == ("end of class", *(pytest.approx(x) for x in (1.2**17, 0.2, 0.3)))

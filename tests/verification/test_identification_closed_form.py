@@ -325,6 +325,11 @@ def test_runs_of_the_first_search_by_a_part_count_with_the_others(monkeypatch):
     assert found.factors == pytest.approx(list(TRUE.values()), rel=0.02)
 
 
+def test_a_factor_lies_between_a_tenth_and_ten_where_nothing_is_said():
+    assert Parameter("a", ("a",)).bounds == pytest.approx((-np.log(10.0), np.log(10.0)))
+    assert Parameter("a", ("a",), low=0.5, high=4.0).bounds == pytest.approx(np.log([0.5, 4.0]))
+
+
 @pytest.mark.parametrize(("probability", "white"), [(0.0105, True), (0.0095, False),
                                                     (np.nan, True)])  # fmt: skip
 def test_residuals_are_white_where_chance_gives_their_statistic_once_in_a_hundred(
