@@ -9,12 +9,14 @@ from dynamics import load_track, load_vehicle
 from selection import points
 
 import railsim
+from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
 from railsim.linear.eigenmodes import LossOfStability
 from railsim.linear.modes import modes
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
 from railsim.plot.stability import bifurcation_figure
+from railsim.stability import continuation
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import OF_CONICITY, _by_ramp, _speeds, critical_speed
@@ -419,6 +421,95 @@ def test_a_motion_between_two_runs_has_an_amplitude_and_a_frequency_between_thei
         at = Point(on[0], on[1] * factors[0], on[2] * factors[1], stable=False)
         for piece in (runs, runs[::-1]):
             assert settled_to(Branch("continuation", [at]), [piece]).points[0].stable == same
+
+
+class Parabola:
+    """A branch v = 60 - 4 p + p^2 m/s with p/2 mm, which turns back at 56 m/s and 1 mm."""
+
+    def __init__(self, step=0.75, last=np.inf, factor=1.0):
+        self.step, self.last, self.factor, self.lengths = step, last, factor, []
+
+    def at(self, p):
+        tangent, amplitude = np.array([0.6, 2.0 * p - 4.0]), 0.5e-3 * self.factor * p
+        return SimpleNamespace(
+            p=p, speed=60.0 - 4.0 * p + p**2, amplitude=amplitude, frequency=5.0 + 0.1 * p,
+            tangent=tangent, is_stable=p > 2.0,
+        )  # fmt: skip
+
+    def followed(self, start, length, within):
+        now, inside = start, True
+        while inside:
+            if now.p + self.step > self.last:
+                raise ModelError("no motion further on")
+            now = self.at(now.p + self.step)
+            yield now
+            inside = within(now)
+
+    def fold(self, before, after, length):
+        assert before.p < 2.0 < after.p
+        return self.at(2.0)
+
+
+def continued(monkeypatch, birth, known=(), seeds=None, speeds=(50.0, 64.0), parameter=60.0):
+    """What continuation finds where `birth` begins, and `seeds` is told where runs' motions are."""
+
+    def of_run(motion, seed):
+        seeds.append((seed.speed, seed.amplitude))
+        raise ModelError("its motion is not periodic")
+
+    monkeypatch.setattr(continuation, "_birth", lambda *_: (birth, birth.at(0.0)))
+    monkeypatch.setattr(continuation, "_at", of_run)
+    lost, told = SimpleNamespace(parameter=parameter), []
+    return continuation.followed_branches(None, lost, known, speeds, told.append), told
+
+
+def test_a_branch_is_followed_from_its_birth_through_its_fold_out_of_the_range(monkeypatch):
+    """To the first motion above 64 m/s: p^2 - 4 p > 4, from p = 4.83 on."""
+    found, _ = continued(monkeypatch, Parabola())
+    (branch,) = found.branches
+    p = 0.75 * np.arange(1, 8)
+    np.testing.assert_allclose(branch.column("speed"), 60.0 - 4.0 * p + p**2)
+    np.testing.assert_allclose(branch.column("amplitude"), 0.5e-3 * p)
+    np.testing.assert_array_equal(branch.column("stable"), p > 2.0)
+    assert found.begins == branch.points[0]
+    assert [(fold.speed, fold.amplitude) for fold in found.folds] == [(56.0, 1e-3)]
+    assert not found.remarks
+
+
+@pytest.mark.parametrize(
+    ("birth", "how", "count", "words"),
+    [
+        (Parabola(0.05), {}, 20, "is followed for 20 motions only, to 57 m/s"),
+        (Parabola(last=3.2), {}, 4, "is followed to 57 m/s only: no motion further on"),
+        (Parabola(factor=9.0), {}, 4, None),  # the first one above 12 mm
+        (Parabola(), {"speeds": (57.5, 64.0)}, 2, None),
+        (Parabola(), {"parameter": None}, 0, "no loss of stability at which it could begin"),
+    ],
+)
+def test_a_branch_ends_at_a_number_an_amplitude_or_a_speed(monkeypatch, birth, how, count, words):
+    found, _ = continued(monkeypatch, birth, **how)
+    assert sum(len(branch.points) for branch in found.branches) == count
+    assert [words in remark for remark in found.remarks] == ([True] if words else [])
+
+
+def test_a_branch_of_runs_is_followed_once_and_where_it_is_not_known_yet(monkeypatch):
+    """From a motion 1 m/s above its slow end, 20 % beside what is known and 0.2 mm at least."""
+    on = 0.5e-3 * (2.0 + np.sqrt(6.0))  # of the parabola at 62 m/s
+
+    def run(direction, share, first=61.0):
+        return Branch(direction, [Point(v, on * share, 5.0) for v in np.arange(first, 64.0, 0.5)])
+
+    known = [run("up", 1.15), run("ramp", 2.0), run("up", 0.85), run("down", 0.19e-3 / on),
+             run("down", 1.5), run("up", 1.6, 61.5), run("further", 2.1)]  # fmt: skip
+    seeds = []
+    found, told = continued(monkeypatch, Parabola(), known, seeds)
+    assert seeds == [pytest.approx((62.0, 1.5 * on)), pytest.approx((62.0, 2.1 * on))]
+    assert told == pytest.approx(np.arange(1, 7) / 7.0)
+    said = (
+        f"continuation: the branch of runs from 61 to 63.5 m/s, {1.5e3 * on:.2f} mm at 62 m/s, is"
+    )
+    assert found.remarks[0] == f"{said} not followed: its motion is not periodic"
+    assert len(found.remarks) == 2
 
 
 def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest():
