@@ -59,6 +59,84 @@ def test_a_quotient_that_was_measured_is_not_formed_of_its_forces_again():
     assert found["Y_qst"].mean == pytest.approx(-2e3)
 
 
+def steady(read, *, length=1100.0, until=None, faster=1.0, sensors=(), change=lambda t, x: x):
+    """Comparison in R 300 m of constant channels with -20 kN of Y and the static loads.
+
+    `read`: by quantity; `faster`: measured over simulated speed; `sensors`: at which nothing is
+    read; `change`: of what was measured over time.
+    """
+    on = track(*curve(300.0, length, 20.0, 20.0), cant=0.12)
+    made_up = made(on, SPEED, until=until, Y=lambda t, s: np.full((*s.shape, 2), -20e3))
+    arrays = {name: made_up[name] for name in made_up}
+    arrays["sensor_acceleration"] = np.zeros((len(made_up["time"]), len(sensors), 3))
+    quantities = dict(made_up.quantities)
+    quantities["sensor_acceleration"] = REQUESTED["sensor_acceleration"]
+    coordinates = dict(made_up.coordinates) | {"sensor": sensors, "axis": tuple("xyz")}
+    result = Result(arrays, quantities, coordinates, made_up.attributes, made_up.profiles)
+    t = np.arange(round(on.length / SPEED * RATE)) / RATE
+    how = MeasurementFile.model_validate({
+        "format": "railsim-measurement/1", "name": "m", "file": ["a.csv"], "rate": RATE,
+        "speed": SPEED, "channels": {f"c{k}": {"quantity": q} for k, q in enumerate(read)},
+    })  # fmt: skip
+    channels = {f"c{k}": change(t, np.full(len(t), x)) for k, x in enumerate(read.values())}
+    speed = np.full(len(t), faster * SPEED)
+    return railsim.validate_model(Measurement(how, t, SPEED * t, speed, channels), result)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "channel", "simulated", "limit"),
+    [
+        ("Y_qst", "Y:1:left", -20e3, 5e3),
+        ("Q_qst", "Q:1:left", Q0, 4e3 * (1.0 + 0.01 * 1e-3 * Q0)),
+        ("Q_max", "Q:4:right", Q0, 6e3 * (1.0 + 0.01 * 1e-3 * Q0)),
+    ],
+)
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_mean_difference_passes_up_to_two_thirds_of_its_limit(
+    quantity, channel, simulated, limit, sense
+):
+    """EN 14363, Annex T, as the limits file recalls it, over twelve sections at least."""
+    for share, verdict in ((0.99, "pass"), (1.01, "fail")):
+        found = steady({channel: simulated + sense * share * 2.0 / 3.0 * limit})[quantity]
+        assert found.sections >= 12
+        assert abs(found.mean) == pytest.approx(share * 2.0 / 3.0 * limit)
+        assert (found.limit, found.verdict) == (pytest.approx(limit), verdict)
+
+
+def test_a_gap_of_more_than_a_hundredth_leaves_a_section_out():
+    """Of the 609 values over 70 m from 300 m on 5 or 7 are missing."""
+
+    def without(number):
+        def change(t, x):
+            return np.where((t > 330.0 / SPEED) & (t < 330.0 / SPEED + number / RATE), np.nan, x)
+
+        return steady({"Y:1:left": -21e3}, length=500.0, change=change)["Y_qst"].pairs
+
+    assert len(without(0)) == len(without(5)) == len(without(7)) + 1
+
+
+@pytest.mark.parametrize(("faster", "said"), [(1.019, False), (0.982, False), (1.021, True),
+                                              (0.979, True)])  # fmt: skip
+def test_speeds_may_differ_by_two_percent(faster, said):
+    remarks = "".join(steady({"Y:1:left": -21e3}, length=500.0, faster=faster).remarks)
+    assert (f"measured at {faster * SPEED:.1f} m/s, simulated at 23.0 m/s" in remarks) is said
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.905, False), (0.895, True)])
+def test_a_comparison_of_less_than_nine_tenths_of_the_record_is_said(share, said):
+    """On 1000 m; what is simulated in the first three seconds, 69 m, is not compared."""
+    found = steady({"Y:1:left": -21e3}, length=920.0, until=69.0 + share * 1000.0)
+    assert any("compared from 69 to" in remark for remark in found.remarks) is said
+
+
+def test_accelerations_of_axleboxes_and_frames_are_not_those_of_the_floor():
+    sensors = "floor_front", "frame_1", "axlebox_1_left"
+    read = {f"sensor_acceleration:{name}:{axis}": 0.1 for name in sensors for axis in "yz"}
+    found = steady(read, length=300.0, sensors=sensors)
+    assert {one.quantity.name[:6] for one in found.comparisons} == {"body_y", "body_z"}
+    assert {pair.place for one in found.comparisons for pair in one.pairs} == {"floor_front"}
+
+
 OTHER = np.array([0.27, 1.13, 2.6, 4.1, 7.3, 11.9, 19.1])  # Hz: not alike, so that no place moves
 B, M = Tones(11, (1, 3), 0.4, 0.3), Tones(12, (1, 3), 0.5, 0.3, OTHER)
 MEASURED = {
