@@ -474,3 +474,25 @@ def test_a_clock_in_ms_and_a_distance_in_km_taken_for_si_are_refused(
             file[name] = x
     with pytest.raises(railsim.InputError, match=re.escape(words)):
         railsim.load_measurement(path, [f"file={tmp_path / 'a.h5'}"])
+
+
+def test_a_run_that_is_moved_keeps_its_speed_the_rate_of_its_place(tmp_path):
+    run = railsim.load_measurement(written(tmp_path)).moved(7.0, 0.05)
+    assert run.distance == pytest.approx(7.0 + 1.05 * 50.0 * t)
+    assert run.speed == pytest.approx(np.gradient(run.distance, run.time))
+
+
+@pytest.mark.parametrize("f", [7.0, 20.0, 30.0])
+def test_a_lower_rate_is_taken_behind_a_low_pass_at_two_fifths_of_it(tmp_path, f):
+    """|H|^2 = 1/(1 + (f/20 Hz)^8) of a tone at 50 values a second; what is in a gap is lost."""
+    run = railsim.load_measurement(written(tmp_path))
+    tone = np.cos(2.0 * np.pi * f * t)
+    tone[1000] = np.nan
+    thin = replace(run, channels={**run.channels, "box": tone}).resampled(50.0)
+    assert thin.rate == pytest.approx(50.0)
+    assert thin.time == pytest.approx(np.arange(300) / 50.0)
+    there = (np.abs(thin.time - 2.0) > 0.5) & (thin.time > 0.5) & (thin.time < 5.5)
+    gain = 1.0 / np.sqrt(1.0 + (f / 20.0) ** 8)
+    wanted = gain * np.cos(2.0 * np.pi * f * thin.time)
+    assert thin["box"][there] == pytest.approx(wanted[there], abs=0.02)
+    assert np.flatnonzero(np.isnan(thin["box"])).tolist() == [100]

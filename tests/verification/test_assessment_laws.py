@@ -5,6 +5,7 @@ of ISO 2631-1:1997, tables 3 and 4.
 """
 
 import math
+from dataclasses import replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -15,6 +16,8 @@ from scipy import signal
 
 from railsim.assessment import track_quality
 from railsim.assessment.comfort import (
+    MeanComfort,
+    TransitionComfort,
     en12299_mean_comfort,
     event_comfort,
     iso2631_vibration,
@@ -22,7 +25,7 @@ from railsim.assessment.comfort import (
     p_de,
     transition_comfort,
 )
-from railsim.assessment.comfort_report import _Gathered
+from railsim.assessment.comfort_report import PointComfort, _Gathered, short_of_blocks
 from railsim.assessment.criteria import CRITERIA, Measured, steering_index
 from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
 from railsim.assessment.safety import (
@@ -46,6 +49,7 @@ from railsim.assessment.wear import (
 from railsim.assessment.wear_report import _patches
 from railsim.assessment.weighting import WEIGHTINGS
 from railsim.contact.geometry import contact_geometry
+from railsim.definitions.loading import load_comfort_limits
 from railsim.errors import InputError
 from railsim.profiles import load_profile
 from railsim.result.filters import (
@@ -650,3 +654,18 @@ def test_track_quality_is_that_of_the_worse_rail_between_3_and_25_m(worse, monke
         across, along = (np.sqrt(((size * left(of)) ** 2 + rest) / 2.0)
                          for size, of in ((2e-3, 20.0), (3e-3, 4.0)))  # fmt: skip
         assert found == pytest.approx((across, along), rel=0.01)
+
+
+def test_record_of_a_point_has_the_worst_transition_and_the_worst_block_of_each_axis():
+    blocks = np.array([[0.1, 0.5, 0.2], [0.3, 0.4, 0.9]])
+    mean = MeanComfort(1.0, 2.0, 3.0, blocks, 2)
+    passed = [TransitionComfort(0.0, 1.0, 0.5, 0.1, 1.0, *p) for p in ((8.0, 2.0), (5.0, 3.0))]
+    point = PointComfort("floor_front", 9.5, mean, np.array([0.2, 0.3, 0.6]), {}, tuple(passed), {})
+    found = point.record(load_comfort_limits("comfort"))
+    assert found["P_CT"] == {"standing": 8.0, "seated": 3.0}
+    assert found["continuous_largest"] == [0.3, 0.5, 0.9]
+    assert found["iso2631_total"] == pytest.approx(0.7)
+    assert [found[name] for name in ("N_MV", "N_VA", "N_VD", "blocks")] == [1.0, 2.0, 3.0, 2]
+    assert short_of_blocks([point]) == "2 blocks of 5 s, EN 12299 requires 60"
+    whole = replace(point, mean=replace(mean, blocks=60))
+    assert short_of_blocks([whole]) == ""

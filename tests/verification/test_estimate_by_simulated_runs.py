@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import railsim
-from railsim.observation import simulated
+from railsim.definitions.excitations.base import CHANNELS
+from railsim.observation import Assumed, simulated
 from railsim.observation.innovations import Powers, likely_sizes, spectra_of
 from railsim.observation.pieces import STEP, Piece
-from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, refined
+from railsim.observation.simulated import CHANGE, Reading, SimulatedRun, _series, refined
 
 N = 400
 
@@ -155,3 +156,33 @@ def test_a_run_goes_from_100_m_ahead_of_its_piece_to_15_m_beyond(monkeypatch, wi
     assert rows[0][0] <= begin - 100.0
     assert rows[-1][0] > end + 15.0
     assert seen["track"].length > end + 15.0
+
+
+def test_forces_of_a_simulated_run_are_those_of_their_wheel_or_wheelset():
+    """Wheelsets count from 1, the left wheel before the right one."""
+    Q = np.arange(24.0).reshape(3, 4, 2)
+    result = {"Q": Q, "Y": -Q, "sum_Y": 100.0 + Q[..., 0], "wheelset_lateral": 200.0 + Q[..., 0]}
+    for w in range(4):
+        for k, side in enumerate(("left", "right")):
+            assert _series(result, f"Q.{w + 1}.{side}").tolist() == Q[:, w, k].tolist()
+            assert _series(result, f"Y.{w + 1}.{side}").tolist() == (-Q[:, w, k]).tolist()
+        assert _series(result, f"sum_Y.{w + 1}").tolist() == (100.0 + Q[:, w, 0]).tolist()
+        assert _series(result, f"lateral.{w + 1}").tolist() == (200.0 + Q[:, w, 0]).tolist()
+
+
+def test_power_that_is_assumed_has_the_variance_of_the_source_within_the_wavelengths():
+    """ERRI B176, low: cross level as an angle, which is a height over 1.5 m; b = 0.75 m.
+
+    Two-sided power over the points of a record: the mean square is its sum over both sides.
+    """
+    A, omega_c, omega_r, omega_s = (4.032e-7, 0.8246, 0.0206, 0.4380)
+    w = np.linspace(2.0 * np.pi / 60.0, 2.0 * np.pi / 4.0, 200_001)
+    level = A * omega_c**2 / ((w**2 + omega_r**2) * (w**2 + omega_c**2))
+    angle = level * w**2 / (w**2 + omega_s**2) / 0.75**2
+    points = 4000
+    k = 2.0 * np.pi * np.fft.rfftfreq(points, STEP)
+    assumed = Assumed("erri_b176_low", scale=1.3, wavelengths=(4.0, 60.0))
+    sums = 2.0 * assumed.power(k, points).sum(axis=0) / points
+    found = dict(zip(CHANNELS, sums, strict=True))
+    assert found["vertical"] == pytest.approx(1.3**2 * np.trapezoid(level, w), rel=1e-4)
+    assert found["cross_level"] == pytest.approx(1.3**2 * 1.5**2 * np.trapezoid(angle, w), rel=1e-4)
