@@ -14,7 +14,7 @@ from railsim.measurement.alignment import shift_of
 from railsim.measurement.clock import bridged, clock_of, delayed
 from railsim.measurement.columns import _length
 from railsim.measurement.counterpart import amplified
-from railsim.measurement.likeness import likeness
+from railsim.measurement.likeness import Likeness, likeness
 from railsim.measurement.position import position
 
 
@@ -223,3 +223,63 @@ def test_shares_of_missing_values_are_plain_numbers():
     gappy = np.where(np.arange(len(V)) < 3, V, np.nan)
     _, _, (remark, *_) = position("made", how, TIME, {"distance": WAY, "speed": gappy}, None)
     assert "gaps (99.8 %)" in remark
+
+
+@pytest.mark.parametrize(
+    ("correlation", "ratio", "lag", "drift", "words"),
+    [
+        (-0.51, 1.0, 0.0, 0.0, "opposite sign"), (-0.49, 1.0, 0.0, 0.0, ""),
+        (0.51, 9.81 * 1.34, 0.0, 0.0, "9.81 (g) times"), (0.51, 9.81 * 1.36, 0.0, 0.0, ""),
+        (0.51, 9.81 / 1.34, 0.0, 0.0, "9.81 (g) times"), (0.49, 9.81, 0.0, 0.0, ""),
+        (0.51, 1.0 / 9.81, 0.0, 0.0, "1/9.81 (g) times"), (0.1, 1340.0, 0.0, 0.0, "1000 times"),
+        (0.1, 1.34e-3, 0.0, 0.0, "1/1000 times"), (0.1, 1.36e-3, 0.0, 0.0, ""),
+        (0.9, 1.0, 0.0, 0.021, "runs apart by 21 ms"), (0.9, 1.0, 0.0, 0.019, ""),
+        (0.9, 1.0, 0.0, -0.021, "runs apart by -21 ms"), (0.9, 1.0, 0.0, np.nan, ""),
+        (0.81, 1.0, 0.021, 0.0, "comes 21 ms later"), (0.81, 1.0, -0.021, 0.0, "21 ms earlier"),
+        (0.81, 1.0, 0.019, 0.0, ""), (0.79, 1.0, 0.021, 0.0, ""),
+    ],
+)  # fmt: skip
+def test_what_looks_wrong_with_a_channel_is_said_from_its_border_on(
+    correlation, ratio, lag, drift, words
+):
+    """35 % around a factor, correlations of 0.5 and 0.8, two steps of 10 ms."""
+    said = Likeness(correlation, ratio, lag, drift).remark("Q1", 0.01)
+    assert words in said
+    assert bool(said) == bool(words)
+
+
+@pytest.mark.parametrize(("share", "said"), [(1.0021, "+0.21 %"), (1.0019, ""), (0.9979, "-0.21 %"),
+                                             (0.9981, "")])  # fmt: skip
+def test_distance_and_speed_may_run_apart_by_a_fifth_of_a_percent(share, said):
+    how = SimpleNamespace(speed=None, start=0.0)
+    axes = {"distance": share * 20.0 * TIME, "speed": np.full(len(TIME), 20.0)}
+    s, _, remarks = position("made", how, TIME, axes, None)
+    assert [said in remark for remark in remarks] == ([True] if said else [])
+    assert s == pytest.approx(axes["distance"])
+
+
+@pytest.mark.parametrize(
+    ("share", "back", "refused"),
+    [
+        (1.49, 0.0, ""),
+        (1.51, 0.0, "by speed"),
+        (0.51, 0.0, ""),
+        (0.49, 0.0, "by speed"),
+        (1.0, 0.9, ""),
+        (1.0, 1.1, "falls by 1.1"),
+    ],
+)
+def test_a_distance_that_contradicts_the_speed_or_falls_is_refused(share, back, refused):
+    """By half, and by a metre."""
+    how = SimpleNamespace(speed=None, start=0.0)
+    way = share * 20.0 * TIME
+    middle = len(way) // 2
+    way[middle] = way[middle - 1] - back if back else way[middle]
+    axes = {"distance": way, "speed": np.full(len(TIME), 20.0)}
+    if refused:
+        with pytest.raises(InputError, match=refused):
+            position("made", how, TIME, axes, None)
+    else:
+        s = position("made", how, TIME, axes, None)[0]
+        assert s[-1] == pytest.approx(way[-1])
+        assert np.all(np.diff(s) > 0.0)

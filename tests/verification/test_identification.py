@@ -620,3 +620,28 @@ def test_spectra_are_compared_in_third_octaves():
         for aside in (2.0**-0.13, 2.0**0.13):
             (rows,) = form.features(prepared, np.sin(2.0 * np.pi * f * aside * t)[None])
             assert np.argmax(rows) == band
+
+
+def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tmp_path):
+    """White noise of the file's rate has the share 2 (f2 - f1)/rate of its variance in a band.
+
+    100 m before the record, as far as there is track, the run begins; 2 s later it counts.
+    """
+    vehicle = quarter()
+    run = railsim.load_measurement(measured(tmp_path, vehicle))
+    long = TRACK.replace(plan=[{"type": "STR", "length": 500.0}])
+    model = model_of(vehicle, [run], long)
+    for band in ((0.5, 14.0), (1.0, 3.0)):  # the second one at fewer values than are measured
+        one = prepared(run, model, band, long)
+        stated = [run.definition.channels[name].noise for name in one.names]
+        share = np.sqrt(2.0 * (band[1] - band[0]) / RATE)
+        assert one.noise == pytest.approx(share * np.array(stated), rel=1e-6)
+    for shift, start in ((40.0, 0.0), (150.0, 50.0)):
+        one = prepared(run.moved(shift), model, (0.5, 14.0), long).run
+        first = shift + run.distance[0]
+        assert one.start == pytest.approx(start + run.distance[0] * (start > 0.0))
+        assert one.at[0] == pytest.approx(max(first, one.start + 2.0 * SPEED), abs=0.2)
+    for wave, mode in ((0.009, "constant"), (0.011, "table")):  # from the least to the largest
+        speed = SPEED * (1.0 + 0.5 * wave * np.cos(2.0 * np.pi * np.arange(len(run.time)) / 400.0))
+        drive = prepared(replace(run, speed=speed), model, (0.5, 14.0), long).run.settings.drive
+        assert drive.mode == mode

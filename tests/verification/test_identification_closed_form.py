@@ -15,7 +15,7 @@ from scipy import optimize, stats
 import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
 from railsim.identification.fit import _counting, _solved
-from railsim.identification.identified import Channel
+from railsim.identification.identified import Channel, _wheels
 from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem
 from railsim.identification.residuals import Form, whiteness
@@ -338,3 +338,24 @@ def test_residuals_are_white_where_chance_gives_their_statistic_once_in_a_hundre
     none = np.zeros(3)
     one = Channel("run", "Q", "Q:1:left", STEP, none, none, none, none, 1.0, 1.6, probability)
     assert one.is_white is white
+
+
+def test_a_stretch_of_more_than_a_metre_in_a_kilometre_is_said(monkeypatch):
+    monkeypatch.setitem(globals(), "PLACES", [(0.8, 1.1e-3), (-1.1, -0.9e-3)])
+    found = identified(runs(np.random.default_rng(7), 0.1), [Parameter(n, (n,)) for n in TRUE])
+    (said,) = [remark for remark in found.remarks if "stretched" in remark]
+    assert said.startswith("run 0: its arc length is stretched by +1.10 m/km")
+
+
+def test_an_identified_profile_is_that_of_the_wheels_that_had_it():
+    """Left and right wheel; a wheelset whose profile is not sought keeps its own."""
+    axle = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
+    coach = railsim.load_vehicle("coach_manchester")
+    files = {"cone_1in20": ("found.csv", "")}
+    for pair, expected in (
+        (["cone_1in20", "S1002"], ["found.csv", "S1002"]),
+        (["S1002", "cone_1in20"], ["S1002", "found.csv"]),
+        (["cone_1in20", "cone_1in20"], ["found.csv", "found.csv"]),
+    ):
+        assert _wheels(coach.with_values({axle: pair}), files) == {axle: expected}
+    assert _wheels(coach, files) == {}
