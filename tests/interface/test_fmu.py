@@ -14,7 +14,7 @@ import railsim
 from railsim.cli import railsim as program
 from railsim.errors import InputError
 from railsim.fmi import Controller, fmu
-from railsim.fmi.unit import Unit
+from railsim.fmi.unit import Unit, exponents
 
 pytest.importorskip("pythonfmu3", reason="no PythonFMU3")
 validate_fmu = pytest.importorskip("fmpy.validation", reason="no FMPy").validate_fmu
@@ -158,6 +158,31 @@ def test_steps_of_communication_may_be_a_little_longer_than_those_of_the_run(uni
         assert called.do_step(3.0 + 20 * step, wrong).status.name == "error"
     assert "more than 0" in called.logged[-1][0]
     assert called.do_step(3.0 + 20 * step, step).status.name == "ok"
+
+
+def test_a_step_beyond_the_end_ends_with_the_run_at_the_time_of_the_program(unit, tmp_path):
+    """30 m at 20 m/s, from 3 s on; what the program asks for later is an error."""
+    with zipfile.ZipFile(unit) as packed:
+        packed.extractall(tmp_path)
+    Called.resources = str(tmp_path / "resources")
+    called = Called()
+    called.exit_initialization_mode()
+    last = called.do_step(3.0, 5.0)
+    assert last.terminateSimulation
+    assert last.status.name == "ok"
+    assert called._time == pytest.approx(4.5, abs=1e-6)
+    assert called._status == "complete"
+    assert called.do_step(4.5, 0.1).status.name == "error"
+
+
+@pytest.mark.parametrize(
+    ("unit_of_si", "defined"),
+    [("N", "kg m/s2"), ("Pa", "N/m2"), ("J", "N m"), ("W", "J/s"), ("N m/rad", "kg m2/s2 rad")],
+)
+def test_units_are_made_of_the_base_units_as_the_si_defines_them(unit_of_si, defined):
+    left, right = exponents(unit_of_si), exponents(defined)
+    assert left == right
+    assert exponents("kg m/s2") == {"kg": 1, "m": 1, "s": -2}
 
 
 def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
