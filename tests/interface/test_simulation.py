@@ -240,8 +240,16 @@ def test_a_wheelset_is_ahead_by_its_own_way_in_the_vehicle(coach, track):
 
 
 def test_counts_of_a_run_are_those_of_its_time(coach, track):
-    """0.3 s in equal steps of a constant speed."""
-    facts = railsim.simulate(coach, track, speed=20.0, duration=0.3).attributes
+    """0.3 s in equal steps of a constant speed, and 0.3 s further on."""
+    way = {"speed": 20.0, "duration": 0.3}
+    first = railsim.simulate(coach, track, **way)
+    second = railsim.simulate(coach, track, duration=0.3, resume=first)
+    assert second["time"][0] == pytest.approx(0.3)
+    assert_counted(first.attributes)
+    assert_counted(second.attributes)
+
+
+def assert_counted(facts):
     assert facts["duration"] == pytest.approx(0.3, rel=1e-9)
     assert facts["real_time_factor"] * facts["cpu_time"] == pytest.approx(0.3, rel=1e-9)
     assert 0.0 < facts["cpu_time"] <= facts["wall_time"]
