@@ -192,3 +192,43 @@ def curve_of(radius):
         {"type": "STR", "length": 500.0},
     )
     return railsim.load_track("curve_r250").replace(plan=plan)
+
+
+STR, CST = {"type": "STR", "length": 100.0}, {"type": "CST", "length": 100.0}
+
+
+def curved(radius, cant):
+    """A transition, a curve and a transition, 40, 60 and 40 m, of a plan and of its cant."""
+    ends = {"type": "CLO", "length": 40.0}, {"type": "LIR", "length": 40.0}
+    return (
+        [ends[0], {"type": "CIR", "length": 60.0, "radius": radius}, ends[0], STR],
+        [ends[1], {**CST, "length": 60.0, "cant": cant}, ends[1], {**CST, "cant": 0.0}],
+    )
+
+
+@pytest.mark.parametrize(
+    ("curves", "found"),
+    [
+        ([(300.0, 0.1)], (300.0, 0.1)),
+        ([(-300.0, -0.1)], (-300.0, -0.1)),
+        ([(400.0, 0.1), (-300.0, -0.05)], (-300.0, -0.05)),
+        ([(-300.0, -0.1), (400.0, 0.05)], (-300.0, -0.1)),
+        ([(1499.0, 0.03)], (1499.0, 0.03)),
+        ([(1501.0, 0.03)], None),
+    ],
+)
+def test_tightest_curve_has_its_own_cant_and_is_none_above_1500_m(curves, found):
+    plan, cant = [STR], [{**CST, "cant": 0.0}]
+    for parts in (curved(*one) for one in curves):
+        plan, cant = plan + parts[0], cant + parts[1]
+    curve = flange.tightest_curve(railsim.load_track("straight").replace(plan=plan, cant=cant))
+    assert (curve is None) == (found is None)
+    if found:
+        assert curve == pytest.approx((1.0 / found[0], found[1]), rel=1e-6)
+
+
+@pytest.mark.parametrize("radius", [300.0, -300.0])
+def test_a_track_that_ends_in_a_transition_is_tightest_there(radius):
+    plan = [STR, {"type": "CLO", "length": 60.0, "radius_end": radius}]
+    curve = flange.tightest_curve(railsim.load_track("straight").replace(plan=plan))
+    assert curve == pytest.approx((1.0 / radius, 0.0))
