@@ -132,9 +132,10 @@ def test_changed_inputs_are_refused_without_resume(tmp_path, simulated, capsys):
     assert simulated == [10.0, 10.0]
 
 
-def test_resume_computes_only_what_has_changed(tmp_path, simulated):
+def test_resume_computes_only_what_has_changed(tmp_path, simulated, capsys):
     assert main(arguments(tmp_path, 10, 20)) == 0
     assert main(arguments(tmp_path, 10, 20, 30, more=["--resume"])) == 0
+    assert "1 of 3 runs computed, 2 were there already" in capsys.readouterr().out
     assert simulated == [10.0, 20.0, 30.0]
 
 
