@@ -148,14 +148,33 @@ def test_a_run_goes_from_100_m_ahead_of_its_piece_to_15_m_beyond(monkeypatch, wi
     track = track.replace(gauge_widening=widening) if widening else track
     piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 40.0), 500.0)
     run = SimulatedRun(railsim.load_vehicle("coach_manchester"), track, piece, {}, [])
+    alignment, level, cross_level, gauge = 4.0, 3.0, 2.0, 1.0  # mm
+    fields = 1e-3 * np.tile([[alignment], [level], [cross_level], [gauge]], N)
     with pytest.raises(LookupError):
-        run(np.zeros((4, N)))
+        run(fields)
     end = begin + STEP * (N - 1)
     assert (seen["start"], seen["until"]) == pytest.approx((begin - 100.0, end + 15.0))
     rows = seen["track"].irregularities[0].rows
     assert rows[0][0] <= begin - 100.0
     assert rows[-1][0] > end + 15.0
     assert seen["track"].length > end + 15.0
+    # from nothing to the first value and from the last one to nothing in a straight line
+    s, y_left, z_left, y_right, z_right = np.transpose(rows)
+    share = np.interp(s, [rows[0][0], begin, end, rows[-1][0]], [0.0, 1.0, 1.0, 0.0])
+    for found, sums in (
+        (0.5 * (y_left + y_right), alignment), (0.5 * (z_left + z_right), level),
+        (z_right - z_left, cross_level), (y_right - y_left, gauge),
+    ):  # fmt: skip
+        assert 1e3 * found == pytest.approx(sums * share, abs=0.02 * sums)
+
+
+@pytest.mark.parametrize(("spread", "steady"), [(0.009, True), (0.011, False)])
+def test_a_speed_is_constant_within_a_hundredth_of_its_mean(spread, steady):
+    speeds = 40.0 + np.linspace(-0.5, 0.5, N) * spread * 40.0
+    grid = 500.0 + STEP * np.arange(N)
+    piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), speeds, 500.0)
+    coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    assert SimulatedRun(coach, track, piece, {}, []).is_steady is steady
 
 
 def test_forces_of_a_simulated_run_are_those_of_their_wheel_or_wheelset():

@@ -174,6 +174,18 @@ def test_a_channel_is_wrong_by_sign_by_size_or_by_what_nobody_else_reads(
     assert bool(said) == bool(words)
 
 
+@pytest.mark.parametrize(("reading", "found"), [(4, {2}), (3, set())])
+def test_of_three_channels_none_can_be_said_to_be_the_wrong_one(reading, found):
+    random = np.random.default_rng(5)
+    given = powers(random)
+    read = channels(random, given)
+    read[2] = -read[2]
+    there = np.ones(read.shape, dtype=bool)
+    there[reading:] = False
+    piece = SimpleNamespace(there=there)
+    assert disagreeing(given, piece, read, [f"channel {c}" for c in range(5)])[0] == found
+
+
 def test_powers_of_sizes_are_those_of_their_parts():
     """Errors of the model are shares of what a channel reads; contacts in y and yaw, z and roll."""
     random = np.random.default_rng(6)
