@@ -34,6 +34,7 @@ from railsim.definitions.vehicle.out_of_round import Sections as WheelSections
 from railsim.definitions.vehicle.tables import Service
 from railsim.definitions.wear_law import ArchardMap, FrictionWork, WearLawFile
 from railsim.errors import InputError
+from railsim.observation import Assumed
 from railsim.simulation.conditions import check_range, initial_speed
 from railsim.studies.stationary import StationaryValue
 
@@ -157,6 +158,13 @@ BORDERS = {
     ),
     "lasts some time": (
         lambda t: check_range(LINE, 20.0, 0.0, t, None), [TINY], [0.0, math.inf]
+    ),
+    "irregularities that are sought have waves of 1 m and longer": (
+        lambda low: Assumed(wavelengths=(low, 300.0)).check(), [1.0, below(300.0)],
+        [below(1.0), 300.0],
+    ),
+    "and of up to 300 m": (
+        lambda high: Assumed(wavelengths=(3.0, high)).check(), [300.0], [above(300.0)]
     ),
     "has the speed of its table, to a thousandth": (
         lambda v: initial_speed(IN_TABLE, v, 50.0), [19.981, 20.019], [19.979, 20.021]

@@ -283,3 +283,21 @@ def test_a_distance_that_contradicts_the_speed_or_falls_is_refused(share, back, 
         s = position("made", how, TIME, axes, None)[0]
         assert s[-1] == pytest.approx(way[-1])
         assert np.all(np.diff(s) > 0.0)
+
+
+@pytest.mark.parametrize(("extra", "gap"), [(0.6, True), (0.4, False)])
+def test_a_step_of_one_and_a_half_is_a_gap(extra, gap):
+    written = 0.01 * (np.arange(200) + extra * (np.arange(200) >= 100))
+    said = "".join(clock_of("made", written).remarks)
+    assert ("The record has 1 gaps, together 0.016 s" in said) is gap
+
+
+@pytest.mark.parametrize(("off", "equal"), [(0.24, True), (0.26, False)])
+def test_a_clock_may_leave_its_line_by_a_quarter_of_a_step(off, equal):
+    number = np.arange(401)
+    written = 0.01 * (number + off * np.sin(2.0 * np.pi * number / 40.0))
+    found = clock_of("made", written)
+    assert ("unequal" in "".join(found.remarks)) is not equal
+    if equal:
+        assert found.time == pytest.approx(0.01 * number, abs=1e-4)
+        assert found.places.tolist() == number.tolist()
