@@ -301,3 +301,11 @@ def test_a_clock_may_leave_its_line_by_a_quarter_of_a_step(off, equal):
     if equal:
         assert found.time == pytest.approx(0.01 * number, abs=1e-4)
         assert found.places.tolist() == number.tolist()
+
+
+@pytest.mark.parametrize(("late", "found"), [(0.95, True), (-0.95, True), (1.1, False)])
+def test_a_channel_is_looked_for_within_a_second(late, found):
+    time = np.arange(0.0, 40.0, 0.02)
+    one = likeness(signal(time - late, 0.5), signal(time, 0.5), 0.02)
+    assert (one.lag == pytest.approx(late, abs=0.021) and one.correlation > 0.9) is found
+    assert abs(one.lag) <= 1.0 + 1e-9
