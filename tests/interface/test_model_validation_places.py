@@ -7,6 +7,7 @@ from made_record import Q0, curve, made, track
 from test_section_values import FORCE, OUT, RIDE, Expected, Tones
 
 import railsim
+from railsim.assessment.model_validation import _alike
 from railsim.assessment.sections import TestSection
 from railsim.definitions.measurement import MeasurementFile
 from railsim.measurement import Measurement
@@ -135,6 +136,23 @@ def test_accelerations_of_axleboxes_and_frames_are_not_those_of_the_floor():
     found = steady(read, length=300.0, sensors=sensors)
     assert {one.quantity.name[:6] for one in found.comparisons} == {"body_y", "body_z"}
     assert {pair.place for one in found.comparisons for pair in one.pairs} == {"floor_front"}
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        ({"name": "another name"}, True), ({"friction": (0.2, 0.2)}, True),
+        ({"plan": [{"type": "STR", "length": 99.0}]}, False),
+        ({"cant": [{"type": "CST", "length": 99.0, "cant": 0.01}]}, False),
+        ({"vertical": [{"type": "CST", "length": 99.0, "gradient": 0.01}]}, False),
+        ({"gauge": 1.44}, False),
+        ({"irregularities": [{"type": "dip", "s": 9.0, "length": 2.0, "depth": 0.01}]}, False),
+    ],
+)  # fmt: skip
+def test_tracks_are_alike_in_course_gauge_and_irregularities(change, same):
+    one = track({"type": "STR", "length": 700.0})
+    assert _alike(one, one.replace(**change)) is same
+    assert _alike(one.replace(**change), one) is same
 
 
 OTHER = np.array([0.27, 1.13, 2.6, 4.1, 7.3, 11.9, 19.1])  # Hz: not alike, so that no place moves
