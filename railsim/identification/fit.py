@@ -17,7 +17,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, argument_error
 from railsim.files.access import make_folder
-from railsim.identification.identified import AT_BOUND, Channel, Identified, Place
+from railsim.identification.identified import AT_BOUND, INFINITE, Channel, Identified, Place
 from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem
 from railsim.identification.residuals import FORMS, Form, banded, whiteness
@@ -30,6 +30,7 @@ from railsim.processes import available_cores
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 COARSE, FINE = 0.1, 3e-5  # of the sum of squares; of it and of the coordinates
+SILENT = 1e-3  # of the noise of a channel: change that is none
 FIRST = 0.05  # of the rms of a channel: least noise that is taken for the first weights
 SETTLED = 0.05  # change of a weight
 MOST_STEPS = 30
@@ -324,6 +325,11 @@ def _outcome(
 ) -> Identified:
     count = problem.count
     jacobian = problem.derivatives_near(x)
+    # what nothing depends on goes back to the file's value: the search leaves it anywhere
+    silent = np.linalg.norm(jacobian, axis=0) * INFINITE < 1.0
+    back = np.where(silent, start, x)
+    if silent.any() and np.abs(problem.vector(back) - problem.vector(x)).max() < SILENT:
+        x = back
     covariance, inflation = _covariance(problem, x, jacobian, loss)
     jacobian = np.sqrt(_counting(problem.vector(x), loss))[:, None] * jacobian
     data = len(jacobian) - len(problem.before(x))

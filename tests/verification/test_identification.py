@@ -284,6 +284,16 @@ def test_two_springs_in_series_are_named(tmp_path):
     assert together == pytest.approx(1.2e6 * 0.8 / 1.8, rel=0.02)
 
 
+def test_what_nothing_depends_on_keeps_its_value(tmp_path):
+    """Vertical motion does not know the yaw stiffness; the search had left it at a bound."""
+    silent = "primary.rotational_stiffness.2"
+    path = measured(tmp_path, quarter(), {PRIMARY: 1.1}, noise=0.05)
+    one = railsim.identify(quarter(), path, [PRIMARY, silent], band=(0.5, 14.0), workers=1)
+    assert one.factors[0] == pytest.approx(1.1, rel=0.03)
+    assert one.factors[1] == 1.0
+    assert one.unidentified[0].startswith(f"The data say nothing about {silent}")
+
+
 def test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white(tmp_path):
     damper = {
         "kind": "spring_damper", "bodies": ["frame", "body"],
