@@ -243,7 +243,7 @@ class _Smooth:
         run = SimulatedRun(self.vehicle, self.track, piece, outputs, list(names))
         read = piece.signals
         if self.simulations and not run.is_steady:
-            smooth = run(np.zeros((len(QUANTITIES), n)))
+            smooth = run(np.zeros((len(QUANTITIES), points)))
             if isinstance(smooth, str):
                 raise ModelError(f"the run over the track without irregularities: {smooth}")
             read = read - smooth.channels

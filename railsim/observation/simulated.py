@@ -94,15 +94,21 @@ class SimulatedRun:
     def __call__(self, fields: Floats) -> Reading | str:
         """Return what is read over irregularities at the grid, or why the run ended before.
 
-        `fields` (float64[quantity, n]): [m].
+        `fields` (float64[quantity, points]): [m]; beyond the grid those with which the smoother,
+        whose fields are periodic, brings the vehicle to its beginning and has it leave.
         """
         s = self.piece.grid - self._moved
         before = np.arange(self._start, s[0] - 0.5 * STEP, STEP)
         after = s[-1] + np.arange(STEP, AFTER, STEP)
-        rails = RAILS.T @ fields
-        first = np.outer(rails[:, 0], np.linspace(0.0, 1.0, len(before), endpoint=False))
-        last = np.outer(rails[:, -1], np.linspace(1.0, 0.0, len(after)))
-        rows = np.vstack([np.concatenate([before, s, after]), np.hstack([first, rails, last])]).T
+        rails, n = RAILS.T @ fields, len(s)
+        beyond = rails.shape[1] - n
+        first, last = np.zeros((len(rails), len(before))), np.zeros((len(rails), len(after)))
+        some = min(len(before), beyond)
+        first[:, len(before) - some :] = rails[:, n + beyond - some :] * np.linspace(0.0, 1.0, some)
+        some = min(len(after), beyond)
+        last[:, :some] = rails[:, n : n + some] * np.linspace(1.0, 0.0, some)
+        on_rails = np.hstack([first, rails[:, :n], last])
+        rows = np.vstack([np.concatenate([before, s, after]), on_rails]).T
         irregularity = {"type": "measured", "rows": rows.tolist(), "fade": 0.0}
         changes: dict[str, Any] = {"irregularities": [irregularity]}
         end = float(s[-1]) + 0.5 * AFTER
@@ -164,7 +170,7 @@ def refined(
 ) -> Refined | str:
     """Solve (1), starting from the linear estimate.
 
-    `run`: float64[quantity, n] to what is read, n points of the grid. `gain`, `seen`: K and H:
+    `run`: float64[quantity, points] to what is read on the n of the grid. `gain`, `seen`: K and H:
     float64[channel, points] to float64[quantity, points] and back. `data` (float64[channel, n]):
     y, and where it exists.  A constant in it is the channel's, not the track's. `first`,
     `deviations` (float64[quantity, points]): Irregularities to begin with, and what they are
@@ -179,7 +185,7 @@ def refined(
     residuals: list[Floats] = []
     best: Refined | str = "not there"
     for _ in range(most):
-        reading = run(r[:, :n])
+        reading = run(r)
         if isinstance(reading, str):
             return reading if isinstance(best, str) else best
         rest = np.where(there, y - reading.channels, 0.0)

@@ -136,7 +136,11 @@ def test_a_run_on_track_that_differs_from_place_to_place_begins_at_its_place(cha
 
 @pytest.mark.parametrize(("widening", "begin"), [(None, 100.0), ([[0.0, 0.01]], 500.0)])
 def test_a_run_goes_from_100_m_ahead_of_its_piece_to_15_m_beyond(monkeypatch, widening, begin):
-    """On rails that are irregular as far as that; where all places are alike it begins at 0."""
+    """On rails that are irregular as far as the smoother has them, whose fields are periodic.
+
+    What lies beyond the end of the grid is ahead of its begin too; where all places are alike the
+    run begins at 0.
+    """
     seen = {}
 
     def simulate(vehicle, track, **how):
@@ -148,24 +152,26 @@ def test_a_run_goes_from_100_m_ahead_of_its_piece_to_15_m_beyond(monkeypatch, wi
     track = track.replace(gauge_widening=widening) if widening else track
     piece = Piece(grid, np.zeros((0, N)), np.zeros((0, N), dtype=bool), np.full(N, 40.0), 500.0)
     run = SimulatedRun(railsim.load_vehicle("coach_manchester"), track, piece, {}, [])
-    alignment, level, cross_level, gauge = 4.0, 3.0, 2.0, 1.0  # mm
-    fields = 1e-3 * np.tile([[alignment], [level], [cross_level], [gauge]], N)
+    more = round(60.0 / STEP)  # beyond the grid
+    wave = 1.0 + 0.2 * np.cos(2.0 * np.pi * np.arange(N + more) / (N + more))
+    sizes = {"alignment": 4.0, "level": 3.0, "cross_level": 2.0, "gauge": 1.0}  # mm
     with pytest.raises(LookupError):
-        run(fields)
+        run(1e-3 * np.outer(list(sizes.values()), wave))
     end = begin + STEP * (N - 1)
     assert (seen["start"], seen["until"]) == pytest.approx((begin - 100.0, end + 15.0))
     rows = seen["track"].irregularities[0].rows
     assert rows[0][0] <= begin - 100.0
     assert rows[-1][0] > end + 15.0
     assert seen["track"].length > end + 15.0
-    # from nothing to the first value and from the last one to nothing in a straight line
+    # from nothing 60 m ahead of the grid, and to nothing 30 m beyond it, in a straight line
     s, y_left, z_left, y_right, z_right = np.transpose(rows)
-    share = np.interp(s, [rows[0][0], begin, end, rows[-1][0]], [0.0, 1.0, 1.0, 0.0])
-    for found, sums in (
-        (0.5 * (y_left + y_right), alignment), (0.5 * (z_left + z_right), level),
-        (z_right - z_left, cross_level), (y_right - y_left, gauge),
+    share = np.interp(s, [begin - 60.0, begin, end, end + 30.0], [0.0, 1.0, 1.0, 0.0])
+    share *= wave[np.round((s - begin) / STEP).astype(int) % (N + more)]
+    for found, name in (
+        (0.5 * (y_left + y_right), "alignment"), (0.5 * (z_left + z_right), "level"),
+        (z_right - z_left, "cross_level"), (y_right - y_left, "gauge"),
     ):  # fmt: skip
-        assert 1e3 * found == pytest.approx(sums * share, abs=0.02 * sums)
+        assert 1e3 * found == pytest.approx(sizes[name] * share, abs=0.02 * sizes[name])
 
 
 @pytest.mark.parametrize(("spread", "steady"), [(0.009, True), (0.011, False)])
