@@ -15,7 +15,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten, groups
-from railsim.errors import Fault, Faults, InputError, argument_fault, nearest
+from railsim.errors import Fault, Faults, argument_error, argument_fault, nearest
 from railsim.model.assembly import check_fixed
 from railsim.notation import QUANTITIES
 from railsim.result import Result
@@ -71,26 +71,20 @@ class Inputs:
         """Return the inputs; raise InputError with all faults of speed, start and end."""
         number = speed_in_si(speed)
         check_numbers(speed=number, start=start, duration=duration, until=until)
-        first = initial_speed(settings, number, start)
-        check_range(track, first, start, duration, until)
         # of another type of number the time loop would be compiled again
-        return cls(track, settings, float(first), float(start), duration, until)
+        first, start = float(initial_speed(settings, number, start)), float(start)
+        check_range(track, first, start, duration, until)
+        return cls(track, settings, first, start, duration, until)
 
 
 def check_numbers(**values: object) -> None:
     """Raise InputError with everything among the arguments that is neither None nor a number."""
-    faults = [
-        argument_fault(
-            name,
-            "",
-            f"found {shortened(repr(value))}",
-            "a number" + " of m/s, or a text such as '72 km/h'" * (name == "speed"),
-        )
-        for name, value in values.items()
-        if value is not None and (not isinstance(value, Real) or isinstance(value, bool))
-    ]
-    if faults:
-        raise InputError(faults)
+    faults = Faults()
+    for name, value in values.items():
+        right = value is None or (isinstance(value, Real) and not isinstance(value, bool))
+        allowed = "a number" + " of m/s, or a text such as '72 km/h'" * (name == "speed")
+        faults.require(right, name, f"found {shortened(repr(value))}", allowed)
+    faults.check()
 
 
 def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
@@ -100,12 +94,10 @@ def initial_speed(settings: Settings, speed: float | None, start: float) -> floa
         first = float(np.interp(start, distance, value))
         if speed is not None and not math.isclose(speed, first, rel_tol=AS_IN_TABLE):
             allowed = f"none, or {first:g} m/s, that of settings.drive.speed_table at the start"
-            raise InputError([argument_fault("speed", "", f"found {speed:g} m/s", allowed)])
+            raise argument_error("speed", f"found {speed:g} m/s", allowed)
         return first
     if speed is None:
-        raise InputError(
-            [argument_fault("speed", "", "no speed is given", "a speed in m/s, e.g. 20")]
-        )
+        raise argument_error("speed", "no speed is given", "a speed in m/s, e.g. 20")
     return speed
 
 
@@ -113,32 +105,22 @@ def check_range(
     track: Track, speed: float, start: float, duration: float | None, until: float | None
 ) -> None:
     """Raise InputError with all faults of speed, start and end of a run."""
-    faults = []
+    faults, end = Faults(), f"{track.length:g} m"
     low, high = SPEED_RANGE
-    if not (math.isfinite(speed) and low <= speed <= high):
-        faults.append(
-            argument_fault("speed", "", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s")
-        )
-    if not (math.isfinite(start) and 0.0 <= start < track.length):
-        faults.append(argument_fault("start", "", f"found {start:g} m", f"0 to {track.length:g} m"))
-    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
-        faults.append(argument_fault("duration", "", f"found {duration:g} s", "a positive number"))
-    if duration is not None and until is not None:
-        faults.append(
-            argument_fault("duration", "", "given together with `until`", "one of the two")
-        )
-    if until is not None and not start < until <= track.length:
-        faults.append(
-            argument_fault(
-                "until",
-                "",
-                f"found {until:g} m",
-                f"more than the start, {start:g} m, and at most {track.length:g} m, "
-                "the track's plan",
-            )
-        )
-    if faults:
-        raise InputError(faults)
+    right = low <= speed <= high
+    faults.require(right, "speed", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s")
+    right = 0.0 <= start < track.length
+    faults.require(right, "start", f"found {start:g} m", f"0 to {end}")
+    if duration is not None:
+        right = 0.0 < duration < math.inf
+        faults.require(right, "duration", f"found {float(duration):g} s", "a positive number")
+        found = "given together with `until`"
+        faults.require(until is None, "duration", found, "one of the two")
+    if until is not None:
+        allowed = f"more than the start, {start:g} m, and at most {end}, the track's plan"
+        right = start < until <= track.length
+        faults.require(right, "until", f"found {float(until):g} m", allowed)
+    faults.check()
 
 
 def check_agreement(
@@ -209,47 +191,28 @@ def state_before(
         ):
             found = "not finite numbers in a row"
             allowed = 'a result, or its states: result.groups["state"]'
-            raise InputError([argument_fault("resume", "", found, allowed, "--continue")])
+            raise argument_error("resume", found, allowed, option="--continue")
         return TakenUp(*(one.astype(float) for one in values))
-    faults = []
-    if "end" not in resume.groups.get("state", {}):
-        faults.append(
-            argument_fault(
-                "resume",
-                "",
-                "the result holds no state at its end",
-                "a result of `railsim run`",
-                "--continue",
-            )
-        )
+    faults = Faults()
+
+    def require(right: bool, key: str, found: str, allowed: str) -> None:
+        if not right:
+            faults.append(argument_fault("resume", key, found, allowed, "--continue"))
+
+    ended = "end" in resume.groups.get("state", {})
+    require(ended, "", "the result holds no state at its end", "a result of `railsim run`")
     for kind, text in (("vehicle", vehicle.to_toml()), ("track", track.to_toml())):
-        if text != resume.attributes[f"{kind}_toml"]:
-            faults.append(
-                argument_fault(
-                    "resume",
-                    "",
-                    f"the result is of another {kind}",
-                    f"the {kind} with the assignments of the result",
-                    "--continue",
-                )
-            )
+        same = text == resume.attributes[f"{kind}_toml"]
+        allowed = f"the {kind} with the assignments of the result"
+        require(same, "", f"the result is of another {kind}", allowed)
     here, there = settings.model_dump(mode="json"), resume.settings().model_dump(mode="json")
-    faults += [
-        argument_fault(
-            "resume",
-            f"settings.{key}",
-            f"found {here[key]}",
-            f"{there[key]}, as in the result",
-            "--continue",
-        )
-        for key in here
-        if key not in OUTPUT_SETTINGS and here[key] != there[key]
-    ]
-    if settings.initial and here["initial"] != there["initial"]:
+    for key in here:
+        same = key in OUTPUT_SETTINGS or here[key] == there[key]
+        require(same, f"settings.{key}", f"found {here[key]}", f"{there[key]}, as in the result")
+    if settings.initial:
         found, allowed = "given, and the run has no start", "none, or that of the result"
-        faults.append(argument_fault("resume", "settings.initial", found, allowed, "--continue"))
-    if faults:
-        raise InputError(faults)
+        require(here["initial"] == there["initial"], "settings.initial", found, allowed)
+    faults.check()
     return state_before(vehicle, track, settings, resume.groups["state"])
 
 
@@ -258,6 +221,5 @@ def own_speed(before: Floats, speed: float | str | None, start: float) -> tuple[
     own = {"speed": float(before[-1]), "start": float(before[-2])}
     for name, given in (("speed", speed_in_si(speed)), ("start", start or None)):
         if given is not None and given != own[name]:
-            found, allowed = "given together with `resume`", "the state's own is used"
-            raise InputError([argument_fault(name, "", found, allowed)])
+            raise argument_error(name, "given together with `resume`", "the state's own is used")
     return own["speed"], own["start"]

@@ -10,7 +10,7 @@ from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.kernels.controllers import START
 from railsim.kernels.state import TIME
 from railsim.model.assembly import SharedTables, assemble
@@ -131,7 +131,7 @@ def _taken_up(before: Floats, length: int) -> Floats:
     """Return values with which a run goes on, of which there have to be so many."""
     if len(before) != length:
         found, allowed = f"a state of {before.size} values", f"{length}, those of this vehicle"
-        raise InputError([argument_fault("resume", "", found, allowed, "--continue")])
+        raise argument_error("resume", found, allowed, option="--continue")
     return before.copy()
 
 

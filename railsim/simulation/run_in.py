@@ -22,7 +22,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
-from railsim.errors import InputError, ModelError, argument_fault
+from railsim.errors import InputError, ModelError, argument_error
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
     ASIDE,
@@ -281,17 +281,9 @@ def _run(
     DOING.info("on the way to the start")
     status = advance(model, system, state, step, steps, scheme, progress)
     if status != RUNNING:
-        raise InputError(
-            [
-                argument_fault(
-                    "start",
-                    "",
-                    f"the vehicle does not stay on the track at s = {start:g} m, "
-                    f"{where}, at {state[SPEED]:g} m/s",
-                    "a start on straight track or a lower speed",
-                )
-            ]
-        )
+        words = f"the vehicle does not stay on the track at s = {start:g} m, "
+        found = f"{words}{where}, at {state[SPEED]:g} m/s"
+        raise argument_error("start", found, "a start on straight track or a lower speed")
 
 
 def _curve(track: Track, s: float) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from railsim.arrays import Floats
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import ModelError, input_error
 from railsim.kernels.actuators import BY_BRAKE, LIMIT, MODE
 from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.rhs import STANDSTILL_SPEED
@@ -123,16 +123,8 @@ class StepChoice:
         # a step is too long or not: growth at a shorter one comes from differences across a kink
         if requested <= stable:
             return requested
-        raise InputError(
-            [
-                Fault(
-                    "settings",
-                    "step",
-                    f"found {requested:g} s, unstable at {speed:g} m/s",
-                    f"at most {stable:g} s",
-                )
-            ]
-        )
+        found = f"found {requested:g} s, unstable at {speed:g} m/s"
+        raise input_error("settings", found, f"at most {stable:g} s", "step")
 
     def _stable(self, speed: float, interval: float) -> float:
         """Longest stable step at a speed that divides the output interval."""

@@ -20,7 +20,7 @@ from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault, nearest
+from railsim.errors import argument_error, nearest
 from railsim.kernels.actuators import COMMAND, send
 from railsim.kernels.controllers import BASE, VALUE
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
@@ -194,12 +194,11 @@ class Simulation:
         InputError : the run has ended, or `dt` is no positive time.
         """
         if not self.running:
-            fault = argument_fault("step", "", self._ended_because(), "a new Simulation")
-            raise InputError([fault])
+            raise argument_error("step", self._ended_because(), "a new Simulation")
         if dt is None:
             dt = self._missing or self._next()
         elif not 0.0 < dt < math.inf:  # NaN is not
-            raise InputError([argument_fault("dt", "", f"found {dt} s", "a positive time")])
+            raise argument_error("dt", f"found {dt} s", "a positive time")
         begin = time.thread_time()
         self._seen = None
         left = float(dt) + self._taken_back() + self._behind
@@ -360,9 +359,9 @@ class Simulation:
         if actuator not in names:
             found = f"no actuator '{actuator}'"
             allowed = nearest(actuator, names) if names else "the vehicle has none"
-            raise InputError([argument_fault("actuator", "", found, allowed)])
+            raise argument_error("actuator", found, allowed)
         if not math.isfinite(value):
-            raise InputError([argument_fault("value", "", f"found {value}", "a finite number")])
+            raise argument_error("value", f"found {value}", "a finite number")
         convoy, number = self._convoy, names.index(actuator)
         memory = convoy.work.memory
         if value == memory[convoy.system.actuators.which[number, COMMAND]]:
@@ -370,7 +369,7 @@ class Simulation:
         plain = getattr(send, "py_func", send)
         if not plain(convoy.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
-            raise InputError([argument_fault("actuator", actuator, found, "fewer commands")])
+            raise argument_error("actuator", found, "fewer commands", actuator)
         self._seen = self._begun = None
 
     def set_rails(self, displacement: Floats, velocity: Floats) -> None:
@@ -384,8 +383,7 @@ class Simulation:
             Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
         """
         if self._convoy.system.support.elastic:
-            fault = argument_fault("set_rails", "", "a track with a support", "rigid rails")
-            raise InputError([fault])
+            raise argument_error("set_rails", "a track with a support", "rigid rails")
         motion = self._convoy.work.rail_motion
         before = motion.copy()
         motion[..., :2], motion[..., 2:] = displacement, velocity
@@ -412,7 +410,7 @@ class Simulation:
         found, allowed = f"nothing is called '{name}'", nearest(name, self.readable)
         if name in REQUESTED:
             found, allowed = f"'{name}' is not output", "ask for it in settings.outputs"
-        raise InputError([argument_fault("name", "", found, allowed)])
+        raise argument_error("name", found, allowed)
 
     def _present(self) -> Mapping[str, Floats]:
         """Quantities at the present state, evaluated beside the loop."""
@@ -438,7 +436,7 @@ class Simulation:
         )
         if status != RUNNING:
             run.status, run.where = status, where
-            raise InputError([argument_fault("read", "", self._ended_because(), "")])
+            raise argument_error("read", self._ended_because())
         self._seen = run.plan.chunk(recorder, 1, run.prepared.balance.Q0)
         return self._seen
 
@@ -457,11 +455,11 @@ class Simulation:
         if saved.motion.shape != convoy.state.shape:
             found = f"a state of {saved.motion.size} values"
             allowed = f"{convoy.state.size} values, those of this vehicle and track"
-            raise InputError([argument_fault("state", "", found, allowed)])
+            raise argument_error("state", found, allowed)
         recorded = convoy.ensemble.recorder.state[: self._rows, TIME]
         if self._records and saved.motion[TIME] < self._written + SHORTEST:
             found = "an instant before what is recorded already"
-            raise InputError([argument_fault("state", "", found, "record=False")])
+            raise argument_error("state", found, "record=False")
         self._rows = int(np.searchsorted(recorded, saved.motion[TIME] - SHORTEST))
         convoy.restore(saved)
         self._phase, self._missing, self._behind, self._length, self._every, self._goal = (

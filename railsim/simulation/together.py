@@ -9,7 +9,7 @@ from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.errors import InputError, argument_fault
+from railsim.errors import argument_error
 from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
@@ -109,7 +109,7 @@ def outcomes(
     if not vehicles or (sinks is not None and len(sinks) != len(vehicles)):
         count = "no vehicle" if not vehicles else f"{len(sinks or ())} for {len(vehicles)} vehicles"
         name = "sinks" if vehicles else "vehicles"
-        raise InputError([argument_fault(name, "", count, "one vehicle at least, a sink for each")])
+        raise argument_error(name, count, "one vehicle at least, a sink for each")
     settings = settings or Settings()
     inputs = Inputs.checked(track, settings, speed, start, duration, until)
     shared = SharedTables()
