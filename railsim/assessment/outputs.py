@@ -1,21 +1,13 @@
 """What a run has to output so that it can be assessed: checked before it begins."""
 
-from railsim.assessment.record import (
-    ENOUGH,
-    FINE_ENOUGH,
-    MOTION,
-    NEEDED,
-    RUNNING,
-    WIDE_ENOUGH,
-    coarseness,
-)
+from railsim.assessment import record
 from railsim.definitions.settings import LEAST_RATE, Settings
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Fault, Faults
 from railsim.result.sensors import sensors
 from railsim.result.sinks import matches
 
-LEAST = LEAST_RATE["zero"] * WIDE_ENOUGH
+LEAST = LEAST_RATE["zero"] * record.WIDE_ENOUGH
 """Least rate of values that standards filter, where coarse ones are accepted [1/s]."""
 
 
@@ -26,7 +18,7 @@ def output_rate(settings: Settings, speed: float) -> float:
 
 def coarse_remarks(settings: Settings, speed: float) -> tuple[str, ...]:
     """Say in what the values of a run are too coarse to be judged, if they are."""
-    words, loss = coarseness(settings, output_rate(settings, speed))
+    words, loss = record.coarseness(settings, output_rate(settings, speed))
     return (f"{words}: {loss}",) if words else ()
 
 
@@ -38,31 +30,33 @@ def check_outputs(
     `coarse`: fewer samples than `FINE_ENOUGH` are accepted, unless the filters of the standard have
     nothing left to pass.
     """
-    faults, outputs, filters = Faults(), settings.outputs, standard in (*RUNNING, "comfort")
+    faults, outputs, filters = Faults(), settings.outputs, standard in (*record.RUNNING, "comfort")
     kept = outputs.quantities or ("*",)
     for needed, allowed in (
-        (NEEDED[standard], f"with {', '.join(NEEDED[standard])}"),
-        (MOTION, "with them, or settings.outputs.sensors=true"),
+        (record.NEEDED[standard], f"with {', '.join(record.NEEDED[standard])}"),
+        (record.MOTION, "with them, or settings.outputs.sensors=true"),
     ):
         lacking = [name for name in needed if not matches(name, kept)]
-        if lacking and (needed is not MOTION or (standard == "comfort" and not outputs.sensors)):
+        if lacking and (
+            needed is not record.MOTION or (standard == "comfort" and not outputs.sensors)
+        ):
             found = f"without {', '.join(lacking)}"
             faults.append(Fault("settings", "outputs.quantities", found, allowed))
     rate = output_rate(settings, speed)
-    words, _ = coarseness(settings, rate)
+    words, _ = record.coarseness(settings, rate)
     key = "output_rate" if settings.output_spacing is None else "output_spacing"
     key = key if outputs.low_pass is None else "outputs.low_pass.frequency"
-    allowed = ENOUGH
+    allowed = record.ENOUGH
     if settings.output_spacing is not None and settings.drive.mode != "constant":
         words, allowed = "unequal time steps, as the speed varies", "output_rate instead"
     elif coarse and outputs.low_pass is not None:
-        words, allowed = words if filters else "", f"{WIDE_ENOUGH:g} Hz at least"
+        words, allowed = words if filters else "", f"{record.WIDE_ENOUGH:g} Hz at least"
     elif coarse:
         words = words if filters and rate < LEAST * (1.0 - 1e-3) else ""
-        allowed = f"at least {LEAST:g}, better {FINE_ENOUGH:g}"
+        allowed = f"at least {LEAST:g}, better {record.FINE_ENOUGH:g}"
     if words:
         faults.append(Fault("settings", key, words, allowed))
-    if standard in RUNNING and vehicle.service is None:
+    if standard in record.RUNNING and vehicle.service is None:
         allowed = "[service] with admissible_speed and cant_deficiency in its file"
         faults.append(Fault(f"vehicle '{vehicle.name}'", "service", "missing", allowed))
     if standard == "comfort" and all(

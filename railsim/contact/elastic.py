@@ -14,24 +14,7 @@ from railsim.arrays import Floats
 from railsim.contact.coupling import coupling
 from railsim.contact.table import PATCHES, ContactTable
 from railsim.errors import ModelError
-from railsim.kernels.contact_table import (
-    G_Y,
-    INSIDE,
-    K2,
-    K2_Y,
-    K_Y,
-    LOOK_UP_SIZE,
-    N_PATCH,
-    N_WEIGHT,
-    G,
-    K,
-    cell_weights,
-    coupled_approaches,
-    locate,
-    look_up,
-    stretched_roll,
-    under_load,
-)
+from railsim.kernels import contact_table as kernel
 
 
 class TableArrays(NamedTuple):
@@ -109,28 +92,28 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
         table.droll,
         table.w,
     )
-    stretched, roll_slope = stretched_roll(roll)
-    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, 0.0)
-    if where != INSIDE:
+    stretched, roll_slope = kernel.stretched_roll(roll)
+    where, iy, ir, iw, ty, tr, tw = kernel.locate(arrays, 0, y, roll, stretched, 0.0)
+    if where != kernel.INSIDE:
         raise ModelError(
             f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad lies outside of the table"
         )
-    weights, flat = np.empty(N_WEIGHT), np.empty(N_PATCH * LOOK_UP_SIZE)
-    cell_weights(arrays, ty, tr, roll_slope, weights)
-    for patch in range(N_PATCH):
-        look_up(arrays, 0, patch, iy, ir, iw, tw, weights, flat, patch * LOOK_UP_SIZE)
-    fields = flat.reshape(N_PATCH, LOOK_UP_SIZE)
+    weights, flat = np.empty(kernel.N_WEIGHT), np.empty(kernel.N_PATCH * kernel.LOOK_UP_SIZE)
+    kernel.cell_weights(arrays, ty, tr, roll_slope, weights)
+    for patch in range(kernel.N_PATCH):
+        kernel.look_up(arrays, 0, patch, iy, ir, iw, tw, weights, flat, patch * kernel.LOOK_UP_SIZE)
+    fields = flat.reshape(kernel.N_PATCH, kernel.LOOK_UP_SIZE)
     compliance = coupling(table.values, table.G, table.nu)[None]
-    stiffness = np.concatenate((fields[:, K], fields[:, K2]))
+    stiffness = np.concatenate((fields[:, kernel.K], fields[:, kernel.K2]))
 
     def approaches(z: float) -> Floats:
-        e = z - fields[:, G]
-        coupled_approaches(compliance, 0, stiffness, e)
+        e = z - fields[:, kernel.G]
+        kernel.coupled_approaches(compliance, 0, stiffness, e)
         return e
 
     def vertical(z: float) -> Floats:
         e = np.maximum(approaches(z), 0.0)
-        force: Floats = e**1.5 * (fields[:, K] + fields[:, K2] * np.sqrt(e))
+        force: Floats = e**1.5 * (fields[:, kernel.K] + fields[:, kernel.K2] * np.sqrt(e))
         return force
 
     lowest = float(fields[:, 0].min())
@@ -145,15 +128,15 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
         if N_z < 1e-3 * load:
             continue
         field = fields[patch]
-        by_K = 0.4 * e * e * np.sqrt(e) * field[K_Y] + e**3 / 3.0 * field[K2_Y]
-        c_y, _, a1, b1, tangent = under_load(field, 0, float(N_z))
+        by_K = 0.4 * e * e * np.sqrt(e) * field[kernel.K_Y] + e**3 / 3.0 * field[kernel.K2_Y]
+        c_y, _, a1, b1, tangent = kernel.under_load(field, 0, float(N_z))
         N = float(N_z) * float(np.hypot(1.0, tangent))
         a, b = (float(axis) * N ** (1.0 / 3.0) for axis in (a1, b1))
         patches.append(
             Patch(
                 N=N,
                 N_z=float(N_z),
-                N_y=float(by_K - N_z * field[G_Y]),
+                N_y=float(by_K - N_z * field[kernel.G_Y]),
                 y=y + float(c_y),
                 angle=float(np.arctan(tangent)),
                 area=np.pi * a * b,

@@ -63,15 +63,7 @@ from typing import Literal
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.contact.curves import (
-    HALF_WIDTHS,
-    RailCurve,
-    WheelCurve,
-    misfits,
-    rail_curve,
-    tape_circle_position,
-    wheel_curve,
-)
+from railsim.contact import curves
 from railsim.contact.zones import table_range, zone_windows
 from railsim.errors import InputError
 from railsim.kernels import table_slice as kernel
@@ -264,11 +256,11 @@ def build_contact_table(
     """
     grid = chosen_grid(grid, normal)
     height = radius if centre_height is None else centre_height
-    wheel_points = wheel_curve(
-        wheel, radius, tape_circle_position(back_to_back), min(grid.spacing, grid.ds)
+    wheel_points = curves.wheel_curve(
+        wheel, radius, curves.tape_circle_position(back_to_back), min(grid.spacing, grid.ds)
     )
-    rail_nodes = rail_curve(rail, gauge, inclination)
-    if faults := misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
+    rail_nodes = curves.rail_curve(rail, gauge, inclination)
+    if faults := curves.misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
         raise InputError(faults)
     usual = table_range(wheel_points, rail_nodes, widening)
     s_min = usual[0] if grid.s_min is None else grid.s_min
@@ -326,8 +318,8 @@ class Generator:
 
     def __init__(
         self,
-        wheel: WheelCurve,
-        rail: RailCurve,
+        wheel: curves.WheelCurve,
+        rail: curves.RailCurve,
         radius: float,
         height: float,
         G: float,
@@ -339,14 +331,14 @@ class Generator:
         elliptic = grid.normal == "hertz"
         self._laws = (
             kernel.Elastic(
-                G / (1.0 - nu), HALF_WIDTHS, grid.reference, grid.floor_ratio, not elliptic
+                G / (1.0 - nu), curves.HALF_WIDTHS, grid.reference, grid.floor_ratio, not elliptic
             ),
             ellipse_functions(G, nu),
             strip_influence(),
         )
 
     def values(
-        self, rail: RailCurve, s: Floats, roll: Floats, w: Floats, workers: int | None
+        self, rail: curves.RailCurve, s: Floats, roll: Floats, w: Floats, workers: int | None
     ) -> Floats:
         """Fields of the three patches on a rail, shape (3, w.size, roll.size, s.size, N_FIELD)."""
         values = np.empty((3, w.size, roll.size, s.size, N_FIELD))
@@ -373,7 +365,7 @@ NOTHING = np.array([1.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0
 """Fields of a zone that never touches."""
 
 
-def _wheel_arrays(wheel: WheelCurve, rail: RailCurve) -> kernel.Wheel:
+def _wheel_arrays(wheel: curves.WheelCurve, rail: curves.RailCurve) -> kernel.Wheel:
     """A wheel as the generator takes it, with its zones."""
     window = zone_windows(wheel, rail)
     present = window > 1e-6

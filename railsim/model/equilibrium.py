@@ -23,6 +23,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Indices
 from railsim.errors import ModelError
+from railsim.kernels import support as rails
 from railsim.kernels.contact_columns import NORMAL, W_Q
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
@@ -30,15 +31,6 @@ from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, N_SCALARS, SPEED, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import (
-    DOF,
-    K_BALLAST_Z,
-    K_PAD_Z,
-    RAIL_DOF,
-    RATE,
-    REFERENCE_MASS,
-    SUPPORT_SIZE,
-)
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET, System
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.model.assembly import Model
@@ -221,11 +213,11 @@ def _sink(level: System, state: Floats, weight: float) -> None:
     support = level.support
     if not support.elastic:
         return
-    sleeper = weight / support.row[K_BALLAST_Z] if support.sleeper else 0.0
-    rail = sleeper + 0.5 * weight / support.row[K_PAD_Z]
+    sleeper = weight / support.row[rails.K_BALLAST_Z] if support.sleeper else 0.0
+    rail = sleeper + 0.5 * weight / support.row[rails.K_PAD_Z]
     track = tracks_under(level, state)
-    track[:, 1:RAIL_DOF:2] = rail
-    track[:, RAIL_DOF + 1] = sleeper
+    track[:, 1 : rails.RAIL_DOF : 2] = rail
+    track[:, rails.RAIL_DOF + 1] = sleeper
     for body in level.bodies.whole:
         state[6 * body + Z] += rail
 
@@ -234,7 +226,7 @@ def tracks_under(system: System, state: Floats) -> Floats:
     """View of the states of the track under each wheelset."""
     end = len(state) - N_SCALARS
     wheelsets = len(system.contact.body)
-    return state[end - SUPPORT_SIZE * wheelsets : end].reshape(wheelsets, SUPPORT_SIZE)
+    return state[end - rails.SUPPORT_SIZE * wheelsets : end].reshape(wheelsets, rails.SUPPORT_SIZE)
 
 
 def conditions(
@@ -258,13 +250,13 @@ def conditions(
             of_body = (bodies.mass[body],) * 3 + tuple(bodies.inertia[body])
             inertias.append(float(of_body[component]))
     if support.elastic and not held:
-        first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(system.contact.body)
-        starts = first + SUPPORT_SIZE * np.arange(len(system.contact.body))
-        moving = np.arange(DOF if support.sleeper else RAIL_DOF)
+        first = model.n_state - N_SCALARS - rails.SUPPORT_SIZE * len(system.contact.body)
+        starts = first + rails.SUPPORT_SIZE * np.arange(len(system.contact.body))
+        moving = np.arange(rails.DOF if support.sleeper else rails.RAIL_DOF)
         track = (starts[:, None] + moving).ravel().tolist()
         unknowns += track
-        equations += [RATE + k for k in track]
-        inertias += [REFERENCE_MASS] * len(track)
+        equations += [rails.RATE + k for k in track]
+        inertias += [rails.REFERENCE_MASS] * len(track)
     air = (internal_begin(n) + np.flatnonzero(system.internal.kind == AIR)).tolist()
     return (
         np.array([*unknowns, *air]),

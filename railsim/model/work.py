@@ -4,6 +4,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.creep import creep_scratch
+from railsim.kernels import system as kernel
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.commands import Controllers, Signals
 from railsim.kernels.contact_columns import BUMP_SIZE, CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
@@ -24,20 +25,6 @@ from railsim.kernels.rails import (
 from railsim.kernels.registers import LANES
 from railsim.kernels.state import N_SCALARS
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_SIZE, SUPPORT_STEP, TRACED
-from railsim.kernels.system import (
-    AXLEBOX,
-    CONSTANT,
-    FIXED,
-    N_EVENTS,
-    N_PARTS,
-    POSE_SIZE,
-    RATES_SIZE,
-    RELATIVE_SIZE,
-    Z_0,
-    Drive,
-    System,
-    Work,
-)
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.transient import TRANSIENT
 from railsim.kernels.vibration import VIBRATION
@@ -49,15 +36,15 @@ NO_SIGNALS = Signals(np.zeros((0, SIGNAL_WHICH), dtype=np.int64), np.zeros((0, S
 NO_CONTROLLERS = Controllers(
     np.zeros((0, CONTROLLER_WHICH), dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64)
 )
-CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
+CONSTANT_SPEED = kernel.Drive(kernel.CONSTANT, np.zeros((1, 2)), np.zeros(3))
 
 
 def components_of(kind: int) -> tuple[int, ...]:
     """Components in which a body of this kind moves."""
-    return {AXLEBOX: (4,), FIXED: ()}.get(kind, (0, 1, 2, 3, 4, 5))
+    return {kernel.AXLEBOX: (4,), kernel.FIXED: ()}.get(kind, (0, 1, 2, 3, 4, 5))
 
 
-def work_arrays(system: System) -> Work:
+def work_arrays(system: kernel.System) -> kernel.Work:
     """Scratch arrays for `system`."""
     n = len(system.bodies.kind)
     n_wheelsets = len(system.contact.body)
@@ -65,14 +52,14 @@ def work_arrays(system: System) -> Work:
     n_patches = -(-2 * of_wheel * n_wheelsets // LANES) * LANES  # by eights
     n_frames = len(system.frame_offset)
     n_tracks = n_wheelsets * system.support.elastic
-    return Work(
+    return kernel.Work(
         frames=aligned_zeros((n_frames, FRAME_SIZE)),
         cell=aligned_zeros(n_frames, np.int64),
         cell_u=aligned_zeros(n_frames),
-        pose=aligned_zeros((n, POSE_SIZE)),
-        relative=aligned_zeros((n, RELATIVE_SIZE)),
-        rail_force=aligned_zeros((n, RATES_SIZE)),
-        acceleration=aligned_zeros((n, RATES_SIZE)),
+        pose=aligned_zeros((n, kernel.POSE_SIZE)),
+        relative=aligned_zeros((n, kernel.RELATIVE_SIZE)),
+        rail_force=aligned_zeros((n, kernel.RATES_SIZE)),
+        acceleration=aligned_zeros((n, kernel.RATES_SIZE)),
         drive=aligned_zeros((len(system.internal.kind), 2)),
         friction=np.ascontiguousarray(system.mounts.friction[:, :, :2]),
         laws=aligned_zeros(LAWS_SIZE),
@@ -96,12 +83,12 @@ def work_arrays(system: System) -> Work:
         motion=aligned_zeros((n_tracks, 2, LANES)),
         compliance=aligned_zeros(3),
         vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
-        events=aligned_zeros((n_wheelsets, N_EVENTS), np.int64),
+        events=aligned_zeros((n_wheelsets, kernel.N_EVENTS), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         force_rate=aligned_zeros(n_wheelsets),
         watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE, np.nan, 1.0]),
         rate_change=aligned_zeros((2, CHANGES)),
-        parts=aligned_zeros(N_PARTS, np.int64),
+        parts=aligned_zeros(kernel.N_PARTS, np.int64),
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),
@@ -133,7 +120,7 @@ def no_extremes(n_wheelsets: int) -> Floats:
     return extremes
 
 
-def level_track(system: System) -> System:
+def level_track(system: kernel.System) -> kernel.System:
     """Return the same system on straight, level, smooth, frictionless track, no given loads."""
     cells = 4
     length = float(np.ptp(system.frame_offset)) + 100.0
@@ -148,7 +135,7 @@ def level_track(system: System) -> System:
     return without_loads(system)._replace(track=track, support=even, drive=CONSTANT_SPEED)
 
 
-def without_loads(system: System) -> System:
+def without_loads(system: kernel.System) -> kernel.System:
     """Return the system without given forces and torques, which analyses without a clock omit."""
     return system._replace(
         loads=system.loads._replace(
@@ -158,7 +145,7 @@ def without_loads(system: System) -> System:
     )
 
 
-def level_track_with_friction(system: System) -> System:
+def level_track_with_friction(system: kernel.System) -> kernel.System:
     """As `level_track`, with the largest friction that each rail of the real track has."""
     level = level_track(system)
     rail = level.track.rail.copy()
@@ -167,7 +154,7 @@ def level_track_with_friction(system: System) -> System:
     return level._replace(track=level.track._replace(rail=rail))
 
 
-def against_rails(system: System, state: Floats) -> Floats:
+def against_rails(system: kernel.System, state: Floats) -> Floats:
     """Lateral displacement and roll of each wheelset against its rails, from recorded states.
 
     Returns
@@ -181,7 +168,7 @@ def against_rails(system: System, state: Floats) -> Floats:
         system.track,
         axles,
         system.frame_offset[system.bodies.frame[axles]],
-        system.bodies.row[axles, Z_0],
+        system.bodies.row[axles, kernel.Z_0],
         first_rail(system, state),
         SUPPORT_SIZE if elastic else 0,
         state,
@@ -192,6 +179,6 @@ def against_rails(system: System, state: Floats) -> Floats:
     return found
 
 
-def first_rail(system: System, state: Floats) -> int:
+def first_rail(system: kernel.System, state: Floats) -> int:
     """Index of the first wheelset's elastic rails in a state."""
     return int(state.shape[1] - N_SCALARS - len(system.contact.body) * SUPPORT_SIZE)

@@ -12,6 +12,7 @@ from itertools import count, pairwise
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.stability import ramp
 from railsim.stability.branches import (
     DROP,
     RESOLUTION,
@@ -22,16 +23,6 @@ from railsim.stability.branches import (
     seen_at,
 )
 from railsim.stability.motion import LeftRange, Motion, Stretch
-from railsim.stability.ramp import (
-    CHANGE,
-    EXCITATIONS,
-    SMALL,
-    WINDOW,
-    Progress,
-    hunting,
-    looked_at,
-    moved,
-)
 
 ALIKE = 0.1  # relative difference of two amplitudes at a speed that count as one motion
 NEAR = 0.03  # relative difference of amplitudes that need not settle further
@@ -47,8 +38,8 @@ ARRIVED = 0.9  # share of the way between the two at which it has
 def diagram(
     motion: Motion,
     speeds: Sequence[float],
-    tell: Progress = lambda _: None,
-    excitations: Sequence[float] = EXCITATIONS,
+    tell: ramp.Progress = lambda _: None,
+    excitations: Sequence[float] = ramp.EXCITATIONS,
     low: float | None = None,
 ) -> list[Branch]:
     """Bifurcation diagram by steps of speed upwards and then downwards with carried states.
@@ -65,8 +56,8 @@ def diagram(
     for speed in speeds:
         try:
             last = up.points[-1] if up.points else None
-            if last is None or last.amplitude < SMALL:  # where it rests, a small disturbance
-                seen = settled(motion, motion.rest(speed, SMALL), speed, speed)
+            if last is None or last.amplitude < ramp.SMALL:  # where it rests, a small disturbance
+                seen = settled(motion, motion.rest(speed, ramp.SMALL), speed, speed)
             else:
                 seen = settled(motion, last.state, last.speed, speed)
             up.points.append(seen_at(speed, seen))
@@ -77,14 +68,14 @@ def diagram(
         return [up, down]
     reached = [point.speed for point in up.points]
     lower = _below(speeds, speeds[0] if low is None else low)
-    state, before = hunting(motion, reached[-1], excitations).state, reached[-1]
+    state, before = ramp.hunting(motion, reached[-1], excitations).state, reached[-1]
     for speed in [*reversed(reached), *lower]:
         if speed < reached[0] and down.points[-1].amplitude <= THRESHOLD:
             break
         try:
             seen = settled(motion, state, before, speed)
         except LeftRange:  # while it brakes
-            seen = hunting(motion, speed, excitations)
+            seen = ramp.hunting(motion, speed, excitations)
         down.points.append(seen_at(speed, seen))
         state, before = down.points[-1].state, speed
         tell(0.25 * (1.0 + min(1.0, len(down.points) / len(speeds))))
@@ -113,14 +104,14 @@ def settled(
     `known`: amplitudes of motions at that speed, with 0 for rest: near these it need not settle
     [m].
     """
-    state, before = moved(motion, state, begin, speed), np.inf
+    state, before = ramp.moved(motion, state, begin, speed), np.inf
     dead = THRESHOLD if 0.0 in known else 0.02 * THRESHOLD
     lasting, turned, grew = 0, 0, False
     for look in count(1):
-        seen = looked_at(motion, state, speed, SETTLING)
+        seen = ramp.looked_at(motion, state, speed, SETTLING)
         change = abs(seen.amplitude - before) / max(seen.amplitude, 1e-12)
         near = any(abs(a - seen.amplitude) < NEAR * a for a in known)
-        if change < 0.1 * CHANGE or (near and change < 0.5 * CHANGE):
+        if change < 0.1 * ramp.CHANGE or (near and change < 0.5 * ramp.CHANGE):
             break
         if seen.amplitude < dead and seen.amplitude < before:
             break
@@ -215,7 +206,7 @@ def _between(motion: Motion, before: Point, after: Point) -> list[Point]:
     return [*_between(motion, before, here), here, *_between(motion, here, after)]
 
 
-def _threshold(motion: Motion, up: Branch, down: Branch, tell: Progress) -> Branch:
+def _threshold(motion: Motion, up: Branch, down: Branch, tell: ramp.Progress) -> Branch:
     """Unstable motions between the branch upwards and the one downwards where both are followed."""
     line = Branch("threshold")
     differ = [
@@ -254,7 +245,7 @@ def _unstable(motion: Motion, speed: float, lower: Stretch, upper: Stretch) -> S
         state, first = rest + share * (upper.state - rest), None
         for _ in range(MOST_LINGERING):
             try:
-                seen = motion.stretch(state, speed, speed, WINDOW)
+                seen = motion.stretch(state, speed, speed, ramp.WINDOW)
             except LeftRange:  # further than the larger motion
                 seen = upper
                 break

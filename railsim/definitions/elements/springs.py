@@ -14,21 +14,11 @@ from railsim.definitions.base import (
     Vector,
     check,
 )
-from railsim.definitions.elements.base import (
-    Characteristic,
-    FreeLength,
-    PairElement,
-    PointElement,
-    PreloadAlongAxes,
-    SidedElement,
-    Signs,
-    VerticalSpring,
-    two_sided,
-)
+from railsim.definitions.elements import base
 from railsim.definitions.elements.rows import NOTHING, Link, Mount, State
 
 
-class SpringDamper(FreeLength, SidedElement):
+class SpringDamper(base.FreeLength, base.SidedElement):
     """Spring and damper along the line between two points."""
 
     kind: Literal["spring_damper"]
@@ -42,9 +32,9 @@ class SpringDamper(FreeLength, SidedElement):
     """Stiffness in series with the damper [N/m]; 0 means rigid"""
     preload: AutoOrNumber = 0.0
     """Force at the nominal length, tension positive [N], or `auto`: found from the equilibrium"""
-    spring_table: Characteristic | None = None
+    spring_table: base.Characteristic | None = None
     """Rows [elongation m, force N] instead of `stiffness`; from 0 on it serves both directions"""
-    damper_table: Characteristic | None = None
+    damper_table: base.Characteristic | None = None
     """Rows [velocity m/s, force N] instead of `damping`; from 0 on it serves both directions"""
 
     @check
@@ -73,7 +63,7 @@ class SpringDamper(FreeLength, SidedElement):
         """Largest stiffness along its line [N/m]."""
         if self.spring_table is None:
             return self.stiffness
-        steps = pairwise(two_sided(self.spring_table))
+        steps = pairwise(base.two_sided(self.spring_table))
         return max((end[1] - begin[1]) / (end[0] - begin[0]) for begin, end in steps)
 
     @property
@@ -103,7 +93,7 @@ class SpringDamper(FreeLength, SidedElement):
         ]
 
 
-class Bushing(VerticalSpring, PointElement):
+class Bushing(base.VerticalSpring, base.PointElement):
     """Three springs and dampers along the axes of body 1; the force acts at the point on body 2."""
 
     SUPPORTS: ClassVar = "on axles"
@@ -147,7 +137,7 @@ class Bushing(VerticalSpring, PointElement):
         ]
 
 
-class ShearSpring(VerticalSpring, SidedElement):
+class ShearSpring(base.VerticalSpring, base.SidedElement):
     """Coil spring or rubber block between two seats: shear, axial force, bending and torsion."""
 
     SUPPORTS: ClassVar = "always"
@@ -175,7 +165,7 @@ class ShearSpring(VerticalSpring, SidedElement):
         ]
 
 
-class Airspring(PreloadAlongAxes, PointElement):
+class Airspring(base.PreloadAlongAxes, base.PointElement):
     """Air spring with reservoir after Nishimura: three springs and the orifice's damping.
 
     Vertical force: area_stiffness z + bellows_stiffness (z - w), where the orifice closes the
@@ -227,16 +217,16 @@ class Airspring(PreloadAlongAxes, PointElement):
         ]
 
 
-class BumpStop(PointElement):
+class BumpStop(base.PointElement):
     """Stop with free travel along one axis of body 1; a spring with clearance."""
 
     kind: Literal["bump_stop"]
     axis: Literal["x", "y", "z"]
     """Axis of body 1 along which the stop acts"""
-    table: Characteristic
+    table: base.Characteristic
     """Rows [travel of body 2 m, force N]; from [0, 0] on it serves both directions"""
 
-    def mirrored(self, signs: Signs) -> Self:
+    def mirrored(self, signs: base.Signs) -> Self:
         """Return the stop in a mirrored placement: the two directions of its axis are exchanged."""
         if signs["xyz".index(self.axis)] > 0.0 or self.table[0][0] == 0.0:
             return self
@@ -249,7 +239,7 @@ class BumpStop(PointElement):
         return [Mount(tables=(x, y, z))]
 
 
-class RollBar(PairElement):
+class RollBar(base.PairElement):
     """Anti-roll bar: a moment about x against the relative roll of two bodies."""
 
     kind: Literal["roll_bar"]

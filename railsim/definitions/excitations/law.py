@@ -8,25 +8,18 @@ from pydantic import Field
 
 from railsim.arrays import Floats
 from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative
-from railsim.definitions.excitations.base import (
-    MIRROR,
-    Channel,
-    Displacement,
-    Stretch,
-    faded,
-    rails_moved,
-)
+from railsim.definitions.excitations import base
 
 PER_WAVE = 200  # differences of the rate over the shortest wave; error 3e-8 of it
 
 
-class ByLaw(Stretch):
+class ByLaw(base.Stretch):
     """What a law of one's own gives over the arc length."""
 
     type: Literal["law"]
     law: Name
     """Name of the law in the table `laws`, or of a library"""
-    channel: Channel = "vertical"
+    channel: base.Channel = "vertical"
     """Which of the four irregularities: both rails to the right or down, the left rail higher, or
     the rails apart"""
     parameters: dict[Name, Finite] = EMPTY_TABLE
@@ -44,7 +37,7 @@ class ByLaw(Stretch):
 
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""
-        return self.model_copy(update={"factor": MIRROR[self.channel] * self.factor})
+        return self.model_copy(update={"factor": base.MIRROR[self.channel] * self.factor})
 
     def resolution(self) -> float:
         """Return a sixteenth of the shortest wavelength [m]."""
@@ -54,17 +47,19 @@ class ByLaw(Stretch):
         """Return channel and law."""
         return f"{self.channel} by the law '{self.law}'"
 
-    def displacement(self, length: float) -> Displacement:
+    def displacement(self, length: float) -> base.Displacement:
         """Refuse: a definition executes nothing, see `railsim.track.irregularity`."""
         raise NotImplementedError
 
-    def displacement_by(self, function: Callable[[Floats], Floats], length: float) -> Displacement:
+    def displacement_by(
+        self, function: Callable[[Floats], Floats], length: float
+    ) -> base.Displacement:
         """Return how it moves the rails by a function of the arc length, with its rate."""
         h, (begin, end) = self.shortest / PER_WAVE, self.extent(length)
-        shares = self.factor * rails_moved(self.channel)
+        shares = self.factor * base.rails_moved(self.channel)
 
         def moved(s: Floats) -> tuple[Floats, Floats]:
             at = {k: function(np.clip(s + k * h, begin, end)) for k in (-2, -1, 0, 1, 2)}
             return shares * at[0], shares * (8.0 * (at[1] - at[-1]) - at[2] + at[-2]) / (12.0 * h)
 
-        return faded(moved, begin, end, self.fade)
+        return base.faded(moved, begin, end, self.fade)

@@ -8,24 +8,17 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Flag, NonNegative, Positive, Text, check, rises
-from railsim.definitions.excitations.base import (
-    COLUMNS,
-    Amplitude,
-    Displacement,
-    Irregular,
-    Wavelengths,
-    faded,
-)
+from railsim.definitions.excitations import base
 
 # Keys that say how the file of a measured irregularity is read; its rows are what came of it.
 READING = ("encoding", "columns", "units", "offset", "reverse", "falling_mileage", "chord", "band")
 # Share of the range of the rows around by which a spline between measured rows may leave it.
 OVERSHOOT = 0.25
 _INNER = np.arange(1, 8) / 8.0  # positions within an interval, over its length
-Row = tuple[Finite, Amplitude, Amplitude, Amplitude, Amplitude]
+Row = tuple[Finite, base.Amplitude, base.Amplitude, base.Amplitude, base.Amplitude]
 
 
-class Measured(Irregular):
+class Measured(base.Irregular):
     """Displacements measured or computed elsewhere.
 
     Between the rows a cubic spline where they resolve the waves, shape-preserving elsewhere.
@@ -53,7 +46,7 @@ class Measured(Irregular):
     chord: tuple[Positive, Positive] | None = None
     """Displacements are offsets at a chord of these parts behind and ahead [m]: the space curve is
     recovered from them"""
-    band: Literal["D1", "D2", "D3"] | Wavelengths | None = None
+    band: Literal["D1", "D2", "D3"] | base.Wavelengths | None = None
     """Band of wavelengths that is kept: D1 (3 to 25 m), D2 (25 to 70 m), D3 (70 to 150 m), or
     shortest and longest [m]"""
     rows: Annotated[tuple[Row, ...], rises("arc length")] | None = None
@@ -104,7 +97,7 @@ class Measured(Irregular):
         slopes = np.stack([shape_preserving_slopes(positions, row) for row in values])
         return positions, values, slopes
 
-    def displacement(self, length: float) -> Displacement:
+    def displacement(self, length: float) -> base.Displacement:
         """Return the spline through the rows."""
         from scipy.interpolate import CubicHermiteSpline  # a quarter of a second; most need none
 
@@ -116,7 +109,7 @@ class Measured(Irregular):
             at = np.clip(s, positions[0], positions[-1])
             return spline(at), slope(at)
 
-        return faded(moved, positions[0], positions[-1], self.fade)
+        return base.faded(moved, positions[0], positions[-1], self.fade)
 
 
 def _between(positions: Floats, values: Floats, slopes: Floats) -> Floats:
@@ -155,7 +148,7 @@ def largest_between_rows(part: Measured) -> Between:
     column = int(np.argmax(further))
     index = int(np.argmax(found[column]))
     return Between(
-        COLUMNS[column],
+        base.COLUMNS[column],
         float(at_rows[column]),
         float(found[column, index]),
         float(inner.ravel()[index]),

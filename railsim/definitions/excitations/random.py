@@ -16,16 +16,7 @@ from pydantic import Field
 
 from railsim.arrays import Floats
 from railsim.definitions.base import Finite, Flag, NonNegative, Whole, check
-from railsim.definitions.excitations.base import (
-    CHANNELS,
-    MIRROR,
-    SHARES,
-    Channel,
-    Displacement,
-    Stretch,
-    Wavelengths,
-    faded,
-)
+from railsim.definitions.excitations import base
 from railsim.definitions.excitations.spectra import SPECTRA, Coefficients, Spectrum, erri_b176
 
 SpectrumName = Literal[(*SPECTRA, "own")]  # type: ignore[valid-type]
@@ -34,7 +25,7 @@ POINTS_PER_WAVE = 32
 PERIOD_IN_WAVES = 20.0
 
 
-class Random(Stretch):
+class Random(base.Stretch):
     """Stationary random irregularities from power spectral densities."""
 
     type: Literal["random"]
@@ -44,9 +35,9 @@ class Random(Stretch):
     """Own coefficients"""
     seed: Whole = 1
     """Seed of the random phases: the same seed gives the same track"""
-    wavelengths: Wavelengths = (3.0, 70.0)
+    wavelengths: base.Wavelengths = (3.0, 70.0)
     """Shortest and longest wavelength [m]; the variance is the integral of the spectrum between"""
-    channels: Annotated[tuple[Channel, ...], Field(min_length=1)] | None = None
+    channels: Annotated[tuple[base.Channel, ...], Field(min_length=1)] | None = None
     """Which of the four irregularities are generated; by default all that the spectra describe"""
     begin: Finite = 0.0
     """Arc length where it begins [m]"""
@@ -85,7 +76,7 @@ class Random(Stretch):
         mirrored = ", mirrored" if self.mirror else ""
         return f"{self.spectrum}{of}, seed {self.seed}, {low:g} to {high:g} m{times}{mirrored}"
 
-    def displacement(self, length: float) -> Displacement:
+    def displacement(self, length: float) -> base.Displacement:
         """Return the sum of cosines of all channels, by interpolation on a periodic lattice."""
         from scipy.fft import next_fast_len
 
@@ -97,8 +88,8 @@ class Random(Stretch):
         n_points = next_fast_len(int(np.ceil(POINTS_PER_WAVE * period / shortest)), real=True)
         lattice = np.zeros((2, 4, n_points))
         for channel in self.channels or spectrum.channels:
-            shares = self.scale * np.array(SHARES[channel])
-            shares *= MIRROR[channel] if self.mirror else 1.0
+            shares = self.scale * np.array(base.SHARES[channel])
+            shares *= base.MIRROR[channel] if self.mirror else 1.0
             shares *= spectrum.half_base if channel == "cross_level" else 1.0
             amplitudes = _amplitudes(spectrum, channel, self.wavelengths, period)
             phases = _phases(self.seed, channel, amplitudes.size)
@@ -109,7 +100,7 @@ class Random(Stretch):
         def moved(s: Floats) -> tuple[Floats, Floats]:
             return _periodic(lattice, period, s - begin)
 
-        return faded(moved, begin, end, self.fade)
+        return base.faded(moved, begin, end, self.fade)
 
 
 def _amplitudes(
@@ -125,7 +116,7 @@ def _amplitudes(
 
 def _phases(seed: int, channel: str, number: int) -> Floats:
     """Random phases of a channel: the same for a seed whatever the other channels [rad]."""
-    generator = np.random.default_rng([seed, CHANNELS.index(channel)])
+    generator = np.random.default_rng([seed, base.CHANNELS.index(channel)])
     return generator.uniform(0.0, 2.0 * np.pi, number)
 
 

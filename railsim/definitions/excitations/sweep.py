@@ -7,30 +7,22 @@ from pydantic import Field
 
 from railsim.arrays import Floats
 from railsim.definitions.base import Finite, NonNegative
-from railsim.definitions.excitations.base import (
-    MIRROR,
-    Amplitude,
-    Channel,
-    Displacement,
-    Stretch,
-    faded,
-    rails_moved,
-)
+from railsim.definitions.excitations import base
 
 Wavelength = Annotated[Finite, Field(ge=0.2, le=1000.0)]
 
 
-class Sweep(Stretch):
+class Sweep(base.Stretch):
     """Waves of one amplitude whose wavelength goes from one value to another.
 
     Each octave of wavelengths takes the same length of track.
     """
 
     type: Literal["sweep"]
-    channel: Channel = "vertical"
+    channel: base.Channel = "vertical"
     """Which of the four irregularities: both rails to the right or down, the left rail higher, or
     the rails apart"""
-    amplitude: Amplitude
+    amplitude: base.Amplitude
     """Amplitude of the waves; of `cross_level` the difference of heights, of `gauge` that of the
     gauge [m]"""
     wavelengths: tuple[Wavelength, Wavelength]
@@ -44,7 +36,7 @@ class Sweep(Stretch):
 
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""
-        sign = MIRROR[self.channel]
+        sign = base.MIRROR[self.channel]
         return self.model_copy(update={"amplitude": sign * self.amplitude})
 
     def resolution(self) -> float:
@@ -56,7 +48,7 @@ class Sweep(Stretch):
         first, last = self.wavelengths
         return f"{self.channel} sweep, {1e3 * self.amplitude:g} mm, {first:g} to {last:g} m"
 
-    def displacement(self, length: float) -> Displacement:
+    def displacement(self, length: float) -> base.Displacement:
         """Return A sin(phase), d phase/ds = 2 pi/wavelength, which changes exponentially.
 
         With u = (s - begin)/length and r = first/last wavelength: wavelength = first r^-u and
@@ -66,7 +58,7 @@ class Sweep(Stretch):
 
         first, last = self.wavelengths
         extent, octaves = self.end - self.begin, np.log(first / last)
-        shares = self.amplitude * rails_moved(self.channel)
+        shares = self.amplitude * base.rails_moved(self.channel)
 
         def moved(s: Floats) -> tuple[Floats, Floats]:
             u = np.clip((s - self.begin) / extent, 0.0, 1.0)
@@ -75,4 +67,4 @@ class Sweep(Stretch):
             phase = 2.0 * np.pi * waves
             return shares * np.sin(phase), shares * rate * np.cos(phase)
 
-        return faded(moved, self.begin, self.end, self.fade)
+        return base.faded(moved, self.begin, self.end, self.fade)
