@@ -6,15 +6,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions.mechanism.parts import (
-    GasSpring,
-    Link,
-    PointMass,
-    Prismatic,
-    Revolute,
-    Slot,
-    Spring,
-)
+from railsim.definitions.mechanism import parts
 from railsim.definitions.mechanism.values import ends
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.kinematics import Motion
@@ -43,22 +35,22 @@ def lines(motion: Motion) -> list[Line]:
             xy = np.stack([motion.point(f"{name}.{p}")[0] for p in closed], axis=1)
             found.append(Line("body", name, xy))
     for name, joint in definition.joints.items():
-        if isinstance(joint, Link):
+        if isinstance(joint, parts.Link):
             found.append(_between(motion, "link", name, joint.link))
-        elif isinstance(joint, Slot | Prismatic):
+        elif isinstance(joint, parts.Slot | parts.Prismatic):
             found.append(_guide(motion, name, joint))
-        elif not isinstance(joint, Revolute):
+        elif not isinstance(joint, parts.Revolute):
             found.append(_cam(motion, name))
     for name, actuator in definition.actuators.items():
         if (pair := ends(actuator)) is not None:
             found.append(_between(motion, "actuator", name, pair))
     for name, element in definition.elements.items():
         if (pair := ends(element)) is not None:
-            kind = "spring" if isinstance(element, Spring | GasSpring) else "damper"
+            kind = "spring" if isinstance(element, parts.Spring | parts.GasSpring) else "damper"
             line = _between(motion, kind, name, pair)
-            if isinstance(element, Spring):
+            if isinstance(element, parts.Spring):
                 line = _coiled(line)
-            elif isinstance(element, GasSpring):
+            elif isinstance(element, parts.GasSpring):
                 line = _telescope(line, element, motion)
             found.append(line)
     return found
@@ -84,7 +76,7 @@ def _coiled(line: Line) -> Line:
     return Line(line.kind, line.name, np.stack(xy, axis=1))
 
 
-def _telescope(line: Line, spring: GasSpring, motion: Motion) -> Line:
+def _telescope(line: Line, spring: parts.GasSpring, motion: Motion) -> Line:
     """A gas spring as a tube, as long as the spring fully compressed, with its rod."""
     n = motion.model.number
     if spring.rod_end == spring.gas_spring[0]:
@@ -103,7 +95,7 @@ def centres(motion: Motion) -> dict[str, Floats]:
         if model.number(body.mass):
             found[name] = motion.at(model.bodies[name], *model.position(body.centre))[0]
     for name, element in model.definition.elements.items():
-        if isinstance(element, PointMass):
+        if isinstance(element, parts.PointMass):
             found[name] = motion.point(element.point_mass)[0]
     return found
 
@@ -112,10 +104,10 @@ def _between(motion: Motion, kind: str, name: str, pair: Any) -> Line:
     return Line(kind, name, np.stack([motion.point(p)[0] for p in pair], axis=1))
 
 
-def _guide(motion: Motion, name: str, joint: Slot | Prismatic) -> Line:
+def _guide(motion: Motion, name: str, joint: parts.Slot | parts.Prismatic) -> Line:
     """The line of a slot, over the part that its pin uses."""
     n = motion.model.number
-    pin, origin = joint.slot if isinstance(joint, Slot) else joint.prismatic
+    pin, origin = joint.slot if isinstance(joint, parts.Slot) else joint.prismatic
     body = motion.model.bodies[origin.partition(".")[0]]
     angle = n(joint.angle) + motion.q[:, body, 2]
     along = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
@@ -131,7 +123,7 @@ def _cam(motion: Motion, name: str) -> Line:
     """The path of a roller's centre on its cam."""
     linkage = motion.model.linkage
     _, _, _, _, first, count = linkage.joint[cam_rows(motion)[name]]
-    parts = []
+    outline = []
     for arc in range(first, first + count):
         u0, v0, u1, v1, turn = linkage.arc_ends[arc]
         begin = np.arctan2(v0, u0)
@@ -143,8 +135,8 @@ def _cam(motion: Motion, name: str) -> Line:
         cx, cy = linkage.point[0, k]
         x, y = cx + radius * np.cos(angles), cy + radius * np.sin(angles)
         at = [motion.at(linkage.point_body[k], *xy)[0] for xy in zip(x, y, strict=True)]
-        parts.append(np.stack(at, axis=1))
-    return Line("cam", name, np.concatenate(parts, axis=1))
+        outline.append(np.stack(at, axis=1))
+    return Line("cam", name, np.concatenate(outline, axis=1))
 
 
 def points(motion: Motion) -> dict[str, Floats]:
@@ -173,7 +165,7 @@ def working_box(motion: Motion) -> tuple[float, float, float, float]:
     for part in (*definition.actuators.values(), *definition.elements.values()):
         names += ends(part) or ()
     for joint in definition.joints.values():
-        if isinstance(joint, Link | Slot | Prismatic):
+        if isinstance(joint, parts.Link | parts.Slot | parts.Prismatic):
             names += ends(joint) or ()
         elif hasattr(joint, "cam"):
             names.append(joint.cam)

@@ -16,23 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.definitions.mechanism.parts import (
-    Actuator,
-    AirSpring,
-    Cylinder,
-    Damper,
-    Element,
-    Force,
-    GasSpring,
-    HandForce,
-    HandTorque,
-    JointFriction,
-    PointMass,
-    Spring,
-    Stop,
-    Torque,
-    TorsionSpring,
-)
+from railsim.definitions.mechanism import parts
 from railsim.definitions.mechanism.values import body_name, points_of
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms import components
@@ -99,7 +83,7 @@ def masses(motion: Motion) -> list[Mass]:
             k = model.bodies[name]
             found.append(Mass(m, motion.at(k, *model.position(body.centre)), inertia, k))
     for part in model.definition.elements.values():
-        if isinstance(part, PointMass):
+        if isinstance(part, parts.PointMass):
             k = model.bodies[body_name(part.point_mass)]
             found.append(Mass(model.number(part.mass), motion.point(part.point_mass), 0.0, k))
     return found
@@ -124,23 +108,28 @@ def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
     length, slope, _ = motion.length(points_of(element))
     speed = slope * rates.speed
     match element:
-        case Spring():
+        case parts.Spring():
             return _spring_law(motion, name, element, length, element.free_length, rates)
-        case Damper():
+        case parts.Damper():
             return -n(element.damping) * speed
-        case Stop():
+        case parts.Stop():
             sense = 1.0 if element.side == "shortest" else -1.0
             depth = sense * (n(element.length) - length)
             push = n(element.stiffness) * depth - sense * n(element.damping) * speed
             met = (np.real(depth) > 0.0) & (np.real(push) > 0.0)  # a stop does not pull
             return sense * np.where(met, push, 0.0)
-        case GasSpring():
+        case parts.GasSpring():
             return _gas_push(motion, name, element, (length, slope, speed), rates)
     raise AssertionError(name)
 
 
 def _spring_law(
-    motion: Motion, name: str, spring: Spring | TorsionSpring, x: Any, free: Any, rates: Rates
+    motion: Motion,
+    name: str,
+    spring: parts.Spring | parts.TorsionSpring,
+    x: Any,
+    free: Any,
+    rates: Rates,
 ) -> Any:
     """Push or torque of a spring at a length or angle; raises InputError: outside its table."""
     model, n = motion.model, motion.model.number
@@ -151,7 +140,7 @@ def _spring_law(
     found = components.table_value(rows, x)
     outside = np.flatnonzero(np.isnan(_first_lane(motion, found)))
     if len(outside) and not rates.trial:
-        turns = isinstance(spring, TorsionSpring)
+        turns = isinstance(spring, parts.TorsionSpring)
         scale, unit = (float(np.degrees(1.0)), "deg") if turns else (1e3, "mm")
         at = driver_words(model, float(_first_lane(motion, motion.s)[outside[0]]))
         value = float(_first_lane(motion, x)[outside[0]]) * scale
@@ -167,7 +156,7 @@ def _first_lane(motion: Motion, values: Any) -> Any:
     return np.real(values).reshape(-1, motion.s.shape[-1])[0]
 
 
-def _gas_push(motion: Motion, name: str, gas: GasSpring, moved: Any, rates: Rates) -> Any:
+def _gas_push(motion: Motion, name: str, gas: parts.GasSpring, moved: Any, rates: Rates) -> Any:
     n = motion.model.number
     length, slope, speed = moved
     stroke, extended = n(gas.stroke), n(gas.extended)
@@ -203,42 +192,42 @@ def _check_stroke(motion: Motion, name: str, compressed: Any, stroke: Any) -> No
         raise motion.model.refusal(f"elements.{name}", found, allowed)
 
 
-def element_loads(motion: Motion, name: str, element: Element, rates: Rates) -> list[Load]:
+def element_loads(motion: Motion, name: str, element: parts.Element, rates: Rates) -> list[Load]:
     """What an element exerts on the bodies; nothing of a mass, whose weight is counted apart."""
     n, bodies = motion.model.number, motion.model.bodies
     match element:
-        case PointMass():
+        case parts.PointMass():
             return []
-        case Force():
+        case parts.Force():
             c, s = _direction(motion, element.force, element)
             return [AtPoint(element.force, n(element.size) * c, n(element.size) * s)]
-        case Torque():
+        case parts.Torque():
             return [OnBody(element.torque, n(element.size))]
-        case TorsionSpring():
+        case parts.TorsionSpring():
             first, second = element.torsion_spring
             twist = motion.q[..., bodies[first], 2] - motion.q[..., bodies[second], 2]
             torque = _spring_law(motion, name, element, twist, element.free_angle, rates)
             return [OnBody(first, torque), OnBody(second, -torque)]
-        case JointFriction():
+        case parts.JointFriction():
             turning = motion.q1[..., bodies[element.joint_friction], 2]
             torque = -n(element.moment) * rates.friction * np.sign(np.real(turning))
             return [OnBody(element.joint_friction, torque)]
     return [Between(points_of(element), element_push(motion, name, rates))]
 
 
-def actuator_load(motion: Motion, actuator: Actuator, force: Any = 1.0) -> Load:
+def actuator_load(motion: Motion, actuator: parts.Actuator, force: Any = 1.0) -> Load:
     """What an actuator of a force, or torque, exerts on the bodies."""
     match actuator:
-        case HandForce():
+        case parts.HandForce():
             c, s = _direction(motion, actuator.push, actuator)
             return AtPoint(actuator.push, force * c, force * s)
-        case HandTorque():
+        case parts.HandTorque():
             return OnBody(actuator.turn, force)
-    pulls = isinstance(actuator, Cylinder) and actuator.acts == "pull"
+    pulls = isinstance(actuator, parts.Cylinder) and actuator.acts == "pull"
     return Between(points_of(actuator), -force if pulls else force)
 
 
-def _direction(motion: Motion, point: str, part: Force | HandForce) -> tuple[Any, Any]:
+def _direction(motion: Motion, point: str, part: parts.Force | parts.HandForce) -> tuple[Any, Any]:
     turned = motion.model.number(part.angle)
     if part.turns:
         turned = turned + motion.q[..., motion.model.bodies[body_name(point)], 2]
@@ -257,7 +246,7 @@ def work(motion: Motion, load: Load) -> Any:
             return torque * motion.q1[..., motion.model.bodies[body], 2]
 
 
-def unit_work(motion: Motion, actuator: Actuator) -> Any:
+def unit_work(motion: Motion, actuator: parts.Actuator) -> Any:
     """Generalised force of an actuator's unit force (or torque), shape (..., position)."""
     return work(motion, actuator_load(motion, actuator))
 
@@ -278,9 +267,9 @@ def _loads(motion: Motion, rates: Rates) -> Iterator[Load]:
 
 def rubs(model: Model) -> bool:
     """Whether any element has friction, so that the way back needs another force."""
-    parts = model.definition.elements.values()
-    sizes = [part.moment for part in parts if isinstance(part, JointFriction)]
-    sizes += [part.friction for part in parts if isinstance(part, GasSpring)]
+    elements = model.definition.elements.values()
+    sizes = [part.moment for part in elements if isinstance(part, parts.JointFriction)]
+    sizes += [part.friction for part in elements if isinstance(part, parts.GasSpring)]
     return any(np.any(np.real(model.number(size))) for size in sizes)
 
 
@@ -313,7 +302,7 @@ def check_dead_point(motion: Motion, name: str) -> Any:
     return effect
 
 
-def table_of(motion: Motion, spring: AirSpring) -> components.AirSpringTable:
+def table_of(motion: Motion, spring: parts.AirSpring) -> components.AirSpringTable:
     """The table of an air spring."""
     n = motion.model.number
     heights, pressures = ([real(n(x)) for x in row] for row in (spring.heights, spring.pressures))
@@ -324,9 +313,9 @@ def table_of(motion: Motion, spring: AirSpring) -> components.AirSpringTable:
 def pressure_for(motion: Motion, name: str, force: Any) -> Any:
     """Pressure at which an actuator has a force [Pa]; NaN where it has none."""
     actuator = motion.model.definition.actuators[name]
-    if isinstance(actuator, AirSpring):
+    if isinstance(actuator, parts.AirSpring):
         return table_of(motion, actuator).pressure(motion.length(actuator.air_spring)[0], force)
-    assert isinstance(actuator, Cylinder)
+    assert isinstance(actuator, parts.Cylinder)
     if actuator.acts != "both":
         return force / chamber_area(motion.model, actuator, actuator.acts)
     pulls = -force / chamber_area(motion.model, actuator, "pull")
@@ -338,13 +327,13 @@ def pressure_for(motion: Motion, name: str, force: Any) -> Any:
 def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
     """Force of an actuator at a pressure [N]; NaN where it has none."""
     actuator = motion.model.definition.actuators[name]
-    if isinstance(actuator, AirSpring):
+    if isinstance(actuator, parts.AirSpring):
         return table_of(motion, actuator).force(motion.length(actuator.air_spring)[0], pressure)
-    assert isinstance(actuator, Cylinder)
+    assert isinstance(actuator, parts.Cylinder)
     return pressure * chamber_area(motion.model, actuator, actuator.acts) + 0.0 * motion.s
 
 
-def chamber_area(model: Model, cylinder: Cylinder, acts: str) -> Any:
+def chamber_area(model: Model, cylinder: parts.Cylinder, acts: str) -> Any:
     """Area of the chamber that pushes or pulls, of all cylinders side by side [m2]."""
     bore, rod, count = map(model.number, (cylinder.bore, cylinder.rod, cylinder.count))
     free = bore * bore - (rod * rod if acts == "pull" else 0.0)

@@ -8,24 +8,10 @@ from railsim.arrays import Floats
 from railsim.definitions.settings import Outputs, Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.kernels import contact_columns as patch
+from railsim.kernels import contact_columns as contact
 from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
 from railsim.kernels.actuators import ACTION, AXLE
-from railsim.kernels.contact_columns import (
-    W_C_Y,
-    W_C_Z,
-    W_CHECK,
-    W_CHECK_GAMMA,
-    W_NORMAL,
-    W_PHI,
-    W_Q,
-    W_T_GAMMA,
-    W_T_GAMMA_SPIN,
-    W_XI_X,
-    W_XI_Y,
-    W_Y,
-)
 from railsim.kernels.controllers import ACTUATOR
 from railsim.kernels.driving import recorded_axle_torques
 from railsim.kernels.recording import Recorder
@@ -64,7 +50,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     position = state[:, : 6 * n].reshape(rows, n, 6)
     wheel = recorder.wheel[:rows]
     axles = model.system.contact.body
-    Q, Y = wheel[..., W_Q], wheel[..., W_Y]
+    Q, Y = wheel[..., contact.W_Q], wheel[..., contact.W_Y]
     outwards = np.array([-1.0, 1.0])
     loaded = np.where(Q > 0.0, Q, np.nan)  # a wheel that carries nothing has no Y/Q
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
@@ -82,15 +68,15 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "wheelset_roll": on_rails[..., 1],
         "wheelset_yaw": position[:, axles, YAW],
         "wheelset_distance": state[:, -2, None] + offsets + position[:, axles, 0],
-        "xi_x": wheel[..., W_XI_X],
-        "xi_y": wheel[..., W_XI_Y],
-        "phi": wheel[..., W_PHI],
-        "T_gamma": wheel[..., W_T_GAMMA],
-        "T_gamma_spin": wheel[..., W_T_GAMMA_SPIN],
+        "xi_x": wheel[..., contact.W_XI_X],
+        "xi_y": wheel[..., contact.W_XI_Y],
+        "phi": wheel[..., contact.W_PHI],
+        "T_gamma": wheel[..., contact.W_T_GAMMA],
+        "T_gamma_spin": wheel[..., contact.W_T_GAMMA_SPIN],
         **(
             {
-                "check_rail_force": wheel[..., W_CHECK],
-                "check_rail_T_gamma": wheel[..., W_CHECK_GAMMA],
+                "check_rail_force": wheel[..., contact.W_CHECK],
+                "check_rail_T_gamma": wheel[..., contact.W_CHECK_GAMMA],
             }
             if len(model.check.check)
             else {}
@@ -103,7 +89,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
 
 def _of_wheels_there(wheel: Floats, column: int) -> Floats:
     """Column of the records of wheels, NaN where a wheel carries nothing: no point of contact."""
-    return np.where(wheel[..., W_NORMAL] > 0.0, wheel[..., column], np.nan)
+    return np.where(wheel[..., contact.W_NORMAL] > 0.0, wheel[..., column], np.nan)
 
 
 def _of_both(values: Floats) -> Floats:
@@ -332,8 +318,8 @@ class OutputPlan:
         values |= {q.name: q.formula(known) for q in self.quantities if q.formula is not None}
         distance, wheel = values["distance"], recorder.wheel[:rows]
         later = {
-            "contact_y": lambda: _of_wheels_there(wheel, W_C_Y),
-            "contact_z": lambda: _of_wheels_there(wheel, W_C_Z),
+            "contact_y": lambda: _of_wheels_there(wheel, contact.W_C_Y),
+            "contact_z": lambda: _of_wheels_there(wheel, contact.W_C_Z),
             "mileage": lambda: self._track_file.mileage_at(distance),
             "curvature": lambda: self._alignment.curvature(distance),
             "cant": lambda: self._alignment.cant(distance),
@@ -366,22 +352,26 @@ def _elements(raw: Floats) -> dict[str, Floats]:
 
 
 def _patches(raw: Floats, speed: Floats) -> dict[str, Floats]:
-    a, b, N = raw[..., patch.A], raw[..., patch.B], raw[..., patch.NORMAL]
+    a, b, N = raw[..., contact.A], raw[..., contact.B], raw[..., contact.NORMAL]
     area = np.where(N > 0.0, np.pi * a * b, 1.0)
     # written over the speed of travel, as T_gamma of the wheel
-    scale = raw[..., patch.PATCH_SPEED] / speed[:, None, None, None]
-    work = raw[..., patch.T_X] * raw[..., patch.XI_X] + raw[..., patch.T_Y] * raw[..., patch.XI_Y]
+    scale = raw[..., contact.PATCH_SPEED] / speed[:, None, None, None]
+    work = (
+        raw[..., contact.T_X] * raw[..., contact.XI_X]
+        + raw[..., contact.T_Y] * raw[..., contact.XI_Y]
+    )
     return {
         "patch_N": N,
         "patch_pressure": 1.5 * N / area,
         "patch_a": a,
         "patch_b": b,
-        "patch_angle": np.arctan2(raw[..., patch.ANGLE_SIN], raw[..., patch.ANGLE_COS]) * (N > 0.0),
-        "patch_x": raw[..., patch.C_X],
-        "patch_y": raw[..., patch.C_Y],
-        "patch_z": raw[..., patch.C_Z],
-        "patch_T_x": raw[..., patch.T_X],
-        "patch_T_y": raw[..., patch.T_Y],
+        "patch_angle": np.arctan2(raw[..., contact.ANGLE_SIN], raw[..., contact.ANGLE_COS])
+        * (N > 0.0),
+        "patch_x": raw[..., contact.C_X],
+        "patch_y": raw[..., contact.C_Y],
+        "patch_z": raw[..., contact.C_Z],
+        "patch_T_x": raw[..., contact.T_X],
+        "patch_T_y": raw[..., contact.T_Y],
         "patch_T_gamma": scale * work,
-        "patch_friction": raw[..., patch.MU_N] / np.where(N > 0.0, N, 1.0),
+        "patch_friction": raw[..., contact.MU_N] / np.where(N > 0.0, N, 1.0),
     }

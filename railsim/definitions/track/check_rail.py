@@ -4,18 +4,10 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field
 
-from railsim.definitions.base import (
-    OTHER_SIDE,
-    Definition,
-    Finite,
-    NonNegative,
-    Positive,
-    Side,
-    rises,
-)
+from railsim.definitions import base
 
 MOST_CHECK_RAILS = 100
-Width = Annotated[Finite, Field(ge=0.02, le=0.2)]
+Width = Annotated[base.Finite, Field(ge=0.02, le=0.2)]
 FAR = 1e7  # m
 
 
@@ -24,33 +16,34 @@ def _rows(value: object) -> object:
     return ((-FAR, value), (FAR, value)) if isinstance(value, int | float) else value
 
 
-class CheckRail(Definition):
+class CheckRail(base.Definition):
     """A check rail, or a guard rail of a sharp curve."""
 
-    rail: Side
+    rail: base.Side
     """Running rail beside which it stands; it holds the wheelset by the wheel on that rail"""
     flangeway: Annotated[
-        tuple[tuple[Finite, Width], ...],
+        tuple[tuple[base.Finite, Width], ...],
         Field(min_length=2, max_length=10_000),
-        rises("arc length"),
+        base.rises("arc length"),
         BeforeValidator(_rows),
     ]
     """Rows [s, width] from its begin to its end, linear in between, or one width all along: from
     the gauge face of the running rail to its own face, both 14 mm below the rail tops [m]"""
-    height: Annotated[Finite, Field(ge=-0.02, le=0.08)] = 0.0
+    height: Annotated[base.Finite, Field(ge=-0.02, le=0.08)] = 0.0
     """Height of its top above the tops of the running rails [m]"""
     profile: (
-        Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2, max_length=1000)] | None
+        Annotated[tuple[tuple[base.Finite, base.Finite], ...], Field(min_length=2, max_length=1000)]
+        | None
     ) = None
     """Points [y, z] of its contour from the top down the face: y towards the running rail, z down
     from its top [m]; by default a plane face"""
-    friction: NonNegative = 0.3
+    friction: base.NonNegative = 0.3
     """Coefficient of friction [1]"""
-    stiffness: Annotated[Positive, Field(ge=1e5, le=5e8)] = 5e7
+    stiffness: Annotated[base.Positive, Field(ge=1e5, le=5e8)] = 5e7
     """Lateral stiffness with its fastening [N/m]"""
-    damping: NonNegative = 5e4
+    damping: base.NonNegative = 5e4
     """Its damping [N s/m]"""
 
     def mirrored(self) -> Self:
         """Return the same beside the other rail."""
-        return self.model_copy(update={"rail": OTHER_SIDE[self.rail]})
+        return self.model_copy(update={"rail": base.OTHER_SIDE[self.rail]})

@@ -10,54 +10,45 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Definition,
-    Name,
-    Positive,
-    PositiveVector,
-    Text,
-    Vector,
-    check,
-)
+from railsim.definitions import base
 from railsim.errors import Fault, nearest
 
 DESIGN = "design"  # the load of the vehicle's own numbers, as a load case is called
 
 
-LoadName = Annotated[Text, AfterValidator(lambda name: None if name == DESIGN else name)]
-V = TypeVar("V", bound=Definition)  # a vehicle, which is built on this module
+LoadName = Annotated[base.Text, AfterValidator(lambda name: None if name == DESIGN else name)]
+V = TypeVar("V", bound=base.Definition)  # a vehicle, which is built on this module
 
 
-class BodyLoad(Definition):
+class BodyLoad(base.Definition):
     """What a load case changes in one body."""
 
-    mass: Positive | None = None
+    mass: base.Positive | None = None
     """Mass with the load [kg]"""
-    inertia: PositiveVector | None = None
+    inertia: base.PositiveVector | None = None
     """Moments of inertia Ixx, Iyy, Izz about the common centre of gravity [kg m2]"""
-    position: Vector | None = None
+    position: base.Vector | None = None
     """Common centre of gravity, where the body is in its nominal position [m]"""
 
-    @check
+    @base.check
     def _something_changes(self) -> None:
         if self.mass is None and self.inertia is None and self.position is None:
             raise ValueError("'mass', 'inertia' or 'position' is needed")
 
 
-class LoadGroup(Definition):
+class LoadGroup(base.Definition):
     """Bodies of the vehicle, or of one of its assemblies, that a load case changes."""
 
-    bodies: dict[Name, BodyLoad] = EMPTY_TABLE
+    bodies: dict[base.Name, BodyLoad] = base.EMPTY_TABLE
     """Changed bodies by their names"""
-    assemblies: dict[Name, "LoadGroup"] = EMPTY_TABLE
+    assemblies: dict[base.Name, "LoadGroup"] = base.EMPTY_TABLE
     """Assemblies with changed bodies by their names"""
 
 
 class LoadCase(LoadGroup):
     """One load case: tare, laden, crush, uneven."""
 
-    description: Text | None = None
+    description: base.Text | None = None
     """What it stands for"""
 
 
