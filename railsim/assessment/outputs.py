@@ -32,14 +32,11 @@ def check_outputs(
     """
     faults, outputs, filters = Faults(), settings.outputs, standard in (*record.RUNNING, "comfort")
     kept = outputs.quantities or ("*",)
-    for needed, allowed in (
-        (record.NEEDED[standard], f"with {', '.join(record.NEEDED[standard])}"),
-        (record.MOTION, "with them, or settings.outputs.sensors=true"),
-    ):
-        lacking = [name for name in needed if not matches(name, kept)]
-        if lacking and (
-            needed is not record.MOTION or (standard == "comfort" and not outputs.sensors)
-        ):
+    needed = {record.NEEDED[standard]: f"with {', '.join(record.NEEDED[standard])}"}
+    if standard == "comfort" and not outputs.sensors:
+        needed[record.MOTION] = "with them, or settings.outputs.sensors=true"
+    for names, allowed in needed.items():
+        if lacking := [name for name in names if not matches(name, kept)]:
             found = f"without {', '.join(lacking)}"
             faults.append(Fault("settings", "outputs.quantities", found, allowed))
     rate = output_rate(settings, speed)

@@ -48,13 +48,10 @@ def _report_causes(ended: Event) -> None:
         words = _cause()
         if words and words not in _reported:
             _reported.add(words)
-            echo(words if _is_cached() else words.replace("kept for later", UNCACHED), err=True)
-
-
-def _is_cached() -> bool:
-    """Whether what is prepared is kept on the disk."""
-    cache = sys.modules.get("railsim.kernels.cache")
-    return not any("is not used" in notice for notice in getattr(cache, "notices", ()))
+            notices = getattr(sys.modules.get("railsim.kernels.cache"), "notices", ())
+            if any("is not used" in notice for notice in notices):
+                words = words.replace("kept for later", UNCACHED)
+            echo(words, err=True)
 
 
 @contextmanager

@@ -89,7 +89,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         index = check_index(Path(file))
         return f"study of {len(index.runs)} runs, {index.status}", []
 
-    from railsim.definitions.loading import load_any, load_scenario
+    from railsim.definitions.loading import load_any, load_scenario, load_study
     from railsim.errors import Faults
     from railsim.profiles.used import profile_faults
 
@@ -99,25 +99,18 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
 
         run = load_measurement(file)
         return definition.KIND, [{"key": "channels", "text": remark} for remark in run.remarks]
-    if definition.KIND == "study":
-        _check_runs(file)
-    if definition.KIND == "scenario":
-        from railsim.studies.campaign import check_parts
-        from railsim.studies.plan import faults_of_file
+    if definition.KIND in ("study", "scenario"):
+        from railsim.studies.plan import check_study, faults_of_file
 
         with faults_of_file(file):
-            check_parts(load_scenario(file), file)
+            if definition.KIND == "study":
+                check_study(load_study(file))
+            else:
+                from railsim.studies.campaign import check_parts
+
+                check_parts(load_scenario(file), file)
     Faults(profile_faults(definition, file)).check()
     return definition.KIND, [dict(vars(remark)) for remark in cli.remarks_on(definition)]
-
-
-def _check_runs(file: str) -> None:
-    """Check vehicles, tracks and values of all runs of a study file, as the study does first."""
-    from railsim.definitions.loading import load_study
-    from railsim.studies.plan import check_study, faults_of_file
-
-    with faults_of_file(file):
-        check_study(load_study(file))
 
 
 def _is_profile(name: str) -> bool:

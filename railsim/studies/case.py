@@ -160,11 +160,9 @@ class Loader:
         settings = self.definition("settings", run)
         if settings is None or (run.speed is None and not needs_speed(self._analyses)):
             return run.speed
-        try:
+        with self.faults.caught():
             return initial_speed(settings, run.speed, run.start)
-        except InputError as error:
-            self.faults += error.faults
-            return None
+        return None
 
     def case(self, name: str, run: RunSpec, labels: Mapping[str, str | float]) -> Case | None:
         """Return the case of a run whose speed is that at its start; None if it is wrong."""
