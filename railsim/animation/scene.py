@@ -30,19 +30,15 @@ LARGEST = 0.05  # displacement of a mode over the vehicle's length
 
 @dataclass(frozen=True)
 class Drawn:
-    """A body to draw.
-
-    `name`, `kind`: Kind ``car``, ``frame`` or ``wheelset``. `y`, `z`: Nominal position of its
-    centre of gravity in the track frame [m]. `box`: Half length, half width and half height, and
-    the middle of the box from the centre of gravity, x, y, z [m]; of a wheelset its radius, half
-    the wheels' distance, and zeros.
-    """
+    """A body to draw."""
 
     name: str
-    kind: str
+    kind: str  # ``car``, ``frame`` or ``wheelset``
     offset: float  # arc length of its frame beyond that of the reference body [m]
-    y: float
+    y: float  # nominal position of its centre of gravity in the track frame [m]
     z: float
+    # half length, half width and half height, and the middle of the box from the centre of gravity,
+    # x, y, z [m]; of a wheelset its radius, half the wheels' distance, and zeros
     box: tuple[float, ...]
 
 

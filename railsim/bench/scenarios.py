@@ -13,23 +13,17 @@ REFERENCE_STEP = 0.125e-3  # s, of RK4
 
 @dataclass(frozen=True)
 class Scenario:
-    """One run.
+    """One run."""
 
-    `name`: in tables; `vehicle`, `track`: names of shipped files; `speed`: [m/s]; `irregularity`:
-    spectrum of random irregularities on the track; `settings`: what differs from the default
-    settings; `support`: preset of the track's support, by default its own; `until`: end of the run
-    [m], by default that of the track; `target`: least multiple of real time that it is to reach.
-    """
-
-    name: str
-    vehicle: str
-    track: str
-    speed: float
-    irregularity: str | None = None
-    settings: tuple[tuple[str, Any], ...] = ()
-    support: str | None = None
-    until: float | None = None
-    target: float | None = None
+    name: str  # in tables
+    vehicle: str  # name of a shipped file
+    track: str  # likewise
+    speed: float  # m/s
+    irregularity: str | None = None  # spectrum of random irregularities on the track
+    settings: tuple[tuple[str, Any], ...] = ()  # what differs from the default settings
+    support: str | None = None  # preset of the track's support, by default its own
+    until: float | None = None  # end of the run [m], by default that of the track
+    target: float | None = None  # least multiple of real time that it is to reach
 
     def run(self, sink: Sink | None = None, **settings: Any) -> Result:
         """Run it, with further settings if given."""

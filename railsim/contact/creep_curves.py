@@ -25,18 +25,14 @@ SIZES = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0)
 
 
 class Patch(NamedTuple):
-    """A loaded contact ellipse.
+    """A loaded contact ellipse."""
 
-    `a`, `b`: semi-axes along and across the rail [m]; `N`, `mu`: normal force [N], friction
-    coefficient [1]; `G`, `nu`: shear modulus [Pa], Poisson's ratio [1].
-    """
-
-    a: float
-    b: float
-    N: float
-    mu: float
-    G: float = 82e9
-    nu: float = 0.28
+    a: float  # semi-axis along the rail [m]
+    b: float  # across [m]
+    N: float  # normal force [N]
+    mu: float  # friction coefficient [1]
+    G: float = 82e9  # shear modulus [Pa]
+    nu: float = 0.28  # Poisson's ratio [1]
 
     def creepages(self, normalised: Sequence[float] | Floats) -> tuple[float, float, float]:
         """Creepages whose forces in linear theory are the given multiples of mu N."""

@@ -39,35 +39,24 @@ ARC_SPACING = 5e-5
 
 @dataclass(frozen=True)
 class WheelCurve:
-    """Candidate points of a right wheel.
+    """Candidate points of a right wheel, each of shape (n,)."""
 
-    `y`, shape (n,): lateral position from the nominal rolling circle, field side positive [m]; `u`,
-    shape (n,): position along the axle from the wheelset's centre [m]; `r`, shape (n,): radius [m];
-    `t`, shape (n,): slope dr/du [1]; `curvature`, shape (n_width, n): curvature, convex positive,
-    averaged over `HALF_WIDTHS` [1/m].
-    """
-
-    y: Floats
-    u: Floats
-    r: Floats
-    t: Floats
-    curvature: Floats
+    y: Floats  # lateral position from the nominal rolling circle, field side positive [m]
+    u: Floats  # position along the axle from the wheelset's centre [m]
+    r: Floats  # radius [m]
+    t: Floats  # slope dr/du [1]
+    curvature: Floats  # convex positive, averaged over `HALF_WIDTHS`, shape (n_width, n) [1/m]
 
 
 @dataclass(frozen=True)
 class RailCurve:
-    """A right rail in the track, as a function of the lateral position.
+    """A right rail in the track, as a function of the lateral position."""
 
-    `Y0`, `dY`: first node and spacing [m]; `z`, shape (n,): height below the rail-top plane [m];
-    `slope`, shape (n,): dz/dY [1]; `curvature`, shape (n_width, n): curvature, convex positive,
-    averaged over `HALF_WIDTHS` [1/m].
-    """
-
-    Y0: float
-    dY: float
-    z: Floats
-    slope: Floats
-    curvature: Floats
+    Y0: float  # first node [m]
+    dY: float  # spacing [m]
+    z: Floats  # height below the rail-top plane, shape (n,) [m]
+    slope: Floats  # dz/dY, shape (n,) [1]
+    curvature: Floats  # convex positive, averaged over `HALF_WIDTHS`, shape (n_width, n) [1/m]
 
     @property
     def Y(self) -> Floats:

@@ -33,21 +33,16 @@ _WAYS = ((1.0,), (0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0))
 
 
 class RollingGrid(NamedTuple):
-    """Cells and matrices of one ellipse ratio, lengths over sqrt(a b).
+    """Cells and matrices of one ellipse ratio, lengths over sqrt(a b)."""
 
-    `x`, `y`, `half_x`, `half_y`, shape (n_strip, n_cell): cell centres and half sides; cell 0 of a
-    strip at the leading edge; `bound`, shape (n_strip, n_cell): traction bound over mu N/(a b),
-    from the Hertz pressure; sums up to 1 with the cells' areas; `x_middle`, shape (n_strip,
-    n_cell): where sticking is to be evaluated; `middle`, `centre`, shape (3, n, n): elastic slip
-    per traction, see `railsim.kernels.halfspace.rolling_matrices`.
-    """
-
-    x: Floats
+    # of the cells, shape (n_strip, n_cell); cell 0 of a strip at the leading edge
+    x: Floats  # centre
     y: Floats
-    half_x: Floats
+    half_x: Floats  # half side
     half_y: Floats
-    bound: Floats
-    x_middle: Floats
+    bound: Floats  # of the traction over mu N/(a b), Hertz; sums up to 1 with the cells' areas
+    x_middle: Floats  # where sticking is to be evaluated
+    # elastic slip per traction, shape (3, n, n), see `railsim.kernels.halfspace.rolling_matrices`
     middle: Floats
     centre: Floats
 

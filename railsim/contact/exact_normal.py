@@ -34,22 +34,15 @@ LARGEST_OVERLAP = 1.5e-3
 
 @dataclass(frozen=True, eq=False)
 class ExactContact:
-    """Contact of a right wheel on a right rail.
+    """Contact of a right wheel on a right rail."""
 
-    `z`: vertical displacement of the wheelset's centre [m]; `penetration`: how far the wheel is
-    below its first touch, vertically [m]; `patches`: from the flange to the tread; `x`, `s`, shapes
-    (n_x,), (n_s,): element centres along the track and along the rail's contour (0 at its top) [m];
-    `Y`, shape (n_s,): lateral position on the rail at `s`, track axes [m]; `pressure`, shape (n_x,
-    n_s): pressure [Pa].
-    """
-
-    z: float
-    penetration: float
-    patches: tuple[Patch, ...]
-    x: Floats
-    s: Floats
-    Y: Floats
-    pressure: Floats
+    z: float  # vertical displacement of the wheelset's centre [m]
+    penetration: float  # how far the wheel is below its first touch, vertically [m]
+    patches: tuple[Patch, ...]  # from the flange to the tread
+    x: Floats  # element centres along the track, shape (n_x,) [m]
+    s: Floats  # and along the rail's contour, 0 at its top, shape (n_s,) [m]
+    Y: Floats  # lateral position on the rail at `s`, track axes [m]
+    pressure: Floats  # shape (n_x, n_s) [Pa]
 
 
 def exact_contact(

@@ -37,18 +37,13 @@ SMALL_WAVE = 0.02  # share of the largest amplitude of a table's waves that is n
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """One wheel's height over its angle, see `railsim.kernels.wheel_surface`.
+    """One wheel's height over its angle, see `railsim.kernels.wheel_surface`."""
 
-    `values`, shape (n_phi, n_y, 4): e [m], e_phi [m], e_y [1], e_phi_y [1]; `y`, shape (n_y,):
-    lateral positions [m]; `ahead`, shape (n_phi,): angle to the next flat [rad]; `flat`, `wave`:
-    lengths of the shortest flat and of the shortest wave all around [m], infinite without.
-    """
-
-    values: Floats
-    y: Floats
-    ahead: Floats
-    flat: float
-    wave: float
+    values: Floats  # e [m], e_phi [m], e_y [1], e_phi_y [1], shape (n_phi, n_y, 4)
+    y: Floats  # lateral positions, shape (n_y,) [m]
+    ahead: Floats  # angle to the next flat, shape (n_phi,) [rad]
+    flat: float  # length of the shortest flat [m], infinite without
+    wave: float  # and of the shortest wave all around
 
 
 def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape: float) -> Surface:

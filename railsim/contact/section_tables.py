@@ -67,21 +67,15 @@ USUAL = np.abs(TRIED) < 7e-3  # those at which nodes are chosen
 
 @dataclass(frozen=True, eq=False)
 class Range:
-    """Sections of a rail over a range of the track, as one kind of wheel meets them.
+    """Sections of a rail over a range of the track, as one kind of wheel meets them."""
 
-    `sections`: sections, in their own arc length; `begin`, `end`: range in that arc length [m];
-    `zero`: where y = 0 of the sections lies beside the middle of the track [m]; `wheel`, `rail`:
-    the wheel's, and that of the plain rail; `plain`: contact of the two; `normal`: kind of normal
-    contact.
-    """
-
-    sections: SectionList
-    begin: float
+    sections: SectionList  # in their own arc length
+    begin: float  # in that arc length [m]
     end: float
-    zero: float
+    zero: float  # where y = 0 of the sections lies beside the middle of the track [m]
     wheel: Profile
-    rail: Profile
-    plain: ContactTable
+    rail: Profile  # the plain one
+    plain: ContactTable  # of the two
     normal: Normal
 
 

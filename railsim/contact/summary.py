@@ -121,10 +121,7 @@ class ContactSummary:
     def main_patch(self, friction: float) -> Patch:
         """Return the most loaded patch of the centred right wheel.
 
-        Raises
-        ------
-        ModelError
-            The wheel does not rest on its rail.
+        Raises ModelError: the wheel does not rest on its rail.
         """
         if not self.contacts:
             raise ModelError("the wheel rests on its rail at none of the displacements")

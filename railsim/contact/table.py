@@ -165,16 +165,12 @@ def ellipse_functions(G: float, nu: float) -> kernel.Hertz:
 def strip_influence() -> kernel.Strips:
     """Influences for the non-elliptic patch, as logarithms over a logarithm.
 
-    Returns
-    -------
-    start, spacing : float
-        Grid of the logarithms of q and of b/a.
-    strip : ndarray, shape (n,)
-        ln J(q), J(q) = integral_-1^1 sqrt(1 - t^2)/sqrt(t^2 + q^2) dt: a strip with a
-        semi-elliptic load at the distance q of its half length.  With t = q sinh(v) the integrand
-        has no peak.
-    whole : ndarray, shape (n,)
-        ln of integral_-1^1 sqrt(1 - t^2) J(|t| (b/a)/sqrt(1 - t^2)) dt: all strips of an ellipse.
+    - `start`, `spacing`: grid of the logarithms of q and of b/a
+    - `strip`: ln J(q), J(q) = integral_-1^1 sqrt(1 - t^2)/sqrt(t^2 + q^2) dt: a strip with a
+      semi-elliptic load at the distance q of its half length.  With t = q sinh(v) the integrand has
+      no peak.
+    - `whole`: ln of integral_-1^1 sqrt(1 - t^2) J(|t| (b/a)/sqrt(1 - t^2)) dt: all strips of an
+      ellipse
     """
     x = np.linspace(-12.0, 4.0, 801)
     nodes, weights = np.polynomial.legendre.leggauss(200)

@@ -34,19 +34,13 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Takes:
-    """What a law is given and gives.
+    """What a law is given and gives."""
 
-    `words`: what it is: ``a force element``; `given`: names of the arguments that the loop gives,
-    in the order of the block; `named`: further arguments that have to be there: the inputs of a
-    controller; `gives`: how many numbers it may return; `states`: whether arguments ``state_1``,
-    ... are states whose rates it returns.
-    """
-
-    words: str
-    given: tuple[str, ...]
-    named: tuple[str, ...] = ()
-    gives: tuple[int, ...] = (1,)
-    states: bool = False
+    words: str  # what it is: ``a force element``
+    given: tuple[str, ...]  # arguments that the loop gives, in the order of the block
+    named: tuple[str, ...] = ()  # further ones that have to be there: the inputs of a controller
+    gives: tuple[int, ...] = (1,)  # how many numbers it may return
+    states: bool = False  # whether arguments ``state_1``, ... are states whose rates it returns
 
 
 FORCE_ELEMENT = Takes("a force element", ("deflection", "rate", "time", "command"), states=True)
@@ -61,19 +55,14 @@ EXCITATION = Takes("an excitation", ("s",))
 
 @dataclass(frozen=True)
 class Bound:
-    """A law that the time loop can call.
-
-    `name`: name of the law; `address`: where it stands; `states`: number of its states; `further`:
-    names of its parameters, in the order of the block; `defaults`: values of parameters that need
-    not be given; `kept`: what has to live as long as the address is called.
-    """
+    """A law that the time loop can call."""
 
     name: str
-    address: int
-    states: int
-    further: tuple[str, ...]
-    defaults: Mapping[str, float]
-    kept: tuple[Any, ...]
+    address: int  # where it stands
+    states: int  # their number
+    further: tuple[str, ...]  # names of its parameters, in the order of the block
+    defaults: Mapping[str, float]  # of parameters that need not be given
+    kept: tuple[Any, ...]  # what has to live as long as the address is called
 
     def values(self, given: Floats, parameters: Sequence[float]) -> Any:
         """What a law of one value gives, called beside the loop.
@@ -129,15 +118,11 @@ def _bound(name: str, law: Law, takes: Takes, gives: int | None, memory: int) ->
 
 
 class _Binding:
-    """One law on its way from text to address.
+    """One law on its way from text to address."""
 
-    `names`: of its arguments; `place`: where each stands in the block; `allowed`: how many values
-    it may return.
-    """
-
-    names: list[str]
-    place: dict[str, int]
-    allowed: tuple[int, ...]
+    names: list[str]  # of its arguments
+    place: dict[str, int]  # where each stands in the block
+    allowed: tuple[int, ...]  # how many values it may return
 
     def __init__(self, name: str, law: Law, takes: Takes, gives: int | None, memory: int) -> None:
         self.name, self.law, self.takes, self.gives, self.memory = name, law, takes, gives, memory

@@ -157,10 +157,7 @@ def level_track_with_friction(system: kernel.System) -> kernel.System:
 def against_rails(system: kernel.System, state: Floats) -> Floats:
     """Lateral displacement and roll of each wheelset against its rails, from recorded states.
 
-    Returns
-    -------
-    float64[time, wheelset, 2]
-        [m], [rad]
+    float64[time, wheelset, 2] [m], [rad].
     """
     axles, elastic = system.contact.body, system.support.elastic
     found = np.empty((len(state), len(axles), 2))

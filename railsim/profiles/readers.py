@@ -32,21 +32,16 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 
 @dataclass
 class Points:
-    """Points of a file on their way to a profile.
+    """Points of a file on their way to a profile."""
 
-    `file`: its name, for messages; `y`, `z`, shape (n,): as read in the file's order, axes and
-    unit; `line`, shape (n,): line of each point in the file, from 1; `unit`: metres per unit of the
-    file; None if the file does not say; `kind`: what the file says that it is; `name`: title;
-    `notes`: what was done on the file's own request, then what was recognised.
-    """
-
-    file: str
-    y: Floats
+    file: str  # its name, for messages
+    y: Floats  # as read, in the file's order, axes and unit, shape (n,)
     z: Floats
-    line: Integers
-    unit: float | None = None
-    kind: Kind | None = None
-    name: str = ""
+    line: Integers  # of each point in the file, from 1
+    unit: float | None = None  # metres per unit of the file; None if the file does not say
+    kind: Kind | None = None  # what the file says that it is
+    name: str = ""  # title
+    # what was done on the file's own request, then what was recognised
     notes: list[str] = field(default_factory=list)
 
     def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:

@@ -56,16 +56,10 @@ COUNTED = ("events", "extremes", "unloaded", "vibration", "parts", "memory", "ra
 class SavedState:
     """All that a run goes on from, as `Simulation.state` gives it; it can be pickled.
 
-    Attributes
-    ----------
-    motion : float64[n_state]
-        See `railsim.kernels.state`.
-    counted : tuple of ndarray
-        What steps count and remember beside it: commands, samples, memory of laws, extremes.
-    grid : tuple
-        Where it is on the grid of steps.
-    begun : SavedState, optional
-        Begin of the step of the grid of which a part has been taken.
+    - `motion`: float64[n_state], see `railsim.kernels.state`
+    - `counted`: what steps count and remember: commands, samples, memory of laws, extremes
+    - `grid`: where it is on the grid of steps
+    - `begun`: begin of the step of the grid of which a part has been taken
     """
 
     motion: Floats
@@ -76,38 +70,19 @@ class SavedState:
 
 @dataclass
 class Preparation:
-    """Everything that is settled before the time loop starts.
+    """Everything that is settled before the time loop starts."""
 
-    Attributes
-    ----------
-    model, balance : Model, Equilibrium
-        The assembled vehicle on its track; its rest and steady rolling.
-    state : float64[n_state]
-        Initial state.
-    end_time, end_distance : float
-        Where the run ends, whichever comes first [s], [m].
-    steps : StepChoice
-        Step and output interval at any speed.
-    evaluation : float
-        Time from which on peaks are evaluated [s].
-    memory : float64[...]
-        Commands, samples and memory of laws at the beginning, see `railsim.kernels.system.Own`.
-    fresh : bool
-        Whether nothing was before the initial state.
-    remarks : tuple of str
-        Remarks for the reader.
-    """
-
-    model: Model
-    balance: Equilibrium
-    state: Floats
-    end_time: float
-    end_distance: float
-    steps: StepChoice
+    model: Model  # the assembled vehicle on its track
+    balance: Equilibrium  # its rest and steady rolling
+    state: Floats  # at the beginning, float64[n_state]
+    end_time: float  # where the run ends [s]
+    end_distance: float  # where it ends if that comes first [m]
+    steps: StepChoice  # step and output interval at any speed
+    # commands, samples and memory of laws at the beginning, see `railsim.kernels.system.Own`
     memory: Floats
-    evaluation: float = 0.0
-    fresh: bool = True
-    remarks: tuple[str, ...] = ()
+    evaluation: float = 0.0  # time from which on peaks are evaluated [s]
+    fresh: bool = True  # whether nothing was before the initial state
+    remarks: tuple[str, ...] = ()  # for the reader
 
     def left(self, state: Floats) -> float:
         """Time from `state` to the end of the run at the present speed [s]."""
@@ -117,68 +92,32 @@ class Preparation:
 
 @dataclass(eq=False)
 class Run:
-    """A run on its way.
-
-    Attributes
-    ----------
-    prepared, plan, sink : Preparation, OutputPlan, Sink
-        Where it begins and ends, what it outputs and where.
-    state : float64[n_state]
-        Where it is.
-    fresh : bool
-        Whether nothing was before `state`.
-    due : bool
-        Whether `state` is to be recorded.
-    status, where : int
-        How it ended, see `railsim.kernels.status`.
-    events : int64[3]
-        Loaded contact patches so far, and those out of the creep law's range; look-ups beyond the
-        yaw of the contact table.
-    extremes, evaluated : float64[6, w, EXTREMES]
-        Largest and smallest values so far, see `railsim.kernels.extremes`; of all, and since the
-        evaluation began.
-    unloaded : float64[w, 2]
-        Time during which each wheel has carried nothing [s].
-    parts : int64[N_PARTS]
-        Counts of steps and evaluations, see `railsim.kernels.system`.
-    again : int
-        How often the contact of one wheelset alone was evaluated again.
-    vibration : float64[w, 2, VIBRATION]
-        Vibrations of the wheel loads, see `railsim.kernels.vibration`; empty at its begin.
-    memory : float64[...]
-        Commands, samples and memory of laws, see `railsim.kernels.system.Own`.
-    cpu_time, wall_time : float
-        Its share of what the time loop, and all of the run, took [s].
-    together : int
-        Most runs that have shared a call with it, itself included.
-    error : Exception or None
-        Error in writing its output, or why it cannot begin.
-    stopped : str
-        Why it cannot go on at the speed that it has reached; empty otherwise.
-    remarks : list of str
-        Remarks for the reader of its result, see `railsim.simulation.remarks`.
-    swings : MemorySink
-        What shows whether it hunts, see `railsim.result.hunting`.
-    """
+    """A run on its way."""
 
     prepared: Preparation
     plan: OutputPlan
     sink: Sink
-    state: Floats
-    fresh: bool = True
-    due: bool = True
-    status: int = RUNNING
-    where: int = 0
+    state: Floats  # where it is, float64[n_state]
+    fresh: bool = True  # whether nothing was before `state`
+    due: bool = True  # whether `state` is to be recorded
+    status: int = RUNNING  # how it ended, see `railsim.kernels.status`
+    where: int = 0  # likewise
+    # loaded contact patches so far, and those out of the creep law's range; look-ups beyond the yaw
+    # of the contact table
     events: Integers = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    # counts of steps and evaluations, see `railsim.kernels.system`
     parts: Integers = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
-    again: int = 0
+    again: int = 0  # how often the contact of one wheelset alone was evaluated again
+    # of the wheel loads, see `railsim.kernels.vibration`; empty at its begin
     vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
-    cpu_time: float = 0.0
-    wall_time: float = 0.0
-    together: int = 1
-    error: Exception | None = None
-    stopped: str = ""
+    cpu_time: float = 0.0  # its share of what the time loop took [s]
+    wall_time: float = 0.0  # its share of what all of the run took [s]
+    together: int = 1  # most runs that have shared a call with it, itself included
+    error: Exception | None = None  # in writing its output, or why it cannot begin
+    stopped: str = ""  # why it cannot go on at the speed that it has reached
+    # for the reader of its result, see `railsim.simulation.remarks`
     remarks: list[str] = field(default_factory=list)
+    # what shows whether it hunts, see `railsim.result.hunting`
     swings: MemorySink = field(default_factory=lambda: MemorySink(only=SEEN))
 
     @property
@@ -188,9 +127,10 @@ class Run:
 
     def __post_init__(self) -> None:
         wheelsets = len(self.prepared.model.index.wheelsets)
+        # largest and smallest values so far, see `railsim.kernels.extremes`
         self.extremes: Floats = no_extremes(wheelsets)
-        self.evaluated: Floats = no_extremes(wheelsets)
-        self.unloaded: Floats = np.zeros((wheelsets, 2))
+        self.evaluated: Floats = no_extremes(wheelsets)  # since the evaluation began
+        self.unloaded: Floats = np.zeros((wheelsets, 2))  # s in which each wheel carried nothing
         self.memory: Floats = self.prepared.memory.copy()
         self.swings.begin(self.plan.coordinates)
 
@@ -200,12 +140,8 @@ def advance(
 ) -> Iterator[Run]:
     """Take runs to their ends; yields each when it is there.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of the same track, start and end, and of these settings.
-    progress : callable, optional
-        Called repeatedly with the finished fraction of all runs.
+    `runs`: of the same track, start and end, and of these settings; `progress`: called repeatedly
+    with the finished fraction of all runs.
     """
     whole = {run: run.prepared.left(run.state) for run in runs}
     done = dict.fromkeys(whole, 0.0)

@@ -13,12 +13,7 @@ from railsim.simulation.sampling import output_words
 def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float) -> list[str]:
     """Return the assumptions of a run in customary units, one a line after the title.
 
-    Parameters
-    ----------
-    vehicle, track, settings
-        Inputs of the run.
-    speed : float
-        At its start [m/s].
+    `speed`: at its start [m/s].
     """
     wheelsets = (body.wheelset for body in flatten(vehicle).bodies)
     wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)

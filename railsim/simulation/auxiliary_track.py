@@ -42,18 +42,9 @@ def curve_to_settle_in(
 ) -> Track:
     """Straight, transition and curve on smooth rails, long enough for a vehicle to settle.
 
-    Parameters
-    ----------
-    speed : float
-        [m/s].
-    curvature, cant : float
-        Of the curve [1/m], [m].
-    friction : tuple of float
-        Of left and right rail [1].
-    times : tuple of float
-        Time in the transition and in the curve [s]; at low speed their lengths decide.
-    lengths : tuple of float
-        Of the transition, and of the curve behind the last wheelset, at least [m].
+    `speed`: [m/s]; `curvature`, `cant`: of the curve [1/m], [m]; `friction`: of left and right
+    rail [1]; `times`: time in the transition and in the curve [s], at low speed their lengths
+    decide; `lengths`: of the transition, and of the curve behind the last wheelset, at least [m].
     """
     transition = max(speed * times[0], lengths[0])
     behind = -float(np.min(model.system.frame_offset))

@@ -17,23 +17,10 @@ FULL, HALF = "step", "half"
 
 
 def half_step(result: Result, *, progress: Callable[[float], None] | None = None) -> Result:
-    """Run the inputs of a result again at half its step.
+    """Run the inputs of a result again at half its step; the new result is kept in memory.
 
-    Parameters
-    ----------
-    result : Result
-        A run; it stays as it is.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
-
-    Returns
-    -------
-    Result
-        Kept in memory.
-
-    Raises
-    ------
-    InputError, ModelError : as `railsim.simulate`.
+    `progress`: called repeatedly with the finished fraction. Raises InputError, ModelError: as
+    `railsim.simulate`.
     """
     inputs = result.inputs()
     inputs["settings"] = inputs["settings"].replace(step=0.5 * float(result.attributes["step"]))
@@ -41,13 +28,7 @@ def half_step(result: Result, *, progress: Callable[[float], None] | None = None
 
 
 def step_differences(result: Result, half: Result) -> tuple[Comparison, ...]:
-    """Compare the peaks of a run with those at half its step, which is the reference.
-
-    Returns
-    -------
-    tuple of Comparison
-        The labels of its values are `HALF` and `FULL`.
-    """
+    """Compare the peaks of a run, `FULL`, with those at half its step, `HALF`, the reference."""
     return compare({HALF: half, FULL: result})
 
 

@@ -33,17 +33,10 @@ OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial", "start
 
 
 class TakenUp(NamedTuple):
-    """What a run goes on from.
+    """What a run goes on from."""
 
-    Attributes
-    ----------
-    motion : float64[n_state]
-        See `railsim.kernels.state`.
-    memory : float64[...], optional
-        Commands, samples and memory of laws; None where nothing of it is known.
-    """
-
-    motion: Floats
+    motion: Floats  # float64[n_state], see `railsim.kernels.state`
+    # commands, samples and memory of laws; None where nothing of it is known
     memory: Floats | None = None
 
 
@@ -177,11 +170,8 @@ def state_before(
 ) -> TakenUp:
     """State with which a run goes on from another one.
 
-    Raises
-    ------
-    InputError
-        The result holds no state, or is of another vehicle, track or other settings: going on would
-        not give what an undisturbed run gives.
+    Raises InputError: the result holds no state, or is of another vehicle, track or other settings:
+    going on would not give what an undisturbed run gives.
     """
     if not isinstance(resume, Result):
         states = resume if isinstance(resume, Mapping) else {"end": resume}

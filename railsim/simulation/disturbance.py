@@ -26,15 +26,8 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
     before.  Otherwise it would be pressed into the rails: 3 mm sideways on S1002 and 60E1 make
     392 kN of a wheel load of 69 kN.
 
-    Parameters
-    ----------
-    model : Model
-        With preloads, on its track.
-    Q0 : float64[wheelset, side]
-        Static wheel loads [N].
-    settings : Settings
-    state : float64[n_state]
-        Changed in place.
+    `model`: with preloads, on its track; `Q0`: static wheel loads, float64[wheelset, side] [N];
+    `state`: float64[n_state], changed in place.
     """
     if not settings.initial:
         return ()

@@ -62,40 +62,21 @@ def contact_grid(model: Model) -> tuple[float | int, ...]:
 
 @dataclass(frozen=True)
 class Part:
-    """Where one vehicle is in the arrays of an ensemble.
+    """Where one vehicle is in the arrays of an ensemble."""
 
-    Attributes
-    ----------
-    state : int64[n_state]
-        Indices of its own state; the last three, time, position and speed, are those of all.
-    bodies, wheelsets, elements : slice
-        Its bodies, wheelsets and recorded elements.
-    """
-
+    # indices of its own state; the last three, time, position and speed, are those of all
     state: Integers
     bodies: slice
     wheelsets: slice
-    elements: slice
+    elements: slice  # that are recorded
 
 
 class Ensemble:
     """Models of several vehicles as one system; a single model's as it is.
 
-    Parameters
-    ----------
-    models : sequence of Model
-        On the same track, with the same settings and the same `contact_grid`.
-    recorders : sequence of Recorder
-        What is recorded of each.
-
-    Attributes
-    ----------
-    system : System
-        Everything that the time loop reads.
-    recorder : Recorder
-        Records of all vehicles.
-    parts : tuple of Part
-        Where each vehicle is.
+    `models`: on the same track, with the same settings and the same `contact_grid`; `recorders`:
+    what is recorded of each. `system`: everything that the time loop reads; `recorder`: records of
+    all vehicles; `parts`: where each vehicle is.
     """
 
     def __init__(self, models: Sequence[Model], recorders: Sequence[Recorder]) -> None:

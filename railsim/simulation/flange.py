@@ -63,19 +63,10 @@ def in_flange_contact(
 ) -> tuple[System, Floats] | None:
     """System on a curve as tight as the tightest one of the track, and the settled vehicle there.
 
-    Parameters
-    ----------
-    rolling : float64[n_state]
-        Steady rolling on straight track at the speed in question.
-    step : float
-        Step of the fast scheme, stable on straight track [s].
-    progress : callable, optional
-        Called repeatedly with the time simulated so far and the time to simulate [s].
-
-    Returns
-    -------
-    tuple or None
-        None where all curves are wide, or the vehicle does not stay on the track at this speed.
+    `rolling`: steady rolling on straight track at the speed in question; `step`: of the fast
+    scheme, stable on straight track [s]; `progress`: called repeatedly with the time simulated so
+    far and the time to simulate [s]. Returns None where all curves are wide, or the vehicle does
+    not stay on the track at this speed.
     """
     curve = tightest_curve(track)
     if curve is None:

@@ -34,16 +34,9 @@ NEEDED = ("time", "distance", "mileage", "curvature", "cant", "Q0")
 def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
     """Quantities of the first `rows` records.
 
-    Parameters
-    ----------
-    Q0 : float64[wheelset, side]
-        Static wheel loads [N].
-
-    Returns
-    -------
-    mapping of str to ndarray
-        By the names of `railsim.notation.QUANTITIES`, time first [SI]; those that are worked out
-        when asked for are not among them.
+    `Q0`: static wheel loads, float64[wheelset, side] [N]. Returns arrays by the names of
+    `railsim.notation.QUANTITIES`, time first [SI]; those that are worked out when asked for are not
+    among them.
     """
     n = model.index.n_bodies
     state = recorder.state[:rows]
@@ -101,10 +94,7 @@ def _of_both(values: Floats) -> Floats:
 def rail_deflection(model: Model, state: Floats) -> Floats:
     """Displacement of the rail heads on their support, from recorded states.
 
-    Returns
-    -------
-    float64[time, wheelset, side, 2]
-        Lateral and vertical [m]; zero on rigid rails.
+    float64[time, wheelset, side, 2], lateral and vertical [m]; zero on rigid rails.
     """
     rows, wheelsets = len(state), len(model.index.wheelsets)
     if not model.system.support.elastic:
@@ -117,19 +107,10 @@ def rail_deflection(model: Model, state: Floats) -> Floats:
 def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
     """Largest and smallest values over all steps of a run, each with its time and position.
 
-    Parameters
-    ----------
-    extremes : float64[6, wheelset, EXTREMES]
-        See `railsim.kernels.extremes`.
-    Q0 : float64[wheelset, side]
-        Static wheel loads [N].
-
-    Returns
-    -------
-    dict of str to ndarray
-        For each quantity ``Q`` its values (extreme, wheelset, side), extremes in the order of
-        `railsim.notation.EXTREMES`; ``Q_time`` [s] and ``Q_distance`` [m]: when, and where the
-        reference body was.
+    `extremes`: float64[6, wheelset, EXTREMES], see `railsim.kernels.extremes`; `Q0`: static wheel
+    loads, float64[wheelset, side] [N]. Returns for each quantity ``Q`` its values (extreme,
+    wheelset, side), extremes in the order of `railsim.notation.EXTREMES`; ``Q_time`` [s] and
+    ``Q_distance`` [m]: when, and where the reference body was.
     """
     columns: dict[str, int | slice] = {
         name: slice(first, first + 2)
@@ -161,10 +142,7 @@ def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
 class Chunk(Mapping[str, Floats]):
     """Quantities by name, some of them worked out when asked for: summaries need few of them.
 
-    Attributes
-    ----------
-    wrong : str
-        Which law of one's own has given no number, see `OwnOutputs`; or empty.
+    `wrong`: which law of one's own has given no number, see `OwnOutputs`; or empty.
     """
 
     def __init__(
@@ -201,14 +179,7 @@ def requested(outputs: Outputs, track: Track) -> list[Quantity]:
 class OutputPlan:
     """What a run outputs: which elements, patches and track quantities beyond the usual ones.
 
-    Parameters
-    ----------
-    model, settings, track, vehicle : Model, Settings, Track, Vehicle
-
-    Attributes
-    ----------
-    irregularity : callable, optional
-        Displacements of the rails over the arc length, see `railsim.track.irregularity`.
+    `irregularity`: displacements of the rails over s, see `railsim.track.irregularity`.
     """
 
     def __init__(self, model: Model, settings: Settings, track: Track, vehicle: Vehicle) -> None:

@@ -19,18 +19,8 @@ Place = tuple[str, tuple[Any, ...]]
 class OwnOutputs:
     """Laws of `settings.outputs.own`, each bound to its inputs.
 
-    Parameters
-    ----------
-    settings : Settings
-    known : sequence of Quantity
-        What the run outputs otherwise.
-    coordinates : mapping of str to sequence of str
-        Names along its dimensions.
-
-    Raises
-    ------
-    InputError
-        An input that is not output, a law that is not permitted or cannot be compiled.
+    `known`: what the run outputs otherwise; `coordinates`: names along its dimensions. Raises
+    InputError: an input that is not output, a law that is not permitted or cannot be compiled.
     """
 
     def __init__(
@@ -82,18 +72,10 @@ class OwnOutputs:
         )
 
     def values(self, known: Mapping[str, Floats]) -> tuple[dict[str, Floats], str]:
-        """Return what the laws give, and what is wrong with it.
+        """Return what the laws give of the other quantities, float64[time], and what is wrong.
 
-        Parameters
-        ----------
-        known : mapping of str to ndarray
-            The other quantities.
-
-        Returns
-        -------
-        dict of str to float64[time]
-        str
-            Which law gave a value that is not finite although all that it was given is; or empty.
+        That is, which law gave a value that is not finite although all that it was given is; or
+        empty.
         """
         found, wrong = {}, ""
         for name, bound, places, parameters in self._laws:

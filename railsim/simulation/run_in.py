@@ -75,29 +75,12 @@ def start_state(
     progress: Progress | None = None,
     remark: Callable[[str], None] | None = None,
 ) -> Floats:
-    """State of the undisturbed vehicle at `start`.
+    """State of the undisturbed vehicle at time 0 and exactly at `start`, float64[n_state].
 
-    Parameters
-    ----------
-    start : float
-        Arc length of the reference body [m].
-    step, scheme : float, int
-        Time step [s] and scheme of the run.
-    progress : callable, optional
-        Called repeatedly with the time simulated so far and the time to simulate [s].
-    remark : callable, optional
-        Where it is given, the vehicle is in its steady state in a curve; called with a sentence
-        where it is not.
-
-    Returns
-    -------
-    float64[n_state]
-        At time 0 and exactly at `start`.
-
-    Raises
-    ------
-    InputError
-        The vehicle does not stay on the track there.
+    `start`: arc length of the reference body [m]; `step`, `scheme`: time step [s] and scheme of the
+    run; `progress`: called repeatedly with the time simulated so far and the time to simulate [s];
+    `remark`: where it is given, the vehicle is in its steady state in a curve; called with a
+    sentence where it is not. Raises InputError: the vehicle does not stay on the track there.
     ModelError
         The vehicle is longer than the track's table.
     """
@@ -337,24 +320,9 @@ def settled(
 ) -> Floats | None:
     """State of a vehicle that has settled into the curve at `start`, None on straight track.
 
-    Parameters
-    ----------
-    start : float
-        Arc length of the reference body [m].
-    step : float
-        Time step of the fast scheme [s].
-    progress : callable, optional
-        As of `start_state`.
-
-    Returns
-    -------
-    float64[n_state] or None
-        Relative to the track frames; time, position and speed are those of `balance`.
-
-    Raises
-    ------
-    InputError
-        The vehicle does not stay on the track there.
+    `start`: arc length of the reference body [m]; `step`: of the fast scheme [s]; `progress`: as of
+    `start_state`. Returns float64[n_state] relative to the track frames; time, position and speed
+    are those of `balance`. Raises InputError: the vehicle does not stay on the track there.
     """
     curvature, cant = _curve(track, start)
     if not (curvature or cant):

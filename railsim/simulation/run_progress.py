@@ -15,14 +15,8 @@ class RunProgress:
 
     Before a run its step is judged in flange contact, and it may have a run-in.
 
-    Parameters
-    ----------
-    progress : callable or None
-        Called with the finished fraction of all runs.
-    number : int
-        How many they are.
-    inputs : Inputs
-        What they have in common.
+    `progress`: called with the finished fraction of all runs; `number`: how many they are;
+    `inputs`: what they have in common.
     """
 
     def __init__(self, progress: Progress | None, number: int, inputs: Inputs) -> None:

@@ -54,16 +54,10 @@ class StepChoice:
     at some friction in between: there a class is judged at its highest speed and middle friction
     as well, with half of the margin.
 
-    Parameters
-    ----------
-    states : dict of float to float64[n_state]
-        Steady rolling on straight track at the speeds where it is known.
-    inputs : str
-        Hash of all that the model was made of, friction apart, see `inputs_hash`.
-    progress : callable, optional
-        Called while a step is judged, as in `railsim.simulation.flange.in_flange_contact`.
-    periods : sequence of float
-        Of controllers and samples: no step is longer, and one that divides them is preferred [s].
+    `states`: steady rolling on straight track at the speeds where it is known; `inputs`: hash of
+    all that the model was made of, friction apart, see `inputs_hash`; `progress`: called while a
+    step is judged, as in `railsim.simulation.flange.in_flange_contact`; `periods`: of controllers
+    and samples: no step is longer, and one that divides them is preferred [s].
     """
 
     def __init__(
