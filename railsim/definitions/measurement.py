@@ -10,19 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from railsim.constants import STANDARD_GRAVITY
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Definition,
-    Finite,
-    Flag,
-    Name,
-    NonNegative,
-    Positive,
-    Text,
-    Whole,
-    check,
-    holds,
-)
+from railsim.definitions import base
 from railsim.definitions.file_definition import FileDefinition
 from railsim.notation import COMPONENTS, QUANTITIES, REQUESTED, SHOWN_UNITS, SIDES, Quantity
 
@@ -45,7 +33,7 @@ UNITS = {
 FEWEST, MOST_FILES, MOST_CHANNELS = 20, 1000, 500
 
 Files = Annotated[
-    tuple[Text, ...],
+    tuple[base.Text, ...],
     Field(min_length=1, max_length=MOST_FILES),
     BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
     WithJsonSchema(
@@ -82,8 +70,8 @@ def quantity_of(selection: str) -> Quantity | None:
 
 
 Selection = Annotated[
-    Text,
-    holds(
+    base.Text,
+    base.holds(
         lambda selection: quantity_of(selection) is not None,
         "a quantity of a result with a label for each of its dimensions: 'Q:1:left', "
         "'sensor_acceleration:floor_front:z'; or one of " + ", ".join(AXES),
@@ -91,36 +79,36 @@ Selection = Annotated[
 ]
 
 
-class Channel(Definition):
+class Channel(base.Definition):
     """A column of the files: what it measures, where, in which unit and with which sign."""
 
     quantity: Selection
     """Counterpart in a result, with its labels: `Q:1:left`, `sum_Y:2`,
     `sensor_acceleration:axlebox_1_left:z`; `time`, `distance`, `mileage`, `speed`, `curvature` or
     `yaw_rate` (of the body) of the run itself"""
-    column: Text | None = None
+    column: base.Text | None = None
     """Its name in the files (a path in HDF5); by default that of the channel"""
-    index: tuple[Whole, ...] = ()
+    index: tuple[base.Whole, ...] = ()
     """Which series of an array with more dimensions than time, from 0: `[0, 1]` (HDF5, MATLAB)"""
-    unit: Text | None = None
+    unit: base.Text | None = None
     """Unit of the file; by default SI"""
-    reverse: Flag = False
+    reverse: base.Flag = False
     """Its sign is the opposite of railsim's"""
-    offset: Finite = 0.0
+    offset: base.Finite = 0.0
     """What the file shows where the quantity is zero, in the unit of the file"""
-    zero: tuple[Finite, Finite] | None = None
+    zero: tuple[base.Finite, base.Finite] | None = None
     """Times between which the quantity is zero in the mean (at rest, on straight track): this mean
     is taken off [s]"""
-    delay: Finite = 0.0
+    delay: base.Finite = 0.0
     """By how much the channel lags behind the clock of the files [s]"""
-    range: tuple[Finite, Finite] | None = None
+    range: tuple[base.Finite, base.Finite] | None = None
     """Smallest and largest value that the amplifier can show, in the unit of the file: beyond them
     there is no value"""
-    low_pass: Positive | None = None
+    low_pass: base.Positive | None = None
     """-3 dB corner of the amplifier's low pass, Butterworth of order 4 [Hz]"""
-    high_pass: Positive | None = None
+    high_pass: base.Positive | None = None
     """-3 dB corner of its high pass, Butterworth of order 4 (piezoelectric sensors) [Hz]"""
-    noise: Positive | None = None
+    noise: base.Positive | None = None
     """Standard deviation of its noise, as a weight in identification [SI]"""
 
     @property
@@ -129,7 +117,7 @@ class Channel(Definition):
         scale = UNITS[self.unit][1] if self.unit else 1.0
         return -scale if self.reverse else scale
 
-    @check
+    @base.check
     def _unit_of_quantity(self) -> None:
         quantity = quantity_of(self.quantity)
         assert quantity is not None  # by its own check
@@ -150,43 +138,43 @@ class MeasurementFile(FileDefinition):
     KIND: ClassVar = "measurement"
 
     format: Literal["railsim-measurement/1"]
-    name: Text
+    name: base.Text
     """What the run is called in tables and plots"""
-    source: Text | None = None
+    source: base.Text | None = None
     """Who measured it, when and where"""
     file: Files
     """Data: CSV (`.csv`, `.txt`), Parquet (`.parquet`), MATLAB (`.mat`) or HDF5 (`.h5`, `.hdf5`); a
     list of them is one record in several parts, one behind the other"""
-    channels: Annotated[dict[Name, Channel], Field(min_length=1, max_length=MOST_CHANNELS)]
+    channels: Annotated[dict[base.Name, Channel], Field(min_length=1, max_length=MOST_CHANNELS)]
     """Channels by names of one's own"""
-    vehicle: Text | None = None
+    vehicle: base.Text | None = None
     """Vehicle file or name of a shipped one, where a command gives no other"""
-    track: Text | None = None
+    track: base.Text | None = None
     """Track file or name of a shipped one, where a command gives no other"""
-    load: Text | None = None
+    load: base.Text | None = None
     """Load case in which the vehicle ran; by default its design load"""
-    speed: Positive | None = None
+    speed: base.Positive | None = None
     """Speed of the run, where no channel has it [m/s]"""
-    start: Finite = 0.0
+    start: base.Finite = 0.0
     """Arc length of the reference body at the first value, where neither `distance` nor `mileage`
     is measured [m]"""
-    rate: Positive | None = None
+    rate: base.Positive | None = None
     """Values per second, where no channel has the time [1/s]"""
-    encoding: Text = "utf-8-sig"
+    encoding: base.Text = "utf-8-sig"
     """Encoding of text files, such as `latin-1`"""
     skip: Annotated[int, Field(strict=True, ge=0, le=1000)] = 0
     """Lines of a text file above the names of the columns"""
-    units_row: Flag = False
+    units_row: base.Flag = False
     """The line below the names of the columns holds units; it is not read"""
-    missing: tuple[Finite, ...] = ()
+    missing: tuple[base.Finite, ...] = ()
     """Values that stand for none, such as -9999, in the unit of the file; empty cells always do"""
-    longest_gap: NonNegative = 0.0
+    longest_gap: base.NonNegative = 0.0
     """Gaps up to this time are bridged by a straight line; in longer ones there is no value [s]"""
-    mounting: dict[Name, tuple[Finite, Finite, Finite]] = EMPTY_TABLE
+    mounting: dict[base.Name, tuple[base.Finite, base.Finite, base.Finite]] = base.EMPTY_TABLE
     """Small angles by which the sensors at a point are turned about x, y, z of the body [rad]: its
     accelerations are turned back"""
 
-    @check
+    @base.check
     def _axes(self) -> None:
         used = [channel.quantity for channel in self.channels.values()]
         twice = sorted({one for one in used if used.count(one) > 1})

@@ -33,17 +33,9 @@ from railsim.definitions.vehicle.flatten import FlatBody, FlatElement
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import input_error, nearest
 from railsim.kernels import actuators as acts
+from railsim.kernels import element_columns as layout
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.commands import Actuators, Own
-from railsim.kernels.element_columns import (
-    LINK_COLUMNS,
-    LINK_SIZE,
-    MOUNT_COLUMNS,
-    MOUNT_SIZE,
-    ONE_SIDED,
-    falling_friction,
-    mount_laws,
-)
 from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, OWN, PAD, Internal
 from railsim.kernels.system import Curves, Drives, Links, Loads, Mounts
 from railsim.laws.binding import FORCE_ELEMENT, Bound, bind
@@ -167,7 +159,7 @@ class ElementArrays:
         point1, point2 = np.array(element.point1), np.array(element.point2)
         point = 0.5 * (point1 + point2) if mount.both_ends else point2
         rotates = any(mount.rotation) or any(mount.rotation_damping)
-        friction = ONE_SIDED if mount.one_sided else int(mount.friction is not None)
+        friction = layout.ONE_SIDED if mount.one_sided else int(mount.friction is not None)
         limits = mount.friction or (FrictionLimit(),) * 3
         return {
             "name": element.name,
@@ -263,7 +255,7 @@ class ElementArrays:
         drives = [table for row in self.drive_rows for table in row["tables"]]
         return {
             "links": Links(
-                row=_table(self.link_rows, LINK_COLUMNS, LINK_SIZE),
+                row=_table(self.link_rows, layout.LINK_COLUMNS, layout.LINK_SIZE),
                 **_columns(self.link_rows, np.int64, body=(2,), internal=(), curve=(2,)),
             ),
             "mounts": self._mounts(),
@@ -301,10 +293,10 @@ class ElementArrays:
         columns = _columns(self.mount_rows, np.int64, **whole)
         friction = _columns(self.mount_rows, float, friction=(3, 4))["friction"]
         return Mounts(
-            row=_table(self.mount_rows, MOUNT_COLUMNS, MOUNT_SIZE),
+            row=_table(self.mount_rows, layout.MOUNT_COLUMNS, layout.MOUNT_SIZE),
             friction=friction,
-            law=mount_laws(columns["internal"], columns["curve"], columns["flags"]),
-            falling=falling_friction(friction),
+            law=layout.mount_laws(columns["internal"], columns["curve"], columns["flags"]),
+            falling=layout.falling_friction(friction),
             **columns,
         )
 

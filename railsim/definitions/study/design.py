@@ -4,33 +4,24 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Count,
-    Definition,
-    Finite,
-    Flag,
-    Text,
-    Whole,
-    check,
-)
+from railsim.definitions import base
 
 FEWEST_EVOLVED = 5  # designs of a generation of differential evolution
 
 
-class Variable(Definition):
+class Variable(base.Definition):
     """A parameter that is varied between bounds."""
 
-    low: Finite
+    low: base.Finite
     """Lower bound [SI]"""
-    high: Finite
+    high: base.Finite
     """Upper bound [SI]"""
     scale: Literal["linear", "log"] = "linear"
     """Whether equal differences or equal ratios count alike"""
-    also: tuple[Text, ...] = ()
+    also: tuple[base.Text, ...] = ()
     """Paths of further keys that get the same value"""
 
-    @check
+    @base.check
     def _rising(self) -> None:
         if not self.low < self.high:
             raise ValueError("'low' must be below 'high'")
@@ -38,14 +29,14 @@ class Variable(Definition):
             raise ValueError('scale = "log" needs bounds above zero')
 
 
-class Value(Definition):
+class Value(base.Definition):
     """A number of a design: a quantity of the summary of its runs."""
 
-    quantity: Text
+    quantity: base.Text
     """Column of `summary.csv`, without its unit"""
-    magnitude: Flag = False
+    magnitude: base.Flag = False
     """Take the value without its sign"""
-    where: dict[Text, Text | Finite] = EMPTY_TABLE
+    where: dict[base.Text, base.Text | base.Finite] = base.EMPTY_TABLE
     """Only the runs with these labels, such as `track` or a key of the grid; by default all"""
 
 
@@ -61,12 +52,12 @@ class Objective(Value):
 class Constraint(Value):
     """A quantity that must stay within limits in all runs."""
 
-    low: Finite | None = None
+    low: base.Finite | None = None
     """Lower limit [SI]"""
-    high: Finite | None = None
+    high: base.Finite | None = None
     """Upper limit [SI]"""
 
-    @check
+    @base.check
     def _some_limit(self) -> None:
         if self.low is None and self.high is None:
             raise ValueError("'low' or 'high' is needed")
@@ -74,10 +65,10 @@ class Constraint(Value):
             raise ValueError("'low' must not be above 'high'")
 
 
-class Optimise(Definition):
+class Optimise(base.Definition):
     """What `railsim optimise` seeks."""
 
-    variables: Annotated[dict[Text, Variable], Field(min_length=1)]
+    variables: Annotated[dict[base.Text, Variable], Field(min_length=1)]
     """Parameters by their paths, as in a grid"""
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1)]
     """What is to be small or large; several give a Pareto front"""
@@ -85,11 +76,11 @@ class Optimise(Definition):
     """What must hold"""
     method: Literal["surrogate", "nsga2", "differential_evolution"] = "surrogate"
     """Surrogate models (few designs), genetic algorithm (pymoo), or scipy's, for one objective"""
-    evaluations: Count = 80
+    evaluations: base.Count = 80
     """How many designs are computed at most"""
-    batch: Count = 8
+    batch: base.Count = 8
     """How many designs are computed at a time; of a genetic algorithm, its population"""
-    seed: Whole = 0
+    seed: base.Whole = 0
     """Where the random numbers begin: the same seed gives the same designs"""
 
     @property
@@ -97,7 +88,7 @@ class Optimise(Definition):
         """Paths of all keys that are varied."""
         return [*self.variables, *(key for v in self.variables.values() for key in v.also)]
 
-    @check
+    @base.check
     def _consistent(self) -> None:
         names = self.keys
         if twice := sorted({name for name in names if names.count(name) > 1}):

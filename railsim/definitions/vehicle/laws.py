@@ -11,61 +11,47 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Count,
-    Definition,
-    Finite,
-    Flag,
-    Name,
-    NonNegative,
-    Positive,
-    Side,
-    Text,
-    Vector,
-    Whole,
-    check,
-)
+from railsim.definitions import base
 from railsim.errors import Fault, InputError, input_error, nearest
 from railsim.files.access import DEFINITION_BYTES, read_text
 from railsim.files.sources import library_files
 
 
-class Law(Definition):
+class Law(base.Definition):
     """A Python function that is compiled when a run begins, by permission of the user alone."""
 
-    file: Text | None = None
+    file: base.Text | None = None
     """Python file with the function, or the name of a law of a library"""
-    function: Name | None = None
+    function: base.Name | None = None
     """Name of the function; by default that of the law"""
-    source: Text | None = None
+    source: base.Text | None = None
     """Text of the file, as results carry it"""
-    compiled: Flag = True
+    compiled: base.Flag = True
     """`false`: called as Python, slowly"""
 
-    @check
+    @base.check
     def _has_a_source(self) -> None:
         if self.file is None and self.source is None:
             raise ValueError("'file' is needed")
 
 
-class LawUse(Definition):
+class LawUse(base.Definition):
     """A law with the values of its parameters."""
 
-    law: Name
+    law: base.Name
     """Name of the law in the table `laws`"""
-    parameters: dict[Name, Finite] = EMPTY_TABLE
+    parameters: dict[base.Name, base.Finite] = base.EMPTY_TABLE
     """Values of the function's further arguments, by name"""
 
 
 class OwnOutput(LawUse):
     """A quantity of the result by a law of one's own, of other quantities at the same instant."""
 
-    inputs: dict[Name, Text] = EMPTY_TABLE
+    inputs: dict[base.Name, base.Text] = base.EMPTY_TABLE
     """Arguments of the function: to each a quantity with the labels wanted, such as `Q:1:left`"""
-    unit: Text = "1"
+    unit: base.Text = "1"
     """SI unit of what it gives"""
-    words: Text | None = None
+    words: base.Text | None = None
     """Words for axes and tables; by default its name"""
 
 
@@ -86,7 +72,7 @@ ABOUT_AXES = {"deflection": "rad", "rate": "rad/s", "force": "N m"}
 ANGLES = ("roll", "pitch", "yaw")
 
 
-class Signal(Definition):
+class Signal(base.Definition):
     """Something that is measured during a run."""
 
     quantity: Literal[tuple(SIGNALS)]  # type: ignore[valid-type]
@@ -94,29 +80,29 @@ class Signal(Definition):
     reads there, angle against the track, absolute angular velocity; of an `element`: deflection,
     its rate, force, power; of a `wheelset`: speed of its circumference, wheel loads; of the track:
     curvature, cant angle; of the run: speed, its change, distance, time [SI]"""
-    body: Text | None = None
+    body: base.Text | None = None
     """Full name of the body"""
-    position: Vector | None = None
+    position: base.Vector | None = None
     """Point of the body in the nominal vehicle [m]; by default its centre of gravity"""
-    element: Text | None = None
+    element: base.Text | None = None
     """Full name of the element"""
-    wheelset: Text | None = None
+    wheelset: base.Text | None = None
     """Full name of the wheelset"""
-    side: Side | None = None
+    side: base.Side | None = None
     """Side of the wheel, of `Q` and `Y`"""
     axis: Literal["x", "y", "z", "roll", "pitch", "yaw"] | None = None
     """Axis; of a link its line, by default"""
-    ahead: Finite = 0.0
+    ahead: base.Finite = 0.0
     """Position on the track, ahead of the reference body [m]"""
-    rate: Positive | None = None
+    rate: base.Positive | None = None
     """Samples per second [1/s]; by default one each step of the loop"""
-    delay: NonNegative = 0.0
+    delay: base.NonNegative = 0.0
     """Time after which a sample is known [s]; needs `rate`"""
-    noise: NonNegative = 0.0
+    noise: base.NonNegative = 0.0
     """Standard deviation of normal noise of each sample [unit of the quantity]; needs `rate`"""
-    seed: Whole = 1
+    seed: base.Whole = 1
     """Seed of the noise"""
-    resolution: NonNegative = 0.0
+    resolution: base.NonNegative = 0.0
     """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
 
     @property
@@ -125,7 +111,7 @@ class Signal(Definition):
         about = ABOUT_AXES.get(self.quantity) if self.axis in ANGLES else None
         return about or SIGNALS[self.quantity]
 
-    @check
+    @base.check
     def _what_belongs_together(self) -> None:
         needs = {"body": BODY_SIGNALS, "element": ELEMENT_SIGNALS, "wheelset": WHEEL_SIGNALS}
         for key, quantities in needs.items():
@@ -144,21 +130,21 @@ class Signal(Definition):
             raise ValueError("'delay' and 'noise' need 'rate'")
 
 
-class Controller(Definition):
+class Controller(base.Definition):
     """A law of one's own that reads signals and commands actuators, at equal times."""
 
-    law: Name
+    law: base.Name
     """Name of the law in the table `laws`"""
-    period: Positive
+    period: base.Positive
     """Time between two calls [s]"""
-    inputs: dict[Name, Name] = EMPTY_TABLE
+    inputs: dict[base.Name, base.Name] = base.EMPTY_TABLE
     """Signals by the arguments of the function that take them"""
-    outputs: tuple[Text, ...] = Field(min_length=1)
+    outputs: tuple[base.Text, ...] = Field(min_length=1)
     """Full names of the actuators, in the order of what the function returns;
     one value is for all"""
-    parameters: dict[Name, Finite] = EMPTY_TABLE
+    parameters: dict[base.Name, base.Finite] = base.EMPTY_TABLE
     """Values of the function's further arguments, by name"""
-    memory: Count | None = None
+    memory: base.Count | None = None
     """How many numbers its argument `memory` keeps from call to call, 0 at the begin"""
 
 
