@@ -7,7 +7,7 @@ range of validity.
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -181,12 +181,12 @@ class Faults(list[Fault]):
     """
 
     @contextmanager
-    def caught(self) -> Iterator[None]:
-        """Collect the faults of an `InputError` that ends the block."""
+    def caught(self, change: Callable[[Fault], Fault] = lambda fault: fault) -> Iterator[None]:
+        """Collect the faults of an `InputError` that ends the block, as `change` returns them."""
         try:
             yield
         except InputError as error:
-            self.extend(error.faults)
+            self.extend(map(change, error.faults))
 
     def require(
         self, right: object, parameter: str, found: str, allowed: str, option: str | None = None
@@ -199,6 +199,15 @@ class Faults(list[Fault]):
         """Raise them as an `InputError`, if there are any."""
         if self:
             raise InputError(self)
+
+
+@contextmanager
+def changed_faults(change: Callable[[Fault], Fault]) -> Iterator[None]:
+    """Raise the faults of an `InputError` that ends the block as `change` returns them."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(map(change, error.faults)) from None
 
 
 class ModelError(RailsimError):

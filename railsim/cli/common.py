@@ -12,7 +12,7 @@ import click
 
 from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, print_json, show
-from railsim.errors import Faults, InputError, input_error
+from railsim.errors import Fault, Faults, InputError, changed_faults, input_error
 from railsim.files.access import check_file, check_folder, make_folder, whole_file, write_folder
 from railsim.files.sources import OVERRIDE
 from railsim.text import plain
@@ -190,17 +190,13 @@ def collected(name: str, kind: type, *options: Callable[[F], F]) -> Callable[[F]
         def command(**values: Any) -> Any:
             load = values.get("load")
             own = {key: values.pop(key) for key in keys if key in values}
-            try:
+
+            def told(fault: Fault) -> Fault:  # --load stands for an assignment
+                of_load = fault.option == "--set" and fault.key in ("load", "vehicle.load")
+                return replace(fault, key="", option="--load") if load and of_load else fault
+
+            with changed_faults(told):
                 return function(**values, **{name: kind(**own)})
-            except InputError as error:
-                if load is None:
-                    raise
-                raise InputError(  # --load stands for an assignment
-                    replace(fault, key="", option="--load")
-                    if fault.option == "--set" and fault.key in ("load", "vehicle.load")
-                    else fault
-                    for fault in error.faults
-                ) from None
 
         return together(*options)(command)  # type: ignore[return-value]
 

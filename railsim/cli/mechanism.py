@@ -103,14 +103,11 @@ def command(
 
 def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
     """Results of a case that was not asked for; what is wrong with it names it."""
-    from railsim.errors import InputError
+    from railsim.errors import changed_faults
     from railsim.mechanisms.analysis import analyse
 
-    try:
+    with changed_faults(lambda fault: replace(fault, found=f"case '{case}': {fault.found}")):
         return analyse(mechanism, case)
-    except InputError as error:
-        named = (replace(f, found=f"case '{case}': {f.found}") for f in error.faults)
-        raise InputError(named) from None
 
 
 def _wanted(at: Sequence[str]) -> list[Wanted]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import InputError, nearest, optional_package
+from railsim.errors import changed_faults, nearest, optional_package
 from railsim.notation import Quantity
 from railsim.plottable import image_tag, picture_of
 from railsim.profiles.profile import Profile
@@ -297,13 +297,9 @@ class Result:
     def _rebuilt(self, name: str, load: Callable[[str], D]) -> D:
         """Return what an attribute describes; its faults name the file that holds it."""
         if name not in self._definitions:
-            try:
+            source = f"{self._source}: " if self._source else ""
+            with changed_faults(lambda fault: replace(fault, file=f"{source}{fault.file}")):
                 self._definitions[name] = load(str(self._attributes[name]))
-            except InputError as error:
-                source = f"{self._source}: " if self._source else ""
-                raise InputError(
-                    replace(fault, file=f"{source}{fault.file}") for fault in error.faults
-                ) from None
         found: D = self._definitions[name]
         return found
 

@@ -127,13 +127,11 @@ class Loader:
         return self._loaded(kind, getattr(run, kind), self.overrides(run.assignments)[kind])
 
     def _load(self, kind: str, path: str | Path | None, overrides: Overrides) -> Any:
-        try:
+        with self.faults.caught(lambda fault: self._as_written(fault, kind)):
             definition = LOADERS[kind](path, overrides)
-        except InputError as error:
-            self.faults += [self._as_written(fault, kind) for fault in error.faults]
-            return None
-        self.faults += profile_faults(definition, str(path))
-        return definition
+            self.faults += profile_faults(definition, str(path))
+            return definition
+        return None
 
     def _as_written(self, fault: Fault, kind: str = "") -> Fault:
         """Return the fault of an assignment with its key and option as given."""
@@ -148,11 +146,9 @@ class Loader:
         """Return the assignments to vehicle, track and settings, each with the file's own keys."""
         found: dict[str, Overrides] = dict.fromkeys(LOADERS, ())
         for text in assignments:
-            try:
+            with self.faults.caught(self._as_written):
                 for kind, some in split_overrides([text]).items():
                     found[kind] += tuple(some)
-            except InputError as error:
-                self.faults += [self._as_written(fault) for fault in error.faults]
         return found
 
     def first_speed(self, run: RunSpec) -> float | None:
