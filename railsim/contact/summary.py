@@ -1,6 +1,7 @@
 """Contact of a wheelset on its rails at a glance: functions, conicity, patches under a load."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -224,10 +225,8 @@ def _loaded(
     for y in shifts:
         roll = _roll(geometry, y)
         if np.isfinite(roll):
-            try:
+            with suppress(ModelError):  # beyond the table: a wheel that has climbed its rail
                 contacts[y] = loaded_contact(table, y, roll, load)
-            except ModelError:
-                continue  # beyond the table: a wheel that has climbed its rail
     return contacts
 
 
@@ -237,7 +236,7 @@ def _exact(
     """The same patches by boundary elements."""
     solutions = {}
     for y in shifts:
-        try:
+        with suppress(ModelError):  # the load is not reached: a wheel that hangs on its flange
             solutions[y] = exact_contact(
                 pair.wheel,
                 pair.rail,
@@ -249,8 +248,6 @@ def _exact(
                 inclination=pair.inclination,
                 back_to_back=pair.back_to_back,
             )
-        except ModelError:
-            continue  # the load is not reached: a wheel that hangs on its flange
     return solutions
 
 

@@ -81,8 +81,7 @@ def start_state(
     run; `progress`: called repeatedly with the time simulated so far and the time to simulate [s];
     `remark`: where it is given, the vehicle is in its steady state in a curve; called with a
     sentence where it is not. Raises InputError: the vehicle does not stay on the track there.
-    ModelError
-        The vehicle is longer than the track's table.
+    ModelError: the vehicle is longer than the track's table.
     """
     speed = float(balance.state[SPEED])
     steps = _approach(model, track, start, speed, step)
