@@ -54,24 +54,13 @@ def forces_by_law(patch: Patch) -> list[dict[str, Any]]:
     for case, direction in CASES.items():
         unit = patch.unit_creepages(direction)
         for scale in SIZES:
-            xi_x, xi_y, phi = (float(value) for value in scale * unit)
+            xi = dict(zip(("xi_x", "xi_y", "phi"), (scale * unit).tolist(), strict=True))
             for law in LAWS:
-                force = creep_force(
-                    patch.a, patch.b, patch.N, patch.mu, xi_x, xi_y, phi, patch.G, patch.nu, law
-                )
-                rows.append(
-                    {
-                        "case": case,
-                        "size": scale,
-                        "xi_x": xi_x,
-                        "xi_y": xi_y,
-                        "phi": phi,
-                        "law": law,
-                        "T_x": float(force.T_x) / bound,
-                        "T_y": float(force.T_y) / bound,
-                        "M_z": float(force.M_z) / (bound * size),
-                    }
-                )
+                ellipse = patch.a, patch.b, patch.N, patch.mu
+                force = creep_force(*ellipse, **xi, G=patch.G, nu=patch.nu, law=law)
+                row: dict[str, Any] = {"case": case, "size": scale, **xi, "law": law}
+                row |= {name: float(getattr(force, name)) / bound for name in ("T_x", "T_y")}
+                rows.append(row | {"M_z": float(force.M_z) / (bound * size)})
     return rows
 
 

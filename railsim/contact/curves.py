@@ -132,11 +132,9 @@ def wheel_curve(
     part = single_valued_part(y, z, on_tread, 3.0 * STEEPEST)
     # scans from both sides often do not meet exactly on the tip itself
     if z[part.start] < z[tip] - 3e-3 and part.start > tip:
-        raise input_error(
-            profile.name,
-            "the contour is not continuous from tread to flange tip",
-            "a wheel profile must run in one piece from the flange's tip to the field side",
-        )
+        found = "the contour is not continuous from tread to flange tip"
+        allowed = "a wheel profile must run in one piece from the flange's tip to the field side"
+        raise input_error(profile.name, found, allowed)
     spline = contour_spline(y[part], z[part])
     fine = np.linspace(y[part.start], y[part.stop - 1], 40_001)
     slope = spline(fine, 1)

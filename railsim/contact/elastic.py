@@ -83,15 +83,8 @@ def loaded_contact(table: ContactTable, y: float, roll: float, load: float) -> L
     """
     if not load > 0.0:
         raise ModelError(f"a load of {load:g} N presses no wheel on a rail")
-    arrays = TableArrays(
-        table.values[None],
-        np.array([table.shear]),
-        table.y0,
-        table.dy,
-        table.roll0,
-        table.droll,
-        table.w,
-    )
+    grid = table.y0, table.dy, table.roll0, table.droll, table.w
+    arrays = TableArrays(table.values[None], np.array([table.shear]), *grid)
     stretched, roll_slope = kernel.stretched_roll(roll)
     where, iy, ir, iw, ty, tr, tw = kernel.locate(arrays, 0, y, roll, stretched, 0.0)
     if where != kernel.INSIDE:

@@ -354,29 +354,18 @@ def _inner_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
         return
     early, below = -suspension.engagement, -suspension.seat_heights[1]
     if early > 1e-9:
-        yield Fault(
-            "",
-            "inner.seat_height",
-            f"the inner spring would touch {early * 1e3:.1f} mm before the outer one",
-            "lower inner.seat_height or inner.free_height by as much: the outer spring must be the "
-            "first to work",
-        )
+        found = f"the inner spring would touch {early * 1e3:.1f} mm before the outer one"
+        words = "lower inner.seat_height or inner.free_height by as much: the outer spring must be"
+        yield Fault("", "inner.seat_height", found, f"{words} the first to work")
     elif below > 0.0:
-        yield Fault(
-            "",
-            "inner.free_height",
-            f"the inner spring would stand {below * 1e3:.1f} mm below the axle centre",
-            "shorten inner.free_height, or raise arm.seat_height or outer.free_height",
-        )
+        found = f"the inner spring would stand {below * 1e3:.1f} mm below the axle centre"
+        allowed = "shorten inner.free_height, or raise arm.seat_height or outer.free_height"
+        yield Fault("", "inner.free_height", found, allowed)
     clearance = radial_clearance(outer, inner)
     if clearance <= 0.0:
-        yield Fault(
-            "",
-            "inner.mean_diameter",
-            f"the inner spring does not fit into the outer one: radial clearance "
-            f"{clearance * 1e3:.1f} mm",
-            "reduce inner.mean_diameter or a wire diameter, or raise outer.mean_diameter",
-        )
+        words = "the inner spring does not fit into the outer one: radial clearance"
+        allowed = "reduce inner.mean_diameter or a wire diameter, or raise outer.mean_diameter"
+        yield Fault("", "inner.mean_diameter", f"{words} {clearance * 1e3:.1f} mm", allowed)
 
 
 def _tolerance_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:

@@ -31,34 +31,20 @@ KINDS = {Path(folder).name: kind for kind, folder in FOLDERS.items()}
 
 def library_entries(kind: str) -> list[dict[str, Any]]:
     """Return name, title, letters of source quality and file of everything of a kind."""
+    rows: list[tuple[str, str, str, str | None]] = []
     if kind == PROFILES:
         profiles = {name: builtin_profile(name) for name in DEFINITIONS}
-        return [
-            {
-                "kind": kind,
-                "name": name,
-                "title": f"{p.kind}: {p.source}",
-                "trust": "",
-                "file": None,
-            }
-            for name, p in profiles.items()
-        ]
-    if kind == LAWS:
-        return [
-            {"kind": kind, "name": name, "title": _first_line(path), "trust": "", "file": str(path)}
-            for name, path in library_files("law").items()
-        ]
-    word = KINDS[kind]
-    return [
-        {
-            "kind": kind,
-            "name": name,
-            "title": _title(_text_and_data(path)[1]),
-            "trust": trust(text_with_bases(path, word)),
-            "file": str(path),
-        }
-        for name, path in library_files(word).items()
-    ]
+        rows = [(name, f"{p.kind}: {p.source}", "", None) for name, p in profiles.items()]
+    elif kind == LAWS:
+        files = library_files("law")
+        rows = [(name, _first_line(path), "", str(path)) for name, path in files.items()]
+    else:
+        word = KINDS[kind]
+        for name, path in library_files(word).items():
+            title, letters = _title(_text_and_data(path)[1]), trust(text_with_bases(path, word))
+            rows.append((name, title, letters, str(path)))
+    names = ("name", "title", "trust", "file")
+    return [{"kind": kind, **dict(zip(names, row, strict=True))} for row in rows]
 
 
 def _first_line(path: Path) -> str:

@@ -158,12 +158,8 @@ def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], fl
     found = [(names.index(y), names.index(z)) for y, z in pairs if y in names and z in names]
     if found:
         return min(found), units[names[min(found)[0]]]
-    raise input_error(
-        file,
-        f"unknown columns {_shown(names)}",
-        "the header is y_mm,z_mm for millimetres or y,z for metres",
-        key=f"line {line}",
-    )
+    allowed = "the header is y_mm,z_mm for millimetres or y,z for metres"
+    raise input_error(file, f"unknown columns {_shown(names)}", allowed, key=f"line {line}")
 
 
 def _simpack(file: str, lines: list[str]) -> Points:
@@ -193,14 +189,12 @@ def _simpack(file: str, lines: list[str]) -> Points:
         elif key.lower() in NUMERIC_KEYS:
             raise _fault(file, number, f"{key} is not a number: {value!r}", "give a number")
     if not rows:
-        raise input_error(
-            file, "no points", "SIMPACK files hold them from point.begin to point.end"
-        )
+        allowed = "SIMPACK files hold them from point.begin to point.end"
+        raise input_error(file, "no points", allowed)
     per_metre = values.get("units.len.f", 1.0)
     if per_metre <= 0.0:
-        raise input_error(
-            file, f"{per_metre:g}", "units per metre, 1000 for millimetres", key="units.len.f"
-        )
+        allowed = "units per metre, 1000 for millimetres"
+        raise input_error(file, f"{per_metre:g}", allowed, key="units.len.f")
     per_radian = values.get("units.ang.f", 1.0)
     if per_radian <= 0.0:
         allowed = "units per radian, 57.2958 for degrees"

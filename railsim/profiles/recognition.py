@@ -158,11 +158,8 @@ def _remove_outliers(work: Points) -> None:
         at = int(np.argmax(np.where(spike, height, 0.0))) + 1
         removed.append(int(work.line[at]))
         if len(removed) > max(work.y.size // 50, 1):
-            raise work.fail(
-                f"{len(removed)} or more points stand off the contour, the last in this line",
-                "mend the measurement",
-                at,
-            )
+            found = f"{len(removed)} or more points stand off the contour, the last in this line"
+            raise work.fail(found, "mend the measurement", at)
         work.keep(np.arange(work.y.size) != at)
     if removed:
         lines = ", ".join(str(line) for line in sorted(removed)[:8])
@@ -173,13 +170,10 @@ def _check_holes(work: Points) -> None:
     distance = _distances(work)
     at = int(np.argmax(distance))
     if distance[at] > LARGEST_HOLE:
-        raise work.fail(
-            f"a hole of {1e3 * distance[at]:.1f} mm after this point, at y = "
-            f"{1e3 * work.y[at]:.1f} mm",
-            f"neighbouring points may be {1e3 * LARGEST_HOLE:.0f} mm apart; measure again or cut "
-            "the profile there",
-            at,
-        )
+        words = f"a hole of {1e3 * distance[at]:.1f} mm after this point"
+        found = f"{words}, at y = {1e3 * work.y[at]:.1f} mm"
+        allowed = f"neighbouring points may be {1e3 * LARGEST_HOLE:.0f} mm apart"
+        raise work.fail(found, f"{allowed}; measure again or cut the profile there", at)
 
 
 def _orient_wheel(work: Points) -> None:
@@ -304,9 +298,8 @@ def _orient_rail(work: Points) -> float:
                 "a rail falls on both sides",
             )
     if max(widths) < 0.015:
-        raise work.fail(
-            f"the crown is only {1e3 * max(widths):.1f} mm wide", "this is not a rail head"
-        )
+        found = f"the crown is only {1e3 * max(widths):.1f} mm wide"
+        raise work.fail(found, "this is not a rail head")
     depth = (float(work.z[: top + 1].max()), float(work.z[top:].max()))
     inclination = _flank_inclination(work) if min(depth) > GAUGE_SIDE_DEPTH + 6e-3 else None
     mirror = False
@@ -375,12 +368,10 @@ def _check_steps(work: Points, kind: Kind) -> None:
         before = angle[max(i - 3, 0) : i]
         after = angle[i + 1 : i + 4]
         if before.size and after.size and max(np.median(before), np.median(after)) < 45.0:
-            raise work.fail(
-                f"a vertical step of {1e3 * abs(dz[i]):.2f} mm after this point, at y = "
-                f"{1e3 * work.y[i]:.1f} mm",
-                "wheel and rail profiles are continuous; mend the measurement",
-                int(i),
-            )
+            words = f"a vertical step of {1e3 * abs(dz[i]):.2f} mm after this point"
+            found = f"{words}, at y = {1e3 * work.y[i]:.1f} mm"
+            remedy = "wheel and rail profiles are continuous; mend the measurement"
+            raise work.fail(found, remedy, int(i))
 
 
 def _check_overhang(work: Points, kind: Kind, y: Floats, z: Floats) -> None:
@@ -388,8 +379,5 @@ def _check_overhang(work: Points, kind: Kind, y: Floats, z: Floats) -> None:
     overhang = np.flatnonzero(used_part(y, z, kind) & (np.diff(y) <= 0.0))
     if overhang.size:
         at = int(overhang[0])
-        raise work.fail(
-            f"the contour runs back at y = {1e3 * y[at]:.1f} mm",
-            "a profile may not overhang where wheel and rail touch",
-            at,
-        )
+        found = f"the contour runs back at y = {1e3 * y[at]:.1f} mm"
+        raise work.fail(found, "a profile may not overhang where wheel and rail touch", at)

@@ -32,6 +32,8 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
     evaluates = run.state[TIME] > prepared.evaluation
     of_peaks = run.evaluated if evaluates else run.extremes
     swings = hunting(run.swings.close({}), run.plan.irregularity)
+    of_swings = ("frequency", "amplitude") if swings else ()
+    asked = {"duration": inputs.duration, "until": inputs.until}
     attributes: dict[str, str | float | int] = {
         **verdict(run),
         "remarks": "\n".join(run_remarks(run, swings)),
@@ -42,16 +44,8 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
         "start": float(inputs.start),
         "duration": simulated,
         "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[TIME]),
-        **{
-            f"requested_{name}": float(value)
-            for name, value in (("duration", inputs.duration), ("until", inputs.until))
-            if value is not None
-        },
-        **(
-            {"hunting_frequency": swings.frequency, "hunting_amplitude": swings.amplitude}
-            if swings
-            else {}
-        ),
+        **{f"requested_{name}": float(value) for name, value in asked.items() if value is not None},
+        **{f"hunting_{name}": getattr(swings, name) for name in of_swings},
         "step": prepared.steps.smallest,
         "scheme": settings.scheme,
         "wall_time": run.wall_time + time.perf_counter() - began,
@@ -65,22 +59,14 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
         "contacts_evaluated_again": run.again,
         "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
     }
-    result = run.sink.close(
-        attributes,
-        {"Q0": prepared.balance.Q0},
-        prepared.model.profiles,
-        {
-            "state": {"end": run.state}
-            | ({} if before is None else {"start": before.motion, "start_memory": prepared.memory})
-            | ({"memory": run.memory} if len(run.memory) > 1 else {}),
-            # of quantities that are stored filtered the peaks are those of what is stored
-            **(
-                {}
-                if settings.outputs.low_pass is not None
-                else {"peaks": run_extremes(of_peaks, prepared.balance.Q0)}
-            ),
-        },
-    )
+    Q0, groups = prepared.balance.Q0, {"state": {"end": run.state}}
+    if before is not None:
+        groups["state"] |= {"start": before.motion, "start_memory": prepared.memory}
+    if len(run.memory) > 1:
+        groups["state"]["memory"] = run.memory
+    if settings.outputs.low_pass is None:  # else the peaks are those of what is stored, filtered
+        groups["peaks"] = run_extremes(of_peaks, Q0)
+    result = run.sink.close(attributes, {"Q0": Q0}, prepared.model.profiles, groups)
     for remark in result.remarks:
         # what was asked for is no warning, and others were given at the start
         if remark != low_pass_remark(settings) and remark not in prepared.remarks:
