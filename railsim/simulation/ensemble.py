@@ -145,35 +145,27 @@ def joined_system(models: Sequence[Model]) -> System:
     internal = _starts(len(system.internal.kind) for system in systems)
     curves = _starts(len(system.curves.start) - 1 for system in systems)
     offset = np.unique(np.concatenate([system.frame_offset for system in systems]))
-    first = systems[0]
-    return System(
+
+    def starts(name: str) -> Integers:
+        return _joined_starts([getattr(system, name).start for system in systems])
+
+    # track and rails are those of all; vehicles with actuators, signals or laws run alone
+    return systems[0]._replace(
         bodies=_joined_bodies(systems, bodies, offset),
         frame_offset=offset,
-        track=first.track,
-        support=first.support,
         contact=_joined_contact(models, bodies),
         links=_joined(
             [system.links for system in systems], body=bodies, internal=internal, curve=curves
         ),
         mounts=_joined_mounts(systems, body=bodies, internal=internal, curve=curves),
         curves=Curves(
-            start=_joined_starts([system.curves.start for system in systems]),
+            start=starts("curves"),
             x=np.concatenate([system.curves.x for system in systems]),
             f=np.concatenate([system.curves.f for system in systems]),
         ),
         internal=_joined([system.internal for system in systems], curve=curves),
-        loads=_joined([system.loads for system in systems], body=bodies)._replace(
-            start=_joined_starts([system.loads.start for system in systems])
-        ),
-        drives=_joined([system.drives for system in systems], body=bodies)._replace(
-            start=_joined_starts([system.drives.start for system in systems])
-        ),
-        drive=first.drive,
-        gravity=first.gravity,
-        actuators=first.actuators,  # vehicles with any run alone
-        signals=first.signals,
-        controllers=first.controllers,
-        own=first.own,
+        loads=_joined([s.loads for s in systems], body=bodies)._replace(start=starts("loads")),
+        drives=_joined([s.drives for s in systems], body=bodies)._replace(start=starts("drives")),
     )
 
 

@@ -48,6 +48,8 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     loaded = np.where(Q > 0.0, Q, np.nan)  # a wheel that carries nothing has no Y/Q
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
     on_rails = against_rails(model.system, state)
+    has_check = len(model.check.check) > 0
+    of_check = {"force": contact.W_CHECK, "T_gamma": contact.W_CHECK_GAMMA} if has_check else {}
     return {
         "time": state[:, -3],
         "distance": state[:, -2],
@@ -66,14 +68,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "phi": wheel[..., contact.W_PHI],
         "T_gamma": wheel[..., contact.W_T_GAMMA],
         "T_gamma_spin": wheel[..., contact.W_T_GAMMA_SPIN],
-        **(
-            {
-                "check_rail_force": wheel[..., contact.W_CHECK],
-                "check_rail_T_gamma": wheel[..., contact.W_CHECK_GAMMA],
-            }
-            if len(model.check.check)
-            else {}
-        ),
+        **{f"check_rail_{name}": wheel[..., column] for name, column in of_check.items()},
         "body_position": position,
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
