@@ -17,17 +17,12 @@ STUDY_FILES = ("study.json", "summary.csv")
 
 @dataclass
 class Gathered:
-    """Runs by their names.
+    """Runs by their names."""
 
-    `records`: one for each run, as in the journal of a study; `paths`: result files by the names of
-    the runs that have one; `remarks`: what was not found as the records say; `inputs`: inputs of
-    the study, if they are the runs of one.
-    """
-
-    records: list[Record] = field(default_factory=list)
-    paths: dict[str, Path] = field(default_factory=dict)
-    remarks: list[str] = field(default_factory=list)
-    inputs: dict[str, Any] = field(default_factory=dict)
+    records: list[Record] = field(default_factory=list)  # one for each run, as in a journal
+    paths: dict[str, Path] = field(default_factory=dict)  # result files of runs that have one
+    remarks: list[str] = field(default_factory=list)  # what was not found as the records say
+    inputs: dict[str, Any] = field(default_factory=dict)  # of the study, if they are of one
 
     def results(self, names: Sequence[str]) -> "dict[str, Result]":
         """Open the results of some runs; runs without a file are left out."""

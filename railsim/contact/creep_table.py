@@ -51,28 +51,23 @@ _NO_SLIP = 1e9  # bound for linear theory
 
 
 class CreepNodes(NamedTuple):
-    """What the generator makes and the package ships.
+    """What the generator makes and the package ships."""
 
-    `force`, shape (N_RATIO + 1, N_THETA + 1, N_PSI, N_T + 1, 3): T_x/(mu N), T_y/(mu N), M_z/(mu N
-    sqrt(a b)), all over t; `kalker`, shape (N_RATIO + 1, 4): c11, c22, c23, c33 of the same solver
-    without slip.
-    """
-
+    # T_x/(mu N), T_y/(mu N), M_z/(mu N sqrt(a b)), all over t, shape (N_RATIO + 1, N_THETA + 1,
+    # N_PSI, N_T + 1, 3)
     force: NDArray[np.float32]
-    kalker: Floats
+    kalker: Floats  # c11, c22, c23, c33 of the same solver without slip, shape (N_RATIO + 1, 4)
 
 
 class CreepTable(NamedTuple):
-    """What the time loop looks up.
+    """What the time loop looks up."""
 
-    `coefficients`: B-spline coefficients of the force over t, from shape (N_RATIO + 3, N_THETA + 3,
-    N_PSI + 3, N_T + 3, 4); last axis T_x, T_y, M_z and 0.  Half the size of float64: the look-up
-    waits for the memory, and 1e-7 of mu N is far below what the table is good for; `scale`, shape
-    (N_RATIO + 3, 4): B-spline coefficients over log(a/b) of the factors of q: c11, c22, and that of
-    ``phi sqrt(a b)``; last column zero.
-    """
-
+    # B-spline coefficients of the force over t, from shape (N_RATIO + 3, N_THETA + 3, N_PSI + 3,
+    # N_T + 3, 4); last axis T_x, T_y, M_z and 0.  Half the size of float64: the look-up waits for
+    # the memory, and 1e-7 of mu N is far below what the table is good for
     coefficients: NDArray[np.float32]
+    # B-spline coefficients over log(a/b) of the factors of q: c11, c22, and that of
+    # ``phi sqrt(a b)``; last column zero; shape (N_RATIO + 3, 4)
     scale: Floats
 
 

@@ -52,15 +52,11 @@ AHEAD = STEP * np.arange(-round(WINDOW / STEP), round(WINDOW / STEP) + 1)
 
 @dataclass(frozen=True, eq=False)
 class RailPart:
-    """One rail of the sections, as points of equal share over s.
+    """One rail of the sections, as points of equal share over s."""
 
-    `positions`, shape (n,): arc lengths of its sections [m]; `contours`, shape (n, 2, k): y and z
-    of the points [m]; `given`, shape (2, k): y and z of the sections as they were given [m].
-    """
-
-    positions: Floats
-    contours: Floats
-    given: tuple[Floats, ...]
+    positions: Floats  # arc lengths of its sections, shape (n,) [m]
+    contours: Floats  # y and z of the points, shape (n, 2, k) [m]
+    given: tuple[Floats, ...]  # y and z of the sections as they were given, shape (2, k) [m]
 
     @cached_property
     def _slopes(self) -> Floats:

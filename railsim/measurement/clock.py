@@ -22,16 +22,12 @@ FEWEST_LONG = 0.04  # share of double steps in a clock of few digits; seldom one
 
 @dataclass(frozen=True)
 class Clock:
-    """Equal time steps, and where the values of a record lie on them.
+    """Equal time steps, and where the values of a record lie on them."""
 
-    `time`: equal steps [s]; `rate`: values per second [1/s]; `places`: instant of each value; None
-    where values are interpolated; `written`: times of the values as the file has them [s].
-    """
-
-    time: Floats
-    rate: float
-    places: Integers | None
-    written: Floats
+    time: Floats  # equal steps [s]
+    rate: float  # values per second [1/s]
+    places: Integers | None  # instant of each value; None where values are interpolated
+    written: Floats  # times of the values as the file has them [s]
     remarks: tuple[str, ...] = ()
 
     def on_grid(self, x: Floats) -> Floats:

@@ -57,17 +57,14 @@ STRAIGHT = 1e-5  # 1/m, curvature that counts as none
 
 @dataclass(frozen=True)
 class Assumed:
-    """What is known of the track before the measurement, and of the sensors.
-
-    `wavelengths`: Shortest and longest wavelength that the track has [m]. `noise`: rms of a value
-    of an accelerometer, of channels whose file does not say it [m/s2]. `bias`: Standard deviation
-    of what accelerometers show at rest [m/s2].
-    """
+    """What is known of the track before the measurement, and of the sensors."""
 
     spectrum: str = "erri_b176_low"  # of `railsim.definitions.excitations.spectra.SPECTRA`
     scale: float = 1.0  # factor on its displacements
-    wavelengths: tuple[float, float] = (3.0, 100.0)
+    wavelengths: tuple[float, float] = (3.0, 100.0)  # shortest and longest that the track has [m]
+    # rms of a value of an accelerometer, of channels whose file does not say it [m/s2]
     noise: float = NOISE["sensor_acceleration"]
+    # standard deviation of what accelerometers show at rest [m/s2]
     bias: float = BIAS["sensor_acceleration"]
 
     def check(self) -> None:

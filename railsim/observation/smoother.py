@@ -37,17 +37,14 @@ def filtered(matrix: Complexes, values: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Fields:
-    """Gaussian fields on a periodic grid, and how channels see them.
-
-    `power` (float64[bin, field]): Two-sided power: M times the share of each of the bins of
-    `numpy.fft.rfft` in the variance of a field. `errors` (float64[bin, channel]): Power of the
-    channels' errors; of white noise its variance in every bin.
-    """
+    """Gaussian fields on a periodic grid, and how channels see them."""
 
     points: int  # M, points of the grid
+    # two-sided: M times the share of each of the bins of `numpy.fft.rfft` in the variance of a
+    # field, float64[bin, field]
     power: Floats
     response: Complexes  # H, complex128[bin, channel, field]
-    errors: Floats
+    errors: Floats  # their power, float64[bin, channel]; of white noise its variance in every bin
 
     def covariance(self) -> Complexes:
         """Cov[r | y] of (1) per bin, complex128[bin, field, field]."""

@@ -14,15 +14,11 @@ USUAL_CANT_DEFICIENCY = 0.150
 
 @dataclass(frozen=True)
 class Curve:
-    """One circular element.
+    """One circular element."""
 
-    `section`: its section of the plan; `curvature`: positive to the right [1/m]; `cant`: at its
-    middle, positive where the outer rail is higher [m].
-    """
-
-    section: Section
-    curvature: float
-    cant: float
+    section: Section  # of the plan
+    curvature: float  # positive to the right [1/m]
+    cant: float  # at its middle, positive where the outer rail is higher [m]
 
     @property
     def balanced_speed(self) -> float:
