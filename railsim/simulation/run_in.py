@@ -84,55 +84,45 @@ def start_state(
     ModelError: the vehicle is longer than the track's table.
     """
     speed = float(balance.state[SPEED])
+
+    def arrived(steps: int) -> Floats:
+        """State at `start` after so many steps over the real track."""
+        s = start - steps * speed * step
+        before = 0.0
+
+        def settling(done: float, whole: float) -> None:
+            nonlocal before
+            before = whole
+            if progress is not None:
+                progress(done, whole + steps * step)
+
+        def approaching(done: float, whole: float) -> None:
+            if progress is not None:
+                progress(before + done, before + whole)
+
+        frames = _frames(model, s)
+        state = None if remark is None else _steady(model, balance, track, s, remark)
+        if state is None:
+            state = settled(model, balance, track, s, step, settling)
+        if state is None:
+            state = initial_state(model, _standing(model, balance, track, s), s, frames)
+        state[ARC_LENGTH] = s
+        if steps:
+            follow_rails(model, state)
+            system = _guided(without_loads(model.system), model.check)
+            system = system._replace(drive=CONSTANT_SPEED)
+            _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
+        state[-3:] = 0.0, start, speed
+        return state
+
     steps = _approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
-        return _arrived(model, balance, track, start, step, scheme, steps, progress, remark)
+        return arrived(steps)
     except InputError:
         if whole <= steps:
             raise
-    return _arrived(model, balance, track, start, step, scheme, whole, progress, remark)
-
-
-def _arrived(
-    model: Model,
-    balance: Equilibrium,
-    track: Track,
-    start: float,
-    step: float,
-    scheme: int,
-    steps: int,
-    progress: Progress | None,
-    remark: Callable[[str], None] | None,
-) -> Floats:
-    """State at `start` after so many steps over the real track."""
-    speed = float(balance.state[SPEED])
-    s = start - steps * speed * step
-    before = 0.0
-
-    def settling(done: float, whole: float) -> None:
-        nonlocal before
-        before = whole
-        if progress is not None:
-            progress(done, whole + steps * step)
-
-    def approaching(done: float, whole: float) -> None:
-        if progress is not None:
-            progress(before + done, before + whole)
-
-    frames = _frames(model, s)
-    state = None if remark is None else _steady(model, balance, track, s, remark)
-    if state is None:
-        state = settled(model, balance, track, s, step, settling)
-    if state is None:
-        state = initial_state(model, _standing(model, balance, track, s), s, frames)
-    state[ARC_LENGTH] = s
-    if steps:
-        follow_rails(model, state)
-        system = _guided(without_loads(model.system), model.check)._replace(drive=CONSTANT_SPEED)
-        _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
-    state[-3:] = 0.0, start, speed
-    return state
+    return arrived(whole)
 
 
 def _guided(system: System, check: CheckRails) -> System:

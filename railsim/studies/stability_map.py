@@ -53,7 +53,11 @@ def stability_map(
     `progress`: called repeatedly with the finished fraction; `on_remark`: called with a sentence on
     every stored point that is damaged and computed again. Raises InputError: an option is wrong.
     """
-    _check(points, **options)
+    contact = options["linearisation"], options["amplitude"]
+    others = {"linearisation", "amplitude", "over_amplitude"}
+    own = {name: value for name, value in options.items() if name not in others}
+    for conicity in dict.fromkeys(point.at.get("conicity") for point in points):
+        checked(Contact(*contact, conicity), **own)  # before the first point is computed
     paths = [_stored_path(folder, point, options) for point in points]
     found: dict[int, Record] = {}
     for number, path in enumerate(paths):
@@ -72,20 +76,6 @@ def stability_map(
             write_record(path, record)
         progress(len(found) / len(points))
     return [found[number] for number in range(len(points))]
-
-
-def _check(
-    points: Sequence[MapPoint],
-    /,
-    linearisation: str,
-    amplitude: float,
-    *,
-    over_amplitude: bool,
-    **options: Any,
-) -> None:
-    """Look at the arguments of all points before the first is computed."""
-    for conicity in dict.fromkeys(point.at.get("conicity") for point in points):
-        checked(Contact(linearisation, amplitude, conicity), **options)
 
 
 def _computed(
