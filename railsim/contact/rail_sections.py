@@ -27,14 +27,7 @@ from functools import cached_property
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.contact.curves import (
-    RAIL_SPACING,
-    STEEPEST,
-    RailCurve,
-    averaged_curvature,
-    contour_curve,
-    single_valued_part,
-)
+from railsim.contact import curves
 from railsim.definitions.section_files import SectionList
 
 DEEP = 8e-3  # m, of a groove between two rails
@@ -207,7 +200,7 @@ def _rolled(heights: Floats, radius: float) -> tuple[Floats, Floats]:
     return z, AHEAD[best] + STEP * offset
 
 
-def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> RailCurve:
+def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> curves.RailCurve:
     """Return the section of a rail on which a wheel stands as the contact search takes it.
 
     In the frame of the right rail in the track, whose y = 0 lies `zero` beside its middle [m].
@@ -215,26 +208,26 @@ def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) ->
     """
     given = part.unchanged(s)
     if given is not None:
-        return contour_curve(given[0] + zero, given[1])
+        return curves.contour_curve(given[0] + zero, given[1])
     y, _ = part.contour(float(np.clip(s, part.positions[0], part.positions[-1])))
-    Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * RAIL_SPACING)
+    Y = np.arange(y.min() - 2e-3, y.max() + 2e-3, 5.0 * curves.RAIL_SPACING)
     z, _ = _rolled(part.heights_ahead(s, Y), radius)
     known = np.isfinite(z)
     Y, z = Y[known], z[known]
-    usable = single_valued_part(Y, z, int(np.argmin(z)), STEEPEST)
+    usable = curves.single_valued_part(Y, z, int(np.argmin(z)), curves.STEEPEST)
     Y, z = Y[usable][:-1], z[usable][:-1]
     from scipy.interpolate import make_smoothing_spline
 
     spline = make_smoothing_spline(1e3 * Y, 1e3 * z, lam=1e-4)
-    nodes = np.arange(Y[0], Y[-1], RAIL_SPACING)
+    nodes = np.arange(Y[0], Y[-1], curves.RAIL_SPACING)
     slope = spline.derivative()(1e3 * nodes)
-    slope[0], slope[-1] = -STEEPEST, STEEPEST  # walls, or where the section ends
-    return RailCurve(
+    slope[0], slope[-1] = -curves.STEEPEST, curves.STEEPEST  # walls, or where the section ends
+    return curves.RailCurve(
         Y0=float(nodes[0]) + zero,
-        dY=RAIL_SPACING,
+        dY=curves.RAIL_SPACING,
         z=1e-3 * spline(1e3 * nodes),
         slope=slope,
-        curvature=averaged_curvature(nodes, slope, 1.0),
+        curvature=curves.averaged_curvature(nodes, slope, 1.0),
     )
 
 

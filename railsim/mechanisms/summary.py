@@ -19,7 +19,7 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimum import Optimum, Start
+    from railsim.mechanisms.optimum import Optimum
 
 Data = dict[str, Any]
 
@@ -151,18 +151,16 @@ def _courses(courses: Mapping[str, Course], *names: str) -> Data:
 
 def optimum_data(optimum: "Optimum") -> Data:
     """A search as plain numbers, and everything about the optimum."""
+    starts = [asdict(start) | {"feasible": start.feasible} for start in optimum.starts]
+    for start in starts:
+        start["parameters"] = start.pop("end")
     return {
         **analysis_data(optimum.after), "objective": optimum.objective,
         "objective_before": optimum.objective_before,
         "feasible_before": optimum.feasible_before, "feasible": optimum.feasible,
         "breaches": dict(optimum.breaches), "active": [asdict(active) for active in optimum.active],
-        "starts": [_start_data(start) for start in optimum.starts], "seed": optimum.seed,
+        "starts": starts, "seed": optimum.seed,
     }  # fmt: skip
-
-
-def _start_data(start: "Start") -> Data:
-    data = asdict(start) | {"feasible": start.feasible}
-    return data | {"parameters": data.pop("end")}
 
 
 def _list(array: Any) -> list[float]:
