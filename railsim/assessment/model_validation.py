@@ -30,7 +30,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, argument_error, input_error
+from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import common_shift
 from railsim.measurement.counterpart import amplified, check_channels, compared, series
@@ -140,7 +140,7 @@ def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> 
     kind, or with several.
     """
     found: list[Result] = []
-    faults = []
+    faults = Faults()
     for run in measured:
         name = run.definition.track
         track = None if name is None else load_track(name)
@@ -155,8 +155,7 @@ def matching(measured: Sequence[Measurement], results: Mapping[str, Result]) -> 
             "name the file" if fits else f"there are {', '.join([*results][:5]) or 'none'}"
         )
         faults.append(Fault(run.name, "", words, allowed))
-    if faults:
-        raise InputError(faults)
+    faults.check()
     return found
 
 
@@ -226,7 +225,7 @@ class _Run:
         selections = compared(run)
         time, distance = result["time"], result["distance"]
         rate = (len(time) - 1) / float(time[-1] - time[0])
-        simulated_there, faults = {}, []
+        simulated_there, faults = {}, Faults()
         for name, selection in selections.items():
             try:
                 values = np.asarray(series(result, selection))
@@ -236,8 +235,7 @@ class _Run:
                 faults.append(Fault(run.name, key, words, "run it with outputs for it"))
                 continue
             simulated_there[name] = amplified(values, rate, run.channel(name))
-        if faults:
-            raise InputError(faults)
+        faults.check()
         moved, remarks = _placed(run, distance, simulated_there)
         on = run.definition.track
         ended = f"{result.status}, {result.attributes.get('status_reason', '')}".rstrip(", ")

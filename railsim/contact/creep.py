@@ -22,7 +22,7 @@ from railsim.arrays import Floats
 from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
-from railsim.errors import Fault, InputError, ModelError, nearest
+from railsim.errors import Fault, Faults, ModelError, input_error, nearest
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.fastsim import fastsim_workspace
@@ -127,7 +127,7 @@ def creep_force(
     True
     """
     if law not in CREEP_LAWS:
-        raise InputError([Fault("creep_force", "law", f"'{law}'", nearest(law, CREEP_LAWS))])
+        raise input_error("creep_force", f"'{law}'", nearest(law, CREEP_LAWS), "law")
     name: CreepLawName = law
     k_slip = reduction if slip_reduction is None else slip_reduction
     ranges = {
@@ -142,13 +142,11 @@ def creep_force(
             "rows [creepage, T/(mu N)] with the law 'adhesion_curve' and only with it",
         ),
     }
-    faults = [
+    Faults(
         Fault("creep_force", key, found, allowed)
         for key, (fine, found, allowed) in ranges.items()
         if not fine
-    ]
-    if faults:
-        raise InputError(faults)
+    ).check()
     inputs = np.broadcast_arrays(a, b, N, mu, xi_x, xi_y, phi)
     shape = inputs[0].shape
     flat = [np.array(value, dtype=float).ravel() for value in inputs]

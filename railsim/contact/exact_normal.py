@@ -23,7 +23,7 @@ from railsim.contact.curves import (
     wheel_curve,
 )
 from railsim.contact.elastic import Patch
-from railsim.errors import InputError, ModelError
+from railsim.errors import Faults, ModelError
 from railsim.kernels import normal_contact as kernel
 from railsim.profiles.profile import Profile
 
@@ -71,8 +71,7 @@ def exact_contact(
     """
     points = wheel_curve(wheel, radius, tape_circle_position(back_to_back), CANDIDATE_SPACING)
     nodes = rail_curve(rail, gauge, inclination)
-    if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
-        raise InputError(faults)
+    Faults(misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}")).check()
     geometry = _Geometry(points, nodes, y, roll, radius)
     E_star = G / (1.0 - nu)
     first = geometry.first_touch()

@@ -22,7 +22,7 @@ from railsim.contact.conicity import equivalent_conicity
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Wheelset
-from railsim.errors import InputError
+from railsim.errors import Faults, InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile
 
@@ -159,13 +159,11 @@ def contact_geometry(
         if lateral is None
         else np.atleast_1d(np.asarray(lateral, dtype=np.float64))
     )
-    faults = [
+    Faults(
         fault
         for side, w, r in zip(("left", "right"), wheels, rails, strict=True)
         for fault in misfits(w, r, gauge, f"{side} wheel")
-    ]
-    if faults:
-        raise InputError(faults)
+    ).check()
     mean_radius = 0.5 * (radii[0] + radii[1])
     pairs = [
         kernel.RigidPair(np.ascontiguousarray((w.u, w.r, w.t)), r.Y0, r.z, r.slope)

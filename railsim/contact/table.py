@@ -65,7 +65,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.contact import curves
 from railsim.contact.zones import table_range, zone_windows
-from railsim.errors import InputError
+from railsim.errors import Faults
 from railsim.kernels import table_slice as kernel
 from railsim.kernels.contact_table import A1, B1, D_B1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
 from railsim.kernels.hertz import unit_load_ellipse
@@ -256,8 +256,8 @@ def build_contact_table(
         wheel, radius, curves.tape_circle_position(back_to_back), min(grid.spacing, grid.ds)
     )
     rail_nodes = curves.rail_curve(rail, gauge, inclination)
-    if faults := curves.misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
-        raise InputError(faults)
+    pair = f"{wheel.name} on {rail.name}"
+    Faults(curves.misfits(wheel_points, rail_nodes, gauge, pair)).check()
     usual = table_range(wheel_points, rail_nodes, widening)
     s_min = usual[0] if grid.s_min is None else grid.s_min
     s_max = usual[1] if grid.s_max is None else grid.s_max
