@@ -105,9 +105,7 @@ def _positions(furthest: float) -> Floats:
 
 def _pair(value: T | tuple[T, T]) -> tuple[T, T]:
     """Left and right of something given once or for each side."""
-    if isinstance(value, tuple):
-        return value
-    return value, value
+    return value if isinstance(value, tuple) else (value, value)
 
 
 def contact_geometry(

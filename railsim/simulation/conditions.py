@@ -128,10 +128,9 @@ def check_agreement(
     faults, outputs = Faults(), settings.outputs
     there = f" in vehicle '{called or vehicle.name}'"
     fixed = any(body.fixed for group in groups(vehicle) for body in group.bodies.values())
-    if not (fixed or settings.initial or outputs.elements):
-        flat = FlatVehicle("", (), (), "")
-    else:  # of a copy: a study would keep all its vehicles in this form
-        flat = flatten(vehicle.model_copy())
+    needed = fixed or settings.initial or outputs.elements
+    # of a copy: a study would keep all its vehicles in this form
+    flat = flatten(vehicle.model_copy()) if needed else FlatVehicle("", (), (), "")
     with faults.caught():
         check_fixed(flat, track, settings.drive.mode)
     bodies = [body.name for body in flat.bodies]
