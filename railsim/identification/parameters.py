@@ -32,18 +32,11 @@ LOW, HIGH = 0.1, 10.0  # factors that are allowed by default
 class Parameter:
     """A parameter.
 
-    Attributes
-    ----------
-    name : str
-        What it is called in tables.
-    keys : tuple of str
-        Keys of the vehicle, or with ``track.`` before them of the track; changed by one factor.
-    profiles : tuple of str
-        Two wheel profiles instead of keys: the share of the second in the first is sought.
-    low, high : float
-        Bounds of the factor, or of the share.
-    spread : float or None
-        Standard deviation of what is known before, as a share of the value; None: nothing.
+    - `name`: what it is called in tables
+    - `keys`: keys of the vehicle, or with ``track.`` before them of the track; changed by one factor
+    - `profiles`: two wheel profiles instead of keys: the share of the second in the first is sought
+    - `low`, `high`: bounds of the factor, or of the share
+    - `spread`: standard deviation of what is known before, as a share of the value; None: nothing
     """
 
     name: str
