@@ -33,7 +33,7 @@ class Parameter:
     """A parameter.
 
     - `name`: what it is called in tables
-    - `keys`: keys of the vehicle, or with ``track.`` before them of the track; changed by one factor
+    - `keys`: of the vehicle, or with ``track.`` before them of the track; changed by one factor
     - `profiles`: two wheel profiles instead of keys: the share of the second in the first is sought
     - `low`, `high`: bounds of the factor, or of the share
     - `spread`: standard deviation of what is known before, as a share of the value; None: nothing
