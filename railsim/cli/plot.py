@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from railsim.cli import common as cli
 from railsim.cli.gathered import folder_of, gather
 from railsim.errors import Fault, Faults, input_error, nearest
 from railsim.files.access import PICTURES, RESULTS
+from railsim.text import unformatted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -130,18 +132,34 @@ def _study_figure(
     family = family or next((name for name in order if name != x), None)
     ordered = x and varied[x].numeric and (against or x not in seeds)
     kind = kind or ("curves" if ordered else "ranking")
+    early = [record["status"] != "complete" for record in records]
     if kind == "ranking" or x is None:
-        figure = ranking_figure(quantities, [str(record["name"]) for record in records])
+        ends = [
+            f" ({record['status']})" * ended for record, ended in zip(records, early, strict=True)
+        ]
+        named = [f"{record['name']}{end}" for record, end in zip(records, ends, strict=True)]
+        figure = ranking_figure(quantities, named)
     elif kind == "map":
         if family is None:
             found = f"only '{x}' was varied"
             raise input_error("--kind", found, "a study over two parameters", key="map")
         figure = map_figure(quantities, varied[x], varied[family])
     else:
-        figure = curves_figure(quantities, varied[x], varied[family] if family else None)
-    if early := sum(record["status"] != "complete" for record in records):
-        say_above(figure, f"{early} of {len(records)} runs ended early: their values until then")
+        figure = curves_figure(quantities, varied[x], varied[family] if family else None, early)
+    if any(early):
+        crosses = " (crosses)" if kind == "curves" else ""
+        runs = f"{sum(early)} of {len(records)} runs ended early{crosses}"
+        say_above(figure, f"{runs}: their values until then")
+    say_above(figure, _same(folder_of(file).resolve().name, records, varied))
     return figure
+
+
+def _same(name: str, records: Sequence[Mapping[str, Any]], varied: Collection[str]) -> str:
+    """What a study is called, and what all its runs have."""
+    labels = records[0]["labels"]
+    told = [labels[kind] for kind in ("vehicle", "track", "speed") if kind in {*labels} - {*varied}]
+    words = [f"{value:g} m/s" if isinstance(value, float) else str(value) for value in told]
+    return unformatted(": ".join(filter(None, [name, ", ".join(words)])))
 
 
 def _quantity(column: "dict[str, Any]") -> "Column":
@@ -150,7 +168,8 @@ def _quantity(column: "dict[str, Any]") -> "Column":
     words, unit = column["words"], column["unit"]
     if " " in words:  # a name in a file stays as it is
         words = words[:1].upper() + words[1:]
-    return Column(f"{words} ({unit})" if unit else words, column["values"])
+    name = f"{words} ({unit})" if unit else words
+    return Column(name, column["values"], column.get("decimals"))
 
 
 def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":

@@ -1,6 +1,6 @@
 """The same quantities of several results in one picture, to be compared by eye."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
@@ -11,7 +11,15 @@ from railsim.compare import Difference
 from railsim.definitions.track.layout import curvature_sections
 from railsim.notation import Quantity
 from railsim.plot import style
-from railsim.plot.histories import capitalised, check_not_empty, draw_limit, unit_label, widen
+from railsim.plot.histories import (
+    capitalised,
+    check_not_empty,
+    draw_limit,
+    ended,
+    short_names,
+    unit_label,
+    widen,
+)  # fmt: skip
 from railsim.plot.selection import STUDY, Panel, panels
 from railsim.result import Result
 from railsim.text import unformatted
@@ -45,8 +53,10 @@ def overlay(
     shown = style.spans(plans[0], longest["distance"], longest[over]) if alike else []
     same_radii = all(plan == plans[0] for plan in plans)
     count, words = max(map(len, drawn.values())), first.quantities[over].label
-    figure, cells, across = _cells(count, 1.3, words)
+    title = _shared(list(results.values()))
+    figure, cells, across = _cells(count, 1.5 if title else 1.3, words, title)
     together = zip_longest(*drawn.values())
+    places = _places(results.values())
     for number, (axes, same) in enumerate(zip(cells, together, strict=True)):
         for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
             for line in panel.lines if panel is not None else ():
@@ -55,11 +65,12 @@ def overlay(
                 axes.plot(result[over], line.values * panel.quantity.scale, **look)
         held = [panel for panel in same if panel is not None]
         quantity = held[0].quantity
-        _label(axes, quantity, _heading(held))
+        _label(axes, quantity, _heading(held, places))
         draw_limit(axes, quantity, results.values())
         style.shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
-    _legend(figure, list(results), {line.labels.get("side") for line in lines}, 0)
+    labels = [f"{label}{ended(result)}" for label, result in results.items()]
+    _legend(figure, labels, {line.labels.get("side") for line in lines}, 0)
     return figure
 
 
@@ -117,7 +128,23 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
     return figure
 
 
-def _heading(held: Sequence[Panel]) -> str:
+def _shared(results: Sequence[Result]) -> str:
+    """What of vehicle, track and speed is the same for all results."""
+    told = [(r.vehicle().name, r.track().name, r.speed_words) for r in results]
+    same = [names[0] for names in zip(*told, strict=True) if len(set(names)) == 1]
+    return " · ".join(map(unformatted, same))
+
+
+def _places(results: Iterable[Result]) -> dict[str, str]:
+    """Wheelsets as in the legends of histories: number and name."""
+    return {
+        name: f"{number} {short}"
+        for result in results
+        for number, (name, short) in enumerate(short_names(result.wheelsets).items(), start=1)
+    }
+
+
+def _heading(held: Sequence[Panel], names: Mapping[str, str]) -> str:
     """Name of a quantity, with the place that all lines of a result share."""
     quantity, places = held[0].quantity, dict[str, None]()
     for panel in held:
@@ -125,7 +152,8 @@ def _heading(held: Sequence[Panel]) -> str:
         labels -= {quantity.long_name.rpartition(", ")[2]}
         if len(labels) != 1:
             return capitalised(quantity)
-        places[unformatted(labels.pop())] = None
+        place = labels.pop()
+        places[unformatted(names.get(place, place))] = None
     return f"{capitalised(quantity)}: {' / '.join(places)}"
 
 

@@ -33,6 +33,7 @@ class Column:
 
     words: str  # for axes, with the unit
     values: list[Any]  # numbers or texts; None where a run has none
+    decimals: int | None = None  # of printed tables; None: of any size
 
     @property
     def numeric(self) -> bool:
@@ -45,13 +46,21 @@ class Column:
         there = {value for value in self.values if value is not None}
         return sorted(there, key=lambda value: (isinstance(value, str), value))
 
+    def text(self, value: float, digits: int) -> str:
+        """Return a number with so many digits, none beyond those of tables: 1570, not 7e-12."""
+        rounded = value if self.decimals is None else round(value, self.decimals) + 0.0
+        return f"{float(f'{rounded:.{digits}g}'):g}"
+
 
 @styled()
-def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None) -> Figure:
+def curves_figure(
+    quantities: Sequence[Column], x: Column, family: Column | None, early: Sequence[bool] = ()
+) -> Figure:
     """Quantities over a parameter, a curve for each member of a family.
 
     Where several runs share a point, the curve is their median and a band goes from the smallest to
-    the largest.  Over categories there are points and bars, which no line joins.
+    the largest.  Over categories there are points and bars, which no line joins.  `early`: Which
+    runs ended early; they bear crosses.
     """
     members = [None] if family is None else family.different
     colours = _colours(len(members))
@@ -63,6 +72,10 @@ def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None
         for member, colour in zip(members, colours, strict=True):
             own = None if family is None else [value == member for value in family.values]
             _curve(axes, quantity, x, own, colour, member)
+        for value, abscissa, crossed in zip(quantity.values, x.values, early, strict=False):
+            if crossed and None not in (value, abscissa):
+                place = abscissa if x.numeric else x.different.index(abscissa)
+                axes.plot(place, value, "x", color=LIMIT, ms=7)
         axes.set(title=quantity.words, xlabel=x.words)
         if not x.numeric:
             axes.set_xticks(range(len(x.different)), [unformatted(str(v)) for v in x.different])
@@ -79,8 +92,8 @@ def _name_medians(figure: Figure, points: Sequence[Any], more: str = "") -> None
 
 
 def say_above(figure: Figure, words: str) -> None:
-    """Add a line above a picture."""
-    lines = "\n".join(filter(None, [figure.get_suptitle(), words]))
+    """Add a line above a picture, over those that are there."""
+    lines = "\n".join(filter(None, [words, figure.get_suptitle()]))
     figure.suptitle(lines, x=0.012, ha="left", fontsize=8.5, fontweight="normal")
 
 
@@ -121,7 +134,7 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
         values = np.full((len(rows), len(columns)), np.nan)
         for cell, found in there.items():
             values[cell] = float(np.median(found))
-        _draw_map(figure, axes, values)
+        _draw_map(figure, axes, values, quantity)
         axes.set(title=quantity.words, xlabel=x.words, ylabel=y.words)
         _ticks(axes.set_xticks, columns)
         _turned(axes)
@@ -129,7 +142,7 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
     return figure
 
 
-def _draw_map(figure: Figure, axes: Axes, values: Any) -> None:
+def _draw_map(figure: Figure, axes: Axes, values: Any, quantity: Column) -> None:
     axes.grid(False)
     image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
     figure.colorbar(image, ax=axes, pad=0.02)
@@ -139,8 +152,8 @@ def _draw_map(figure: Figure, axes: Axes, values: Any) -> None:
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if value < middle else "black"
-            words = f"{float(f'{value:.3g}'):g}"  # 1570, not 1.57e+03
-            axes.text(column, row, words, ha="center", va="center", fontsize=7, color=colour)
+            look: Any = {"ha": "center", "va": "center", "fontsize": 7, "color": colour}
+            axes.text(column, row, quantity.text(value, 3), **look)
 
 
 def _ticks(tell: Any, values: Sequence[Any]) -> None:
@@ -169,7 +182,8 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
         names_shown = [n if len(n) <= LONGEST else f"...{n[3 - LONGEST :]}" for _, n in shown]
         lengths, labels = [v for v, _ in shown], [*map(unformatted, names_shown)]
         bars = axes.barh(labels, lengths, color=DISTINCT[0], height=0.7)
-        axes.bar_label(bars, [f"{value:.4g}" for value, _ in shown], padding=3, fontsize=7)
+        numbers = [quantity.text(value, 4) for value, _ in shown]
+        axes.bar_label(bars, numbers, padding=3, fontsize=7)
         axes.invert_yaxis()
         axes.margins(x=0.1, y=0.02)
         axes.tick_params(axis="y", labelsize=7)

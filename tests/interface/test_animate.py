@@ -179,10 +179,10 @@ def test_a_yawed_wheel_touches_where_it_is_lowest_along_the_rail(result, yaw, as
 def test_a_wheelset_beside_its_rails_is_drawn_on_its_flanges(result):
     arrays = {name: result[name] for name in result}
     arrays["wheelset_lateral"] = np.full_like(arrays["wheelset_lateral"], 0.3)
-    derailed = railsim.Result(
-        arrays, result.quantities, result.coordinates, result.attributes, PROFILES
-    )
+    status = {**result.attributes, "status": "derailed"}
+    derailed = railsim.Result(arrays, result.quantities, result.coordinates, status, PROFILES)
     scene = result_scene(derailed, frames=5)
+    assert scene.title == f"{result_scene(result, frames=2).title} · derailed"
     flange = max(section["wheel_z"].max() for section in scene.sections[0])
     np.testing.assert_allclose(scene.seats[..., 0], -flange)
     json.dumps(scene_data(scene), allow_nan=False)

@@ -365,6 +365,14 @@ def test_overlay_has_a_colour_for_every_result(result):
     np.testing.assert_allclose(second.get_ydata(), 0.5 * first.get_ydata())
 
 
+def test_overlay_says_what_its_results_share_and_which_ended_early(result):
+    figure = overlay({"one": result, "other": example_result(speed=30.0, status="derailed")})
+    words = [text.get_text() for text in figure.legends[0].texts]
+    assert words[:2] == ["one", "other · derailed"]
+    vehicle, track = result.vehicle().name, result.track().name
+    assert figure.get_suptitle() == f"{vehicle} · {track}"
+
+
 def test_overlay_shades_what_the_longest_run_passed_and_over_time_of_one_speed_only(result):
     short = example_result(duration=16.0)
     for results in ({"short": short, "long": result}, {"long": result, "short": short}):
@@ -385,7 +393,7 @@ def test_overlay_names_the_wheelset_of_each_vehicle(result):
     held = {name: result.quantities[name] for name in ("time", "distance", "Y")}
     wagon = Result({name: result[name] for name in held}, held, coordinates, result.attributes)
     both, one = overlay({"coach": result, "wagon": wagon}, ["Y:1", "Y"]).axes
-    assert both.get_title(loc="left") == "Guiding force: front.outer.wheelset / front"
+    assert both.get_title(loc="left") == "Guiding force: 1 front.outer / 1 front"
     assert one.get_title(loc="left") == "Guiding force"
 
 

@@ -94,8 +94,18 @@ def test_runs_that_ended_early_are_counted_above_the_picture(folder, kind):
     assert _study_figure(str(folder), (), None, None, kind).get_suptitle().count("early") == 0
     index["runs"][0]["status"] = "derailed"
     (folder / "study.json").write_text(json.dumps(index))
-    words = "1 of 8 runs ended early: their values until then"
-    assert _study_figure(str(folder), (), None, None, kind).get_suptitle().endswith(words)
+    figure = _study_figure(str(folder), (), None, None, kind)
+    crosses = " (crosses)" if kind == "curves" else ""
+    words = f"1 of 8 runs ended early{crosses}: their values until then"
+    assert words in figure.get_suptitle().splitlines()
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert sum(name.endswith("(derailed)") for name in names) == (kind == "ranking")
+
+
+@pytest.mark.parametrize("kind", ["curves", "map", "ranking"])
+def test_picture_of_a_study_says_what_it_is_called_and_what_all_its_runs_have(folder, kind):
+    title = _study_figure(str(folder), (), None, None, kind).get_suptitle()
+    assert title.splitlines()[0] == f"s: {Path(CURVE).stem}"  # vehicle and speed were varied
 
 
 @pytest.mark.parametrize("file", ["", "study.json", "summary.csv"])
@@ -124,6 +134,9 @@ def test_curves_and_bands_hold_the_values():
     assert second.get_xydata().tolist() == [[10.0, 3.0], [20.0, 4.0]]
     (middle,) = curves_figure([VALUES], SPEED, None).axes[0].get_lines()
     assert middle.get_ydata().tolist() == [2.0, 3.0]  # medians of 1 and 3, 2 and 4
+    figure = curves_figure([VALUES], SPEED, VEHICLE, [False, True, False, False, True])
+    (cross,) = [line for line in figure.axes[0].get_lines() if line.get_marker() == "x"]
+    assert cross.get_xydata().tolist() == [[20.0, 2.0]]  # the last of them has no value
     figure = curves_figure([VALUES], VEHICLE, None)
     assert [t.get_text() for t in figure.axes[0].get_xticklabels()] == ["a", "b"]
 
@@ -134,6 +147,9 @@ def test_map_and_ranking_hold_the_values():
     large = Column("value", [1571.3, 0.5643, 3.0, 4.0, None])
     texts = map_figure([large], SPEED, VEHICLE).axes[0].texts
     assert [text.get_text() for text in texts] == ["1570", "0.564", "3", "4"]
+    small = Column("force (kN)", [7.4e-12, -4e-9, 16.4567, 28123.0, None], decimals=2)
+    texts = ranking_figure([small], ["p", "q", "r", "s", "t"]).axes[0].texts
+    assert [text.get_text() for text in texts] == ["28120", "16.46", "0", "0"]
     axes = ranking_figure([VALUES], ["p", "q", "r", "s", "t"]).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [4.0, 3.0, 2.0, 1.0]
     assert [t.get_text() for t in axes.get_yticklabels()] == ["s", "r", "q", "p"]
