@@ -123,7 +123,7 @@ def track_svg(track: Track) -> str:
     below = height + 16.0  # where the cant begins, below the line with the radii
     whole = below + height
     across = s / track.length * width
-    shapes = []
+    shapes, names = [], []
     for section in curvature_sections(track):
         if section.type == "STR":
             continue
@@ -134,11 +134,12 @@ def track_svg(track: Track) -> str:
             f'height="{whole:.0f}"/>'
         )
         if section.type == "CIR" and end - begin > 60.0:
-            radius = f"R {1.0 / section.start_value:.6g} m"
-            shapes.append(
+            radius = f"R {1.0 / section.start_value:.6g} m".replace("-", "\N{MINUS SIGN}")
+            names.append(  # over the shade of the next section
                 f'<text x="{0.5 * (begin + end):.1f}" y="{height + 8:.0f}" '
                 f'text-anchor="middle">{radius}</text>'
             )
+    shapes += names
     rows = (
         ("curvature", 1e3 * alignment.curvature(s), "1/km", 0.0),
         ("cant", 1e3 * alignment.cant(s), "mm", below),

@@ -32,7 +32,7 @@ from railsim.report.document import day, in_words
 from railsim.report.inputs import _flat, _settings, differing, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
-from railsim.report.runs import page
+from railsim.report.runs import _peaks, page
 from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
@@ -623,6 +623,14 @@ def test_study_is_reported_with_its_failures(tmp_path, simulated, capsys):
     assert main(["report", str(tmp_path / "s"), "--out", str(tmp_path / "q.html")]) == 0
     told = "1 of 4 runs in"
     assert told in (tmp_path / "q.html").read_text(encoding="utf-8")
+
+
+def test_runs_that_ended_early_are_called_so_beside_their_curves_and_peaks():
+    results = {"whole": example_result(), "short": example_result(status="derailed")}
+    (group,) = groups(results)
+    assert curve_data(group)["runs"] == ["whole", "short · derailed"]
+    peaks = _peaks([{"name": name, **run_facts(one)} for name, one in results.items()], results)
+    assert peaks.tables[0].header == ["", "whole", "short · derailed"]
 
 
 def test_study_writes_its_report_where_asked(tmp_path, simulated, capsys):

@@ -151,6 +151,8 @@ def test_pages_work_and_let_nothing_else_run_or_be_fetched(found):
         assert page["resources"] == 0, number
         assert page["styled"] in ("14px", "15px"), number
     assert found[0]["plots"] > 0
+    # the choice of the wheel is not printed
+    assert re.search(r"Derailment quotient, wheelset 1 (left|right) ", found[0]["text"])
     assert found[1]["state"].startswith("t 0.00 s, s ")
     assert found[2]["state"].startswith("t 0.00 s")
     assert "driver at" in found[4]["state"]

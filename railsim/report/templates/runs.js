@@ -69,11 +69,14 @@
         var from = u.valToPos(s.begin, "x", true), to = u.valToPos(s.end, "x", true);
         g.fillStyle = colour(s.curve ? "--curve" : "--transition");
         g.fillRect(from, b.top, to - from, b.height);
-        if (s.words && to - from > 70) {
-          g.fillStyle = colour("--soft"); g.font = 11 * devicePixelRatio + "px system-ui, sans-serif";
-          g.textAlign = "center"; g.textBaseline = "top";
-          g.fillText(s.words, 0.5 * (from + to), b.top + 3);
-        }
+      });
+      g.restore();
+      g.save();
+      g.fillStyle = colour("--soft"); g.font = 11 * devicePixelRatio + "px system-ui, sans-serif";
+      g.textAlign = "center"; g.textBaseline = "bottom";
+      data.sections.forEach(function (s) { /* above the plot, where no curve crosses them */
+        var from = Math.max(b.left, u.valToPos(s.begin, "x", true)), to = Math.min(b.left + b.width, u.valToPos(s.end, "x", true));
+        if (s.words && to - from > 40 * devicePixelRatio) { g.fillText(s.words, 0.5 * (from + to), b.top - 2); }
       });
       g.restore();
     };
@@ -139,7 +142,7 @@
   function curves(box, data, key) {
     var points = 2 * data.cells, width = (data.high - data.low) / data.cells, fine = [], k;
     for (k = 0; k < data.cells; k++) { fine.push(data.low + (k + 0.25) * width, data.low + (k + 0.75) * width); }
-    var lines = data.quantities.map(function (q) { return decoded(q, points); }), plots = [], kept = {}, grid;
+    var lines = data.quantities.map(function (q) { return decoded(q, points); }), plots = [], titles = [], kept = {}, grid;
     var picks = seen(fine, data.low, data.high), x = positions(fine, picks), unit = data.axis.charAt(0) === "D" ? "m" : "s", over = unit === "m" ? "s (m)" : "t (s)";
     made("h3", box, data.track);
     var controls = made("div", box, undefined, "controls");
@@ -199,7 +202,13 @@
         });
       });
     }
-    function fill() { kept = {}; zoom(plots[0].scales.x.min, plots[0].scales.x.max); plots.forEach(function (u) { u.redraw(true, true); }); }
+    function name() { /* above the plots, also of those that are printed or saved */
+      titles.forEach(function (title, i) {
+        var q = data.quantities[i], s = q.sides === 2 ? " " + ["left", "right"][side.value] : "";
+        title.firstChild.data = q.words + ", wheelset " + (Number(wheelset.value) + 1) + s + " ";
+      });
+    }
+    function fill() { name(); kept = {}; zoom(plots[0].scales.x.min, plots[0].scales.x.max); plots.forEach(function (u) { u.redraw(true, true); }); }
     grid = made("div", box, undefined, "grid");
     /* the wheel that is loaded most in the first run */
     data.quantities.forEach(function (q, i) {
@@ -214,12 +223,13 @@
     data.quantities.forEach(function (q, i) {
       var panel = made("div", grid, undefined, "panel");
       var title = made("h4", panel, q.words + " ");
+      titles.push(title);
       if (q.sign) { made("small", title, q.sign); }
       var target = made("div", panel);
       target.setAttribute("role", "img");
       target.setAttribute("aria-label", q.words + " over the " + (unit === "m" ? "distance" : "time") + ", " + data.track);
       var u = new uPlot({
-        width: Math.max(200, target.clientWidth), height: 210, legend: { show: false },
+        width: Math.max(200, target.clientWidth), height: 210, legend: { show: false }, padding: [16, null, null, null],
         cursor: { sync: { key: key }, drag: { x: true, y: false }, bind: { dblclick: function () { return function () { zoom(data.low, data.high); return null; }; } } },
         scales: { x: { time: false }, y: { range: range(q) } },
         axes: [axis(over, 22), axis(q.symbol + (q.unit ? " (" + q.unit + ")" : ""), 46)],
@@ -230,10 +240,12 @@
           if (name === "x" && plots.length === data.quantities.length && !zooming) { zoom(u.scales.x.min, u.scales.x.max); }
         }] }
       }, values(i), target);
+      u.beneath = { sections: data.sections, limit: q.limit, words: q.limit_words };
       plots.push(u);
       place(u, target, 210);
     });
     var note = made("p", box, "", "notes");
+    name();
     detail();
     reset.addEventListener("click", function () { zoom(data.low, data.high); });
     told({ cursor: {} });
@@ -298,8 +310,21 @@
       function X(v) { return left + (v - sx.min) / (sx.max - sx.min) * (W - left - right); }
       function Y(v) { return y0 + H - bottom - (v - sy.min) / (sy.max - sy.min) * (H - top - bottom); }
       var panel = u.root.closest(".panel");
-      if (panel) { drawnAs("text", picture, { x: left, y: y0 + 16 }, panel.querySelector("h4").textContent); }
+      if (panel) {
+        var title = panel.querySelector("h4"), sign = title.children.length ? title.lastChild.textContent : "";
+        if (sign.length > 80) { sign = sign.slice(sign.lastIndexOf(", ") + 2); } /* it would not fit */
+        drawnAs("text", picture, { x: left, y: y0 + 16 }, title.firstChild.data.trim() + (sign ? ": " + sign : ""));
+      }
+      var beneath = u.beneath || { sections: [], limit: null };
+      beneath.sections.forEach(function (s) {
+        var from = Math.max(left, X(s.begin)), to = Math.min(W - right, X(s.end));
+        if (to > from) { drawnAs("rect", picture, { x: from, y: y0 + top, width: to - from, height: H - top - bottom, fill: colour(s.curve ? "--curve" : "--transition") }); }
+      });
       drawnAs("rect", picture, { x: left, y: y0 + top, width: W - left - right, height: H - top - bottom, fill: "none", stroke: colour("--strong") });
+      if (beneath.limit !== null && beneath.limit >= sy.min && beneath.limit <= sy.max) {
+        drawnAs("line", picture, { x1: left, x2: W - right, y1: Y(beneath.limit), y2: Y(beneath.limit), stroke: colour("--bad"), "stroke-dasharray": "6 4" });
+        drawnAs("text", picture, { x: W - right - 4, y: Y(beneath.limit) - 3, "text-anchor": "end", fill: colour("--bad") }, beneath.words);
+      }
       function ticks(axis, place) { (axis._splits || []).forEach(function (v, i) { var text = axis._values[i]; if (text !== null && text !== undefined && text !== "") { place(v, text); } }); }
       ticks(u.axes[0], function (v, text) { if (v >= sx.min && v <= sx.max) { drawnAs("text", picture, { x: X(v), y: y0 + H - bottom + 15, "text-anchor": "middle" }, text); } });
       ticks(u.axes[1], function (v, text) { if (v >= sy.min && v <= sy.max) { drawnAs("text", picture, { x: left - 6, y: Y(v) + 4, "text-anchor": "end" }, text); } });

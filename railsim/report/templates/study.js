@@ -183,6 +183,8 @@ window.railsimStudy = function (data, tools) {
       else if (kind === 0) { note.textContent = families(inner, value, Number(over.value), second); }
       else if (second < 0) { note.textContent = "A map needs a second parameter."; }
       else { note.textContent = map(inner, value, Number(over.value), second); }
+      var early = data.runs.filter(function (run, r) { return run.status !== "complete" && value.values[r] !== null; }).length;
+      if (early) { note.textContent += " " + early + " of " + total + " runs ended early: their values until then."; }
     }
     draw();
   }
