@@ -191,9 +191,11 @@ def _write(
     from railsim.contact import tables
     from railsim.contact.summary import OTHER_NORMAL
     from railsim.plot import contact as plot
+    from railsim.text import unformatted
 
     _, right = found.pairs
     names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in found.pairs)
+    title = unformatted(" / ".join(names))
     other = found.with_other_normal() if found.exact else None
     labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
     content = (
@@ -201,14 +203,14 @@ def _write(
         tables.conicity_table(found),
         tables.patch_table(found),
         plot.profiles_figure(found.geometry, found.pairs),
-        plot.functions_figure(found.geometry),
+        plot.functions_figure(found.geometry, title),
         plot.conicity_figure({" / ".join(names): (found.amplitudes, found.conicity)}),
         plot.patches_figure(found.contacts, found.load, found.exact, other, labels),
     )
     for name, one in zip((*TABLES, *PICTURES), content, strict=True):
         output.write(name, one)
     if gauges:
-        output.write(MAP[0], plot.conicity_map_figure(gauges, found.amplitudes, by_gauge))
+        output.write(MAP[0], plot.conicity_map_figure(gauges, found.amplitudes, by_gauge, title))
         output.write(MAP[1], tables.conicity_map_table(found, gauges, by_gauge))
     if compared:
         own = right.wheel if compared.kind == "wheel" else right.rail

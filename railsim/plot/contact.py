@@ -17,13 +17,23 @@ from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
 from railsim.contact.summary import Pair
-from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, key, label_grid, note, single, styled
+from railsim.plot.style import (
+    ABOVE,
+    DISTINCT,
+    SIDE_LINES,
+    Picture,
+    key,
+    label_grid,
+    note,
+    single,
+    styled,
+)
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
 
 SIDES = ("left", "right")
 WHEEL, RAIL = DISTINCT[0], "0.35"
-SIDE_COLOURS = {"left": DISTINCT[1], "right": DISTINCT[0]}
+SIDE_COLOURS = {"left": DISTINCT[0], "right": DISTINCT[1]}
 ZONE_COLOURS = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DISTINCT[1]}
 TABLE_LINES = ("-", "--")
 LIFT = 14.0  # height at which the wheel is drawn above its rail [mm]
@@ -48,7 +58,7 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
         axes.set_title(unformatted(f"{name}: {pair.wheel.name} on {pair.rail.name}"))
         if side == 0:  # within the rail's head
             look = {"fontsize": 6.5, "frame": "axes fraction"}
-            note(axes, EXPLAINED, (0.5, 0.16), (0, 0), "center", "center", **look)
+            note(axes, EXPLAINED, (0.43, 0.16), (0, 0), "center", "center", **look)
     if unique:
         _draw_smoothing(figure.add_subplot(grid[1, :]), unique)
     return figure
@@ -102,16 +112,16 @@ def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
 
 
 @styled()
-def functions_figure(geometry: ContactGeometry) -> Figure:
+def functions_figure(geometry: ContactGeometry, title: str = "") -> Figure:
     """Rolling radius difference, radii, contact angles, positions and roll over displacement."""
     y = 1e3 * geometry.lateral
-    figure = Picture(9.6, 5.4, edges=(0.06, 0.085, 0.99, 0.985, 0.24, 0.08))
+    figure = Picture(9.6, 5.4, title, (0.06, 0.085, 0.99, 0.925 if title else 0.985, 0.24, 0.08))
     axes = figure.subplots(2, 3, sharex=True)
     axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
     panels = (
         (axes[0, 1], 1e3 * geometry.rolling_radius, "rolling radius (mm)"),
         (axes[0, 2], np.degrees(geometry.contact_angle), "contact angle (deg)"),
-        (axes[1, 0], 1e3 * geometry.wheel_y, "position on the wheel (mm)"),
+        (axes[1, 0], 1e3 * geometry.wheel_y, "outwards on the wheel (mm)"),
         (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
     )
     for panel, values, label in panels:
@@ -153,6 +163,7 @@ def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
         words = unformatted(name)
         axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=words)
     axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
+    note(axes, "3 mm", (3.0, 1.0), (3, -2), "left", "top", frame=ABOVE)
     axes.set(xlabel="amplitude $\\hat y$ (mm)", ylabel="equivalent conicity $\\tan\\gamma_e$")
     axes.set_xlim(left=0.0)
     axes.set_ylim(bottom=0.0)
@@ -161,9 +172,11 @@ def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
 
 
 @styled()
-def conicity_map_figure(gauges: Sequence[float], amplitudes: Floats, values: Floats) -> Figure:
+def conicity_map_figure(
+    gauges: Sequence[float], amplitudes: Floats, values: Floats, title: str = ""
+) -> Figure:
     """Equivalent conicity, float64[gauge, amplitude], over gauge and amplitude [m]."""
-    figure, axes = single(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
+    figure, axes = single(5.6, 3.6, title, (0.11, 0.13, 0.985, 0.9 if title else 0.975))
     # the flange's slopes beyond would hide the tread's
     levels = np.linspace(0.0, 0.8, 17)
     x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes

@@ -38,7 +38,7 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     for one, values, words in (
         (axes[0, 0], 1e3 * found.attack[..., 0], "angle of attack, leading wheelset (mrad)"),
         (axes[0, 1], guiding, "guiding force Y of the leading outer wheel (kN)"),
-        (axes[1, 0], found.T_gamma.sum((-2, -1)), r"wear number $T_\gamma$ of all wheels (N)"),
+        (axes[1, 0], found.T_gamma.sum((-2, -1)), r"wear number $T\gamma$ of all wheels (N)"),
     ):
         _lines(one, found, order, values, words)
     _steering(axes[1, 1], found, order)
@@ -50,7 +50,9 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
             one.set_xscale("log")
             one.set_xticks(_ticks(radius), [f"{tick:g}" for tick in _ticks(radius)])
             one.minorticks_off()
-    axes[0, 0].legend(fontsize=7.5)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))  # how points were computed, of all curves
+    axes[0, 0].legend(once.values(), once.keys(), fontsize=7.5)
     return figure
 
 
@@ -77,8 +79,8 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
         if shown.size <= NUMBERS:
             _numbers(axes, shown, largest)
         axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "")
-        axes.set(title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
-    figure.colorbar(picture, ax=figure.axes, label=r"$T_\gamma$ (N)", fraction=0.03)
+        axes.set(title=rf"$T\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
+    figure.colorbar(picture, ax=figure.axes, label=r"$T\gamma$ (N)", fraction=0.03)
 
 
 def _numbers(axes: Axes, values: Floats, largest: float) -> None:
@@ -104,13 +106,22 @@ def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: st
             shown = np.where(found.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
             label = f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm"
             colour, line = distinct(m), styles[i % len(styles)]
-            axes.plot(radius, shown, ls=line, color=colour, marker=".", ms=4, label=label)
+            both = _parted(radius, shown)
+            axes.plot(*both, ls=line, color=colour, marker=".", ms=4, label=label)
             for code, marker in ((TIME, "o"), (MEAN, "x")):
                 those = found.converged[:, i, m][order] == code
                 how = METHODS[code] if those.any() else None
                 marked = radius[those], shown[those], marker
                 axes.plot(*marked, color=colour, ms=6, mfc="none", label=how)
     axes.set_title(words)
+
+
+def _parted(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Left-hand curves, then right-hand ones: no line joins them over a radius of zero."""
+    between = int(np.searchsorted(radius, 0.0))
+    if between in (0, len(radius)):
+        return radius, values
+    return np.insert(radius, between, np.nan), np.insert(values, between, np.nan)
 
 
 def _plan(axes: Axes, found: Curving) -> None:
@@ -136,8 +147,9 @@ def _plan(axes: Axes, found: Curving) -> None:
     # to the right is downwards
     axes.set(xlim=(np.min(x) - 2.0, np.max(x) + 2.0), ylim=(1.9, -1.9), aspect="equal")
     axes.set(xticks=[], yticks=[], anchor="W")  # room for the title of a short vehicle
+    radius = f"{found.radius[r]:g}".replace("-", "\N{MINUS SIGN}")
     axes.set_title(
-        f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
+        f"Wheelsets at R {radius} m (first deficiency and friction) from above, "
         f"running to the right; angle of attack and displacement magnified {EXAGGERATED:g} times"
     )
 
@@ -147,6 +159,7 @@ def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
         lateral = 1e3 * found.lateral[order, 0, 0, w]
-        axes.plot(found.radius[order], lateral, color=colours[name], marker=".", ms=4, label=name)
+        both = _parted(found.radius[order], lateral)
+        axes.plot(*both, color=colours[name], marker=".", ms=4, label=name)
     axes.set_title("lateral displacement (mm), first deficiency and friction")
     axes.legend(fontsize=7.5)

@@ -422,8 +422,8 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
     panels[0, 0].set_ylabel("ratio dy/dL")
     panels[0, 1].set_ylabel("force (N)")
     if zoom:
-        panels[1, 0].set_ylabel("ratio over the first's")
-        panels[1, 1].set_ylabel("force over the first's (N)")
+        panels[1, 0].set_ylabel("ratio minus the first's")
+        panels[1, 1].set_ylabel("force minus the first's (N)")
     panels[0, 0].legend(fontsize=7.5)
     return figure
 

@@ -183,6 +183,9 @@ def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Floa
     axes.plot(x[0], y[0], marker="o", color=KINDS["STR"][1], ms=4)
     axes.set(title="Plan, from the dot on, seen from above", xlabel="$X$ (m)")
     axes.set(ylabel="$Y$ (m), to the right")
+    # room for the radii: what is no data is cut off for equal scales
+    inch = max(float(np.ptp(x)) / 6.5, float(np.ptp(y)) / 1.4)
+    axes.update_datalim([(x[0], y.min() - 0.3 * inch), (x[0], y.max() + 0.3 * inch)])
     axes.margins(0.1)
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()

@@ -18,6 +18,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import InputError
 from railsim.files.sources import read_source
 from railsim.notation import QUANTITIES
+from railsim.plot.curving import _parted
 from railsim.plot.histories import STUDY, histories, widen
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
@@ -335,6 +336,28 @@ def test_track_figure_shows_everything_that_changes_along_the_track():
 def test_radii_in_the_plan_have_their_sign():
     plan = track_figure(load_track("s_curve_r150")).axes[0]
     assert [text.get_text() for text in plan.texts] == ["R 150 m", "R \N{MINUS SIGN}150 m"]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_radii_in_the_plan_stand_within_its_axes(side):
+    """Over its edge they would lie on its numbers or on the title."""
+    turned = load_track("curve_r250").model_dump(exclude_none=True)
+    for element in (*turned["plan"], *turned["cant"]):
+        element |= {k: side * element[k] for k in ("radius", "cant") if k in element}
+    figure = track_figure(railsim.Track.model_validate(turned))
+    figure.draw_without_rendering()
+    plan = figure.axes[0]
+    words, axes = plan.texts[0].get_window_extent(), plan.get_window_extent()
+    assert axes.y0 < words.y0 < words.y1 < axes.y1
+
+
+def test_no_line_joins_left_hand_curves_to_right_hand_ones():
+    """Over a radius of zero; the straight lies at both ends."""
+    radius, values = _parted(np.array([-500.0, -250.0, 250.0]), np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_array_equal(radius, [-500.0, -250.0, np.nan, 250.0])
+    np.testing.assert_array_equal(values, [1.0, 2.0, np.nan, 3.0])
+    for one_side in (np.array([250.0, 500.0]), np.array([-500.0, -250.0])):
+        np.testing.assert_array_equal(_parted(one_side, one_side), [one_side, one_side])
 
 
 def test_rail_from_a_file_is_called_by_its_name_without_its_folders():
