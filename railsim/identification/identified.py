@@ -366,7 +366,7 @@ def residual_table(record: Mapping[str, Any]) -> Table:
             Column("before", "before (% of rms in the band)", format=".1f"),
             Column("after", "after (% of rms in the band)", format=".1f"),
             Column("level", "residual over noise", format=".2f"),
-            Column("probability", "p-value, white", format=".2g"),
+            Column("probability", "p-value, white", format=".3f"),
             Column("white"),
         ],
         [{**one, "white": words[one["white"]]} for one in record["channels"]],

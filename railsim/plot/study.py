@@ -401,17 +401,19 @@ LABELS = {"Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "floor y", "body_z": "f
 def heat_strip(
     cells: Floats, shares: Mapping[tuple[str, float, str], Floats], length: float
 ) -> Figure:
-    """Draw one row for each vehicle, speed and quantity; the colour is the share of the limit.
+    """Draw one row for each vehicle, speed and quantity; red where a limit is exceeded.
 
     `cells`: begin of each along the track [m]; `length`: of each [m].
     """
-    figure = Picture(10.0, 1.2 + 0.24 * len(shares))
+    figure = Picture(10.0, 1.4 + 0.24 * len(shares))
     axes, rows = figure.subplots(), np.arange(len(shares) + 1)
     if shares:
         edges = np.append(cells, cells[-1] + length) / 1e3
         values = np.array([*shares.values()])
-        mesh = axes.pcolormesh(edges, rows, values, cmap="inferno_r", vmin=0.0, vmax=1.2)
-        figure.colorbar(mesh, ax=axes, label="share of the limit")
+        scale = matplotlib.colormaps["Blues"].with_extremes(over=LIMIT, bad="0.8")
+        mesh = axes.pcolormesh(edges, rows, values, cmap=scale, vmin=0.0, vmax=1.0)
+        figure.colorbar(mesh, ax=axes, label="share of the limit", extend="max")
+        axes.set_title("Red: above the limit; grey: no run")
     words = [
         f"{vehicle}, {3.6 * speed:.0f} km/h, {LABELS.get(q, q)}" for vehicle, speed, q in shares
     ]

@@ -31,7 +31,8 @@ CAPTIONS = {
     "differences": "Differences over the limit of their standard deviation; line: their mean.",
     "overlays": "Channels over the arc length, low-passed at 20 Hz.",
     "spectra": "Power spectral densities.",
-    "fits": "Measured, with the values of the file, and with the identified ones.",
+    "fits": "Measured, with the values of the file, and with the identified ones; means are drawn "
+    "but not compared.",
     "residuals": "Cumulative periodograms of the residuals: a straight line where they are white.",
 }
 VALIDATION = (

@@ -6,10 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 import railsim
 from railsim.cli import main
 from railsim.plot.study import heat_strip
+from railsim.plot.style import LIMIT
 from railsim.studies import assess_track as module
 from railsim.studies.assess_track import assess_track, recorded
 from railsim.studies.case import Case
@@ -133,6 +135,14 @@ def test_the_strip_of_a_single_cell_is_as_long_as_the_cell():
     shares = {("coach", 40.0, "sum_Y"): np.array([0.5])}
     axes = heat_strip(np.array([100.0]), shares, CELL).axes[0]
     assert axes.dataLim.intervalx == pytest.approx([0.1, 0.125])  # km
+
+
+def test_the_strip_is_red_where_a_limit_is_exceeded_and_nowhere_else():
+    """In darker and darker colours 1.0 looked as 0.9 and as 1.2."""
+    shares = {("coach", 40.0, "sum_Y"): np.array([0.0, 0.99, 1.01, 3.0])}
+    (mesh,) = heat_strip(np.arange(4.0), shares, 1.0).axes[0].collections
+    red = [to_hex(colour) == LIMIT for colour in mesh.to_rgba(mesh.get_array()).reshape(-1, 4)]
+    assert red == [False, False, True, True]
 
 
 def test_vehicles_that_hunt_are_said():
