@@ -158,8 +158,8 @@ def _draw(
         heading = f"{heading}: {names[0]}"
     axes.set(title=heading, ylabel=unit_label(quantity))
     axes.margins(x=0.0)
-    widen(axes, quantity)
     draw_limit(axes, quantity, [result])
+    widen(axes, quantity)
 
 
 def widen(axes: Axes, quantity: Quantity) -> None:

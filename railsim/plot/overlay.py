@@ -65,8 +65,8 @@ def overlay(
                 axes.plot(result[over], line.values * panel.quantity.scale, **look)
         held = [panel for panel in same if panel is not None]
         quantity = held[0].quantity
-        _label(axes, quantity, _heading(held, places))
         draw_limit(axes, quantity, results.values())
+        _label(axes, quantity, _heading(held, places))
         style.shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     labels = [f"{label}{ended(result)}" for label, result in results.items()]

@@ -46,6 +46,9 @@ def _view(flat: FlatVehicle, kinds: Sequence[str], view: View) -> str:
     points = [body.position for body in flat.bodies]
     points += [point for e in flat.elements for point in (e.point1, e.point2)]
     points += [corner for box in body_boxes(flat).values() for corner in box]
+    for body in flat.of_kind("wheelset"):
+        assert body.wheelset is not None  # of its kind
+        points.append((*body.position[:2], body.position[2] - max(body.wheelset.radius)))
     across, upright = (np.array([p[axis] for p in points]) for axis in view)
     x, y = across.min() - MARGIN, min(upright.min() - 0.4, -MARGIN)
     width, height = across.max() + MARGIN - x, max(upright.max(), 0.0) + 0.4 - y

@@ -66,6 +66,15 @@ def test_title_says_how_a_run_ended_early():
         assert histories(example_result(status=status)).get_suptitle().endswith(words)
 
 
+def test_a_limit_is_within_its_axes_where_the_values_are_zero():
+    """Else its words, far outside, leave no room for the axes."""
+    result = example_result(speed=3.0, gain=0.0)
+    figures = histories(result, ["dQ_over_Q0"]), overlay({"one": result}, ["dQ_over_Q0"])
+    for figure in figures:
+        low, high = figure.axes[0].get_ylim()
+        assert low < -60.0 < 0.0 < high
+
+
 @pytest.mark.parametrize("mode", ["constant", "table"])
 def test_titles_call_a_speed_that_varies_that_at_the_start(mode):
     """Of pictures, animations and the result itself."""
