@@ -66,8 +66,8 @@ GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
 NEUTRAL = 1e-3
 _NEVER = 1 << 40
 # of a map before the norms of its powers are looked at, of these, and the least norm of a square
-# that is no round-off
-_BALANCING, _SQUARINGS, _LEFT = 3, 16, 1e-20
+# that is no round-off; squarings from which on n^(1/m) is 1 within 1 %
+_BALANCING, _SQUARINGS, _LEFT, _SURE = 3, 16, 1e-20, 10
 
 
 def empty_recorder(
@@ -127,7 +127,8 @@ class Stability:
     `system`, `state`: the model on straight and level track; steady rolling there; `scheme`: key of
     `SCHEMES`; `curving`: takes a step that is stable on straight track; returns systems and settled
     states in the tightest curve: none where there is no flange contact, or one that has to have the
-    margin, and perhaps a second one for which half of it (its root) is enough.
+    margin, and perhaps a second one for which half of it (its root) is enough; `on_straight`: takes
+    a step and what judges it on straight track, and returns the judgement.
     """
 
     def __init__(
@@ -137,8 +138,10 @@ class Stability:
         state: Floats,
         scheme: str,
         curving: Callable[[float], Sequence[Situation]],
+        on_straight: Callable[[float, Callable[[], bool]], bool] = lambda _, judge: judge(),
     ) -> None:
         self._model, self._scheme, self._curving = model, scheme, curving
+        self._on_straight = on_straight
         self._straight = system, state
         self._flange: Sequence[Situation] | None = None
         self._allowed: dict[int, float] = {}
@@ -182,7 +185,7 @@ class Stability:
 
     def holds_on_straight(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable on straight track."""
-        return self._within(0, *self._straight, margin * h)
+        return self._on_straight(margin * h, lambda: self._within(0, *self._straight, margin * h))
 
     def holds(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable, in flange contact too."""
@@ -239,7 +242,8 @@ def _step_growth(
 ) -> float:
     """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails.
 
-    Where it surely is smaller than `enough`, that is returned instead.
+    Where `enough` is given, that is returned instead of what surely is smaller, and a lower bound
+    of what more than doubles a mode in each step.
     """
     if scheme == "fast" and system.support.elastic:
         system, state = _after_step(system, state, h)
@@ -267,8 +271,8 @@ def _step_growth(
     columns = _jacobian(stepped, state, _moving(system, state), 1e-6 if iterates else 1e-8)
     if not np.isfinite(columns).all():
         return np.inf
-    if enough > 0.0 and _surely_below(columns, enough * h):
-        return enough
+    if enough > 0.0 and (bound := _bound(columns, enough * h)):
+        return bound / h
     return float(np.log(np.max(np.abs(np.linalg.eigvals(columns)))) / h)
 
 
@@ -286,12 +290,13 @@ def _after_step(system: System, state: Floats, h: float) -> tuple[System, Floats
     return system._replace(contact=system.contact._replace(load=1e6 * system.contact.load)), state
 
 
-def _surely_below(matrix: Floats, limit: float) -> bool:
-    """Whether |lambda| < exp(limit) for all eigenvalues, as far as norms of powers tell.
+def _bound(matrix: Floats, limit: float) -> float:
+    """Bound of the largest ln |lambda| of all eigenvalues, as far as powers tell; 0 where not.
 
-    |lambda|^m <= ||A^m||, and squaring A takes a third of the time of its eigenvalues.  Row and
-    column k times and over a factor leave these as they are and make the norm small.  Half of the
-    limit is left for round-off: of the logarithm of a norm over m, single precision is enough.
+    `limit` where that is an upper one: |lambda|^m <= ||A^m||, and squaring A takes a third of the
+    time of its eigenvalues.  Row and column k times and over a factor leave these as they are and
+    make the norm small.  Half of the limit is left for round-off: of the logarithm of a norm over
+    m, single precision is enough.  A lower one where it is above ln 2: |tr A^m| <= n |lambda|^m.
     """
     coupled = matrix != 0.0
     np.fill_diagonal(coupled, False)
@@ -299,7 +304,7 @@ def _surely_below(matrix: Floats, limit: float) -> bool:
     while (alone := kept & ~(coupled[:, kept].any(axis=1) & coupled[kept].any(axis=0))).any():
         kept &= ~alone  # whose eigenvalues are their diagonal entries
     if np.abs(np.diag(matrix)[~kept]).max(initial=0.0) > np.exp(0.5 * limit):
-        return False
+        return 0.0
     power = matrix[np.ix_(kept, kept)]
     for _ in range(_BALANCING):
         sizes = np.abs(power)
@@ -313,11 +318,15 @@ def _surely_below(matrix: Floats, limit: float) -> bool:
             break
         logarithm += math.log(norm)
         if logarithm < 0.5 * limit * 2.0**doubled:
-            return True
+            return limit
         power = (power / norm).astype(np.float32)
+        trace = abs(float(np.trace(power))) / len(power)
+        least = (logarithm + math.log(trace)) / 2.0**doubled if trace > _LEFT else 0.0
+        if doubled >= _SURE and least > math.log(2.0):
+            return least
         power = power @ power
         logarithm *= 2.0
-    return False
+    return 0.0
 
 
 def _jacobian(

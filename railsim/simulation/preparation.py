@@ -107,7 +107,8 @@ def _balanced(
     inputs = inputs_hash(vehicle, track, settings, model)
     balance = stored_equilibrium(model, speed, inputs)
     known = {speed: balance.state}
-    how = sampled(settings), track, known, inputs, on_judgement, periods(vehicle)
+    straight = inputs_hash(vehicle, track, settings, model, straight=True)
+    how = sampled(settings), track, known, inputs, straight, on_judgement, periods(vehicle)
     return balance, StepChoice(balance.model, *how)
 
 

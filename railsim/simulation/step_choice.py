@@ -42,6 +42,7 @@ WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
 HELD, DRY = 1.6, 0.5  # z in `braked_step`; friction of dry rails
 MOST_JUDGED = 10_000
+ALIGNMENT = {"name", "source", "speed", "plan", "cant", "rounding"}  # of a track
 # whether steps hold in classes that this process has judged or read, by a hash of all inputs
 _JUDGED: dict[str, bool] = {}
 
@@ -55,9 +56,10 @@ class StepChoice:
     as well, with half of the margin.
 
     `states`: steady rolling on straight track at the speeds where it is known; `inputs`: hash of
-    all that the model was made of, friction apart, see `inputs_hash`; `progress`: called while a
-    step is judged, as in `railsim.simulation.flange.in_flange_contact`; `periods`: of controllers
-    and samples: no step is longer, and one that divides them is preferred [s].
+    all that the model was made of, friction apart, see `inputs_hash`; `on_straight`: of what counts
+    on straight track; `progress`: called while a step is judged, as in
+    `railsim.simulation.flange.in_flange_contact`; `periods`: of controllers and samples: no step is
+    longer, and one that divides them is preferred [s].
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class StepChoice:
         track: Track,
         states: dict[float, Floats],
         inputs: str,
+        on_straight: str,
         progress: Progress | None = None,
         periods: Sequence[float] = (),
     ) -> None:
@@ -74,7 +77,7 @@ class StepChoice:
         self._track = track
         self._settings = settings
         self._progress = progress
-        self._inputs = inputs
+        self._inputs, self._on_straight = inputs, on_straight
         self._periods = periods
         self._known: dict[float, float] = {}
         self._classes: dict[str, Stability] = {}
@@ -178,12 +181,7 @@ class StepChoice:
             except ModelError:  # no steady rolling there: the run's own speed is judged
                 return {"holds": False}
 
-        key = f"{end} {step!r}"
-        if key not in _JUDGED:
-            if len(_JUDGED) >= MOST_JUDGED:
-                _JUDGED.clear()
-            _JUDGED[key] = bool(solution("class", key, judgement, shared=True)["holds"])
-        return _JUDGED[key]
+        return _once("class", f"{end} {step!r}", judgement)
 
     def _stability(
         self, model: Model, speed: float, state: Floats | None, *, of_class: bool = False
@@ -208,7 +206,27 @@ class StepChoice:
                     found.append(at_rest_beside(model, at, *other))
             return found
 
-        return Stability(model, level, rolling, self._settings.scheme, curving)
+        digest = hashlib.sha256(f"{self._on_straight} {speed!r}".encode() + rolling.tobytes())
+        digest.update(level.track.rail[0, MU_LEFT : MU_RIGHT + 1].tobytes())
+
+        def on_straight(h: float, judge: Callable[[], bool]) -> bool:
+            """Judgement that tracks of other curves share."""
+            return _once(
+                "straight", f"{digest.hexdigest()} {h!r}", lambda: {"holds": bool(judge())}
+            )
+
+        shared = {"on_straight": on_straight} if of_class else {}
+        return Stability(model, level, rolling, self._settings.scheme, curving, **shared)
+
+
+def _once(kind: str, key: str, judgement: Callable[[], dict[str, bool]]) -> bool:
+    """A judgement that this process or another one has made, or that is made now."""
+    key = f"{kind} {key}"
+    if key not in _JUDGED:
+        if len(_JUDGED) >= MOST_JUDGED:
+            _JUDGED.clear()
+        _JUDGED[key] = bool(solution(kind, key, judgement, shared=True)["holds"])
+    return _JUDGED[key]
 
 
 def class_speed(speed: float) -> float:
@@ -258,13 +276,19 @@ def braked_step(system: System) -> float:
     return HELD / float(rate.max()) if len(braked) else math.inf
 
 
-def inputs_hash(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> str:
-    """Return a hash of all that a model was made of, except for the friction of its track."""
+def inputs_hash(
+    vehicle: Vehicle, track: Track, settings: Settings, model: Model, *, straight: bool = False
+) -> str:
+    """Return a hash of all that a model was made of, except for the friction of its track.
+
+    `straight`: without the alignment either, and what the track is called.
+    """
     digest = hashlib.sha256()
     apart = {"outputs"} if settings.own_creep_law or settings.own_friction else {"outputs", "laws"}
+    left_out = {"friction", "friction_table"} | (ALIGNMENT if straight else set())
     texts = (
         vehicle.to_toml(),
-        track.model_dump_json(exclude={"friction", "friction_table"}),
+        track.model_dump_json(exclude=left_out),
         settings.model_dump_json(exclude=apart),
     )
     for part in (*texts, *sorted(model.profiles)):

@@ -455,7 +455,7 @@ def test_scatter_says_which_dimension_matters(capsys):
     assert re.search(r"stroke \(mm\) +113\.6682 .* d \(", capsys.readouterr().out)
 
 
-WITHOUT_UNIT = ("ratio dy/dL", "ratio minus the first's", "rate of the driver", "objective", "start")
+WITHOUT_UNIT = ("ratio", "rate of the driver", "objective", "start")
 
 
 def unit_stated(label):
