@@ -36,8 +36,9 @@ def solved(monkeypatch):
     return calls
 
 
-def run(speed=20.0, friction=0.4, vehicle="coach_manchester"):
-    track = railsim.load_track("curve_r250").replace(friction=(friction, friction))
+def run(speed=20.0, friction=0.4, vehicle="coach_manchester", **changes):
+    track = railsim.load_track(changes.pop("track", "curve_r250"))
+    track = track.replace(friction=(friction, friction), **changes)
     return railsim.simulate(railsim.load_vehicle(vehicle), track, speed=speed, until=5.0)
 
 
@@ -49,7 +50,8 @@ def same(one, other):
 def test_later_run_is_the_first_to_the_last_bit(folder, solved):
     first = run()
     assert solved == ["equilibrium", "step"]
-    assert len(list(folder.glob("*.json"))) == 3  # and the class of the step
+    # and the class of the step, on straight track and in the curve
+    assert len(list(folder.glob("*.json"))) == 4
     assert same(first, run())
     assert solved == ["equilibrium", "step"]
 
@@ -61,6 +63,32 @@ def test_other_inputs_have_solutions_of_their_own(folder, solved, other):
     run()
     run(**other)
     assert solved == ["equilibrium", "step"] * 2
+
+
+@pytest.mark.parametrize(
+    ("other", "judged"),
+    [({"track": "curve_r500"}, 1), ({"track": "curve_r500", "friction": 0.3}, 2),
+     ({"track": "curve_r500", "support": {"preset": "rigid"}}, 2), ({"speed": 24.0}, 2)],
+)  # fmt: skip
+def test_tracks_of_other_curves_share_the_judgement_on_straight_track(
+    folder, monkeypatch, other, judged
+):
+    """And take the step that they take by themselves."""
+    asked = Counter()
+    holds = step_choice.Stability._within
+
+    def within(self, number, *how):
+        asked[number] += number == 0
+        return holds(self, number, *how)
+
+    monkeypatch.setattr(step_choice.Stability, "_within", within)
+    run()
+    found = run(**other).attributes["step"]
+    assert asked[0] == judged
+    for path in folder.glob("*.json"):
+        path.unlink()
+    monkeypatch.setattr(step_choice, "_JUDGED", {})
+    assert run(**other).attributes["step"] == found
 
 
 def test_other_program_has_solutions_of_its_own(folder, solved, monkeypatch):
