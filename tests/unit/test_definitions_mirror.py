@@ -127,6 +127,7 @@ def test_lopsided_load_changes_sides():
 PROFILE = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_left_and_right_wheel_of_a_wheelset_have_profiles_of_their_own():
     """The first one is that of the left wheel: moved to the right, it rolls on a smaller radius."""
     cones = ["cone_1in20", "cone_1in40"]
