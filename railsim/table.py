@@ -248,6 +248,21 @@ class Table:
         return text.getvalue()
 
 
+def beside(value: float, limit: float, digits: int = 0, kind: str = "f") -> str:
+    """A value beside its limit: with more digits where it would read like the limit, but is not.
+
+    Examples
+    --------
+    >>> beside(98.7, 100.0), beside(100.2, 100.0), beside(2.005, 2.0, 3, "g")
+    ('99', '100.2', '2.005')
+    """
+    for more in range(digits, digits + 4):
+        text = f"{value:.{more}{kind}}"
+        if text != f"{limit:.{more}{kind}}" or value == limit:
+            break
+    return text
+
+
 def _fitted(
     cells: Sequence[Sequence[str]], numbers: Sequence[bool], width: int
 ) -> tuple[int, list[int]]:
@@ -302,18 +317,3 @@ def _plain(cell: Any) -> Any:
     value = cell.value if isinstance(cell, Amount) else cell
     value = value.item() if hasattr(value, "item") else value  # numbers of numpy
     return None if isinstance(value, float) and not isfinite(value) else value
-
-
-def beside(value: float, limit: float, digits: int = 0, kind: str = "f") -> str:
-    """A value beside its limit: with more digits where it would read like the limit, but is not.
-
-    Examples
-    --------
-    >>> beside(98.7, 100.0), beside(100.2, 100.0), beside(2.005, 2.0, 3, "g")
-    ('99', '100.2', '2.005')
-    """
-    for more in range(digits, digits + 4):
-        text = f"{value:.{more}{kind}}"
-        if text != f"{limit:.{more}{kind}}" or value == limit:
-            break
-    return text
