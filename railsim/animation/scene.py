@@ -109,9 +109,9 @@ def result_scene(
     poses = _poses(result, rows)
     wheelsets = [result.bodies.index(name) for name in result.wheelsets]
     profiles = sections(result, flat)
-    ended = "" if result.status == "complete" else f" · {result.status}"
     return Scene(
-        title=f"{vehicle.name} · {result.track().name} · {result.speed_words}{ended}", bodies=drawn,
+        title=f"{vehicle.name} · {result.track().name} · {result.speed_words}{result.end_words}",
+        bodies=drawn,
         time=result["time"][rows], distance=distance[rows], pose=poses[:, columns],
         track=_track(Alignment(result.track()), distance[rows]), Q=result["Q"][rows],
         Y=result["Y"][rows], contact=contact_points(result, rows, profiles), sections=profiles,

@@ -11,14 +11,9 @@ LEAST = LEAST_RATE["zero"] * record.WIDE_ENOUGH
 """Least rate of values that standards filter, where coarse ones are accepted [1/s]."""
 
 
-def output_rate(settings: Settings, speed: float) -> float:
-    """Rate of the output at a constant speed [1/s]."""
-    return speed / settings.output_spacing if settings.output_spacing else settings.output_rate
-
-
 def coarse_remarks(settings: Settings, speed: float) -> tuple[str, ...]:
     """Say in what the values of a run are too coarse to be judged, if they are."""
-    words, loss = record.coarseness(settings, output_rate(settings, speed))
+    words, loss = record.coarseness(settings, 1.0 / settings.output_interval(speed))
     return (f"{words}: {loss}",) if words else ()
 
 
@@ -39,7 +34,7 @@ def check_outputs(
         if lacking := [name for name in names if not matches(name, kept)]:
             found = f"without {', '.join(lacking)}"
             faults.append(Fault("settings", "outputs.quantities", found, allowed))
-    rate = output_rate(settings, speed)
+    rate = 1.0 / settings.output_interval(speed)
     words, _ = record.coarseness(settings, rate)
     key = "output_rate" if settings.output_spacing is None else "output_spacing"
     key = key if outputs.low_pass is None else "outputs.low_pass.frequency"

@@ -184,6 +184,10 @@ class Settings(FileDefinition):
     initial: dict[str, InitialState] = EMPTY_TABLE
     """Disturbance at the start by the body's full name"""
 
+    def output_interval(self, speed: float) -> float:
+        """Time between two outputs at a speed [s]."""
+        return self.output_spacing / speed if self.output_spacing else 1.0 / self.output_rate
+
     def in_steady_rolling(self) -> Self:
         """Return the settings of analyses whose creep forces are those of steady rolling."""
         return self.model_copy(update={"transient_creep": False})

@@ -115,12 +115,7 @@ def _figure(
 def title(result: Result) -> str:
     """Return what a figure of a result is called: vehicle, track, speed, and an early end."""
     names = unformatted(result.vehicle().name), unformatted(result.track().name)
-    return f"{names[0]}\n{names[1]} · {result.speed_words}{ended(result)}"
-
-
-def ended(result: Result) -> str:
-    """Return how a run ended, to follow its name; nothing of one that is complete."""
-    return "" if result.status == "complete" else f" · {result.status}"
+    return f"{names[0]}\n{names[1]} · {result.speed_words}{result.end_words}"
 
 
 def _draw(

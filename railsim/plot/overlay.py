@@ -15,7 +15,6 @@ from railsim.plot.histories import (
     capitalised,
     check_not_empty,
     draw_limit,
-    ended,
     short_names,
     unit_label,
     widen,
@@ -69,7 +68,7 @@ def overlay(
         _label(axes, quantity, _heading(held, places))
         style.shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
-    labels = [f"{label}{ended(result)}" for label, result in results.items()]
+    labels = [f"{label}{result.end_words}" for label, result in results.items()]
     _legend(figure, labels, {line.labels.get("side") for line in lines}, 0)
     return figure
 

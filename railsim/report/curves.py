@@ -17,7 +17,6 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.track.layout import curvature_sections
 from railsim.notation import plain_symbol
-from railsim.plot.histories import ended
 from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result
 from railsim.text import printable
@@ -70,7 +69,7 @@ def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
     return {
         "track": printable(group.track),
         "axis": "Distance along the track s (m)" if over == "distance" else "Time t (s)",
-        "runs": [printable(f"{name}{ended(result)}") for name, result in results.items()],
+        "runs": [printable(f"{name}{result.end_words}") for name, result in results.items()],
         "wheelsets": [printable(name) for name in wheelsets], "low": low, "high": high,
         "cells": cells, "sections": _sections(first) if over == "distance" else [],
         "quantities": [quantity for quantity in quantities if quantity],

@@ -20,7 +20,6 @@ from railsim.errors import listed
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
 from railsim.plot.assessment import assessment_figure
-from railsim.plot.histories import ended
 from railsim.report import document as doc
 from railsim.report import spread
 from railsim.report.curves import cells_of, curve_data, groups
@@ -150,7 +149,7 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> doc.Sect
             where += f"{peak.get('side', '')} at {peak['distance']:.1f} m"
             row.append((quantity.text(peak["value"]), where))
     table = doc.Table(
-        ["", *(printable(f"{r['name']}{ended(results[r['name']])}") for r in shown)],
+        ["", *(printable(f"{r['name']}{results[r['name']].end_words}") for r in shown)],
         [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
     )
     # results with a low pass hold the peaks of their outputs alone

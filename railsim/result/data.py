@@ -147,6 +147,11 @@ class Result:
         start = " at the start" if varies else ""
         return f"{self.speed:.6g} m/s ({3.6 * self.speed:.4g} km/h){start}"
 
+    @property
+    def end_words(self) -> str:
+        """How the run ended, to follow its name; nothing where it is complete."""
+        return "" if self.status == "complete" else f" · {self.status}"
+
     def __repr__(self) -> str:
         steps = self["time"].shape[0] if "time" in self else 0
         parts = [self.title, self.status, f"{steps} instants", f"{len(self._arrays)} quantities"]

@@ -20,7 +20,7 @@ from railsim.model.assembly import check_fixed
 from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.simulation.sampling import sampled
-from railsim.simulation.step_choice import WRITTEN, output_interval
+from railsim.simulation.step_choice import WRITTEN
 from railsim.text import shortened
 from railsim.units import speed_in_si
 
@@ -152,7 +152,7 @@ def check_agreement(
                 key = "outputs.elements" if where else "outputs.quantities"
                 found = f"no {word} is called '{pattern}'{where}"
                 faults.append(Fault("settings", key, found, nearest(pattern, names)))
-    interval = output_interval(sampled(settings), speed)
+    interval = sampled(settings).output_interval(speed)
     if settings.step is not None and settings.drive.mode == "constant":
         count = max(1, round(interval / settings.step))
         if abs(count * settings.step - interval) > WRITTEN * interval:

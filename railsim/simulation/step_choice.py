@@ -88,7 +88,7 @@ class StepChoice:
 
     def at(self, speed: float, rate: float = 0.0) -> tuple[float, int]:
         """Step [s] at `speed`, which changes at `rate`, and number of steps to the next output."""
-        interval = output_interval(self._settings, speed)
+        interval = self._settings.output_interval(speed)
         if self._settings.output_spacing is not None:
             interval = duration(self._settings.output_spacing, speed, rate)
         key = class_speed(speed) if self.varies else speed
@@ -302,10 +302,3 @@ def duration(distance: float, speed: float, rate: float) -> float:
     """Time to cover `distance` at a speed that changes at `rate` [s]; without it if that stops."""
     square = speed**2 + 2.0 * rate * distance
     return 2.0 * distance / (speed + math.sqrt(square)) if square > 0.0 else distance / speed
-
-
-def output_interval(settings: Settings, speed: float) -> float:
-    """Time between two outputs [s]."""
-    if settings.output_spacing is not None:
-        return settings.output_spacing / speed
-    return 1.0 / settings.output_rate

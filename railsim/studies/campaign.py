@@ -89,8 +89,9 @@ def campaign(
             check_parts(plan, str(scenario), assignments)
         with faults.caught():
             cases = scenario_cases(plan, names, assignments)
-        with faults.caught():
-            _check_outputs(cases, plan.standard)
+        for case in cases:
+            with faults.caught(_as_assigned):
+                check_outputs(case.vehicle, case.settings, case.speed, plan.standard)
         Faults(dict.fromkeys(faults)).check()
     spec = StudySpec(
         folder=os.path.relpath(Path.cwd(), folder),
@@ -112,18 +113,11 @@ def campaign(
     return Campaign(folder, tuple(assessments), results, outcome.computed)
 
 
-def _check_outputs(cases: Sequence[Case], standard: str) -> None:
-    """Raise InputError: what the assessment would refuse, in settings by assignments alone."""
-    faults = Faults()
-    for case in cases:
-        with faults.caught():
-            check_outputs(case.vehicle, case.settings, case.speed, standard)
-    Faults(
-        replace(one, file="assignments", key=f"settings.{one.key}", option="--set")
-        if one.file == "settings"
-        else one
-        for one in faults
-    ).check()
+def _as_assigned(fault: Fault) -> Fault:
+    """A fault of settings, which a scenario has by assignments alone."""
+    if fault.file != "settings":
+        return fault
+    return replace(fault, file="assignments", key=f"settings.{fault.key}", option="--set")
 
 
 def scenario_cases(

@@ -343,14 +343,14 @@ def _check_steps(cases: Sequence[Case]) -> None:
     for (*of, _), case in sorted(longest.items(), key=lambda one: -(one[1].settings.step or 0.0)):
         if tuple(of) in stable:
             continue  # with a longer step
-        try:
+
+        def told(fault: Fault, name: str = case.name) -> Fault:
+            return replace(fault, file="study", key=f"{name}, settings.{fault.key}")
+
+        with faults.caught(told), suppress(ModelError):  # the outcome of the run
             check_step(case.vehicle, case.track, case.settings, case.speed)
             stable.add(tuple(of))
-        except ModelError:
-            continue  # the outcome of the run
-        except InputError as error:
-            faults += [replace(one, key=f"{case.name}, settings.{one.key}") for one in error.faults]
-    Faults(replace(one, file="study") for one in faults).check()
+    faults.check()
 
 
 def _moved_aside(path: Path) -> Path:

@@ -197,10 +197,11 @@ class Loader:
             if isinstance(analysis, AssessAnalysis):
                 from railsim.assessment.outputs import check_outputs
 
-                own = Faults()
-                with own.caught():
+                def told(fault: Fault, name: str = name) -> Fault:
+                    return replace(fault, found=f"{fault.found}, for analyses.{name}")
+
+                with found.caught(told):
                     check_outputs(vehicle, settings, speed, analysis.standard, coarse=True)
-                found += [replace(one, found=f"{one.found}, for analyses.{name}") for one in own]
         return [self._of_settings(fault, run) for fault in found]
 
     def _of_settings(self, fault: Fault, run: RunSpec) -> Fault:

@@ -143,12 +143,16 @@ class Called(Unit, Slave):
     """A unit without a program that calls it."""
 
 
+def unpacked(path, folder):
+    with zipfile.ZipFile(path) as packed:
+        packed.extractall(folder)
+    Called.resources = str(folder / "resources")
+    return Called()
+
+
 def test_steps_of_communication_may_be_a_little_longer_than_those_of_the_run(unit, tmp_path):
     """By less than a thousandth of one, in which a step of the run is not divided."""
-    with zipfile.ZipFile(unit) as packed:
-        packed.extractall(tmp_path)
-    Called.resources = str(tmp_path / "resources")
-    called = Called()
+    called = unpacked(unit, tmp_path)
     called.exit_initialization_mode()
     step = 1.0003 * called._run.step_length
     for k in range(20):
@@ -162,10 +166,7 @@ def test_steps_of_communication_may_be_a_little_longer_than_those_of_the_run(uni
 
 def test_a_step_beyond_the_end_ends_with_the_run_at_the_time_of_the_program(unit, tmp_path):
     """30 m at 20 m/s, from 3 s on; what the program asks for later is an error."""
-    with zipfile.ZipFile(unit) as packed:
-        packed.extractall(tmp_path)
-    Called.resources = str(tmp_path / "resources")
-    called = Called()
+    called = unpacked(unit, tmp_path)
     called.exit_initialization_mode()
     last = called.do_step(3.0, 5.0)
     assert last.terminateSimulation
@@ -205,10 +206,7 @@ def test_quantities_of_ones_own_are_outputs_whatever_their_unit(active, track, t
     outputs, path = ["double", "Q:1:left"], tmp_path / "own.fmu"
     fmu(active, track, path, outputs=outputs, settings=settings, allow_code=True, **WAY)
     assert not validate_fmu(str(path))
-    with zipfile.ZipFile(path) as packed:
-        packed.extractall(tmp_path)
-    Called.resources = str(tmp_path / "resources")
-    called = Called()
+    called = unpacked(path, tmp_path)
     called.exit_initialization_mode()
     twice, once = called._values.values()
     assert twice == pytest.approx(2.0 * once)
