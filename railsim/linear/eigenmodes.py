@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eig
+from scipy.linalg import eig, eigvals
 from scipy.optimize import brentq, linear_sum_assignment, minimize_scalar
 
 from railsim.arrays import Complexes, Floats, Indices
@@ -188,15 +188,22 @@ def loss_of_stability(
     that is undamped counts; by default all do; `points`: least number of values of the parameter at
     which the range is looked through.
     """
-    known: dict[float, Eigenmodes] = {}
+    known: dict[float, float] = {}
+
+    def modes(parameter: float) -> Eigenmodes:
+        return _least_damped(eigenmodes(at(parameter)), counts)
 
     def growth(parameter: float) -> float:
         if parameter not in known:
-            known[parameter] = _least_damped(eigenmodes(at(parameter)), counts)
-        return float(known[parameter].eigenvalues[0].real)
+            # half of the time without vectors, by which modes are told apart where one is undamped
+            values = np.asarray(eigvals(at(parameter).matrix), dtype=complex)
+            known[parameter] = float(np.max(values[_searched(values)].real))
+            if counts is not None and known[parameter] >= 0.0:
+                known[parameter] = float(modes(parameter).eigenvalues[0].real)
+        return known[parameter]
 
     if growth(low) >= 0.0:
-        return LossOfStability(None, True, (known[low],))
+        return LossOfStability(None, True, (modes(low),))
     before = passed = low
     while passed < high:
         after = min(high, passed + min((high - low) / (points - 1), STEP * passed))
@@ -207,10 +214,9 @@ def loss_of_stability(
         if unstable is not None:
             stable = passed if unstable > passed else before
             root = float(brentq(growth, stable, unstable, xtol=1e-7 * high, rtol=1e-12))
-            growth(root)
-            return LossOfStability(root, False, (known[root],))
+            return LossOfStability(root, False, (modes(root),))
         before, passed = passed, after
-    return LossOfStability(None, False, (known[low], known[high]))
+    return LossOfStability(None, False, (modes(low), modes(high)))
 
 
 def _beyond_zero(
@@ -238,12 +244,16 @@ def _least_damped(
 
     Where no mode counts, the least damped of those that decay.
     """
-    frequency = modes.frequencies
-    inside = np.flatnonzero((frequency >= SEARCHED[0]) & (frequency <= SEARCHED[1]))
-    if len(inside) == 0:
-        inside = np.arange(len(frequency))
+    inside = _searched(modes.eigenvalues)
     order = inside[np.argsort(-modes.eigenvalues[inside].real)]
     ordered = [modes.taken([int(k)]) for k in order]
     if counts is not None:
         ordered = [m for m in ordered if m.eigenvalues[0].real < 0.0 or counts(m)] or ordered
     return ordered[0]
+
+
+def _searched(eigenvalues: Complexes) -> Indices:
+    """Indices of the oscillations in `SEARCHED`; of all where there is none."""
+    frequency = eigenvalues.imag / (2.0 * np.pi)
+    inside = np.flatnonzero((frequency >= SEARCHED[0]) & (frequency <= SEARCHED[1]))
+    return inside if len(inside) else np.arange(len(eigenvalues))
