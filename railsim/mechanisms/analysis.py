@@ -1,6 +1,6 @@
 """Everything that a mechanism file asks for, computed: `analyse` is where to begin reading."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,7 @@ from railsim.errors import argument_error, nearest
 from railsim.mechanisms.cams import Transition, transitions
 from railsim.mechanisms.contact import Contact, Rest, contact_of, positions_of_rest
 from railsim.mechanisms.dynamics import FreeMotion, TimedMotion, driven_motion, free_motion
-from railsim.mechanisms.forces import Rates, generalised_force, reactions
+from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, reactions
 from railsim.mechanisms.inversion import largest, zeros
 from railsim.mechanisms.kinematics import Motion, check_freedom, driver_words, folded, solve
 from railsim.mechanisms.model import Model, build
@@ -102,16 +102,20 @@ class Analysis:
     def extremes(self, name: str, of: Callable[[Any], Any] = np.asarray) -> Extremes:
         """Least and largest value of a result, also between the positions of `output`."""
         if name not in self.known:
-            motion, values = self.motion, self.output[name]
-            if len(motion.s) < DENSE:
-                motion = solve(self.model, np.linspace(self.model.start, self.model.end, DENSE))
-                values = outputs(motion)[name]
+            motion, values = self._dense(name)
             ends = [
                 largest(motion, lambda m, k=k: k * of(outputs(m)[name]), k * of(values))  # type: ignore[misc]
                 for k in (-1.0, 1.0)
             ]
             self.known[name] = Extremes(-ends[0][1], ends[0][0], ends[1][1], ends[1][0])
         return self.known[name]
+
+    def _dense(self, name: str) -> tuple[Motion, Floats]:
+        """Positions from which a result is looked up in between, with its values there."""
+        if len(self.motion.s) >= DENSE:
+            return self.motion, self.output[name]
+        motion = solve(self.model, np.linspace(self.model.start, self.model.end, DENSE))
+        return motion, outputs(motion)[name]
 
     def at(self, quantity: str, value: float) -> dict[str, float]:
         """All results at the first position where one of them has a value; see `everywhere`."""
@@ -134,11 +138,12 @@ class Analysis:
         InputError
             There is no such result, or it never has this value.
         """
-        known = self.result(quantity)
+        self.result(quantity)
+        dense, known = self._dense(quantity)
         low, high = np.nanmin(known), np.nanmax(known)
         level = (known[1:] == value) & (known[:-1] == value)
-        s = zeros(self.motion, lambda motion: outputs(motion)[quantity] - value)
-        s = [x for x in s if x not in self.motion.s[1:][level]] or [self.model.start]
+        s = zeros(dense, lambda motion: outputs(motion)[quantity] - value)
+        s = [x for x in s if x not in dense.s[1:][level]] or [self.model.start]
         results = outputs(solve(self.model, s))
         # where it jumps over the value it does not have it
         near = 1e-6 * max(high - low, abs(value))
@@ -182,7 +187,7 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     in_zone = outputs(solve(model, list(at_zone.values()))) if at_zone else {}
     zone = {n: {k: float(v[i]) for k, v in in_zone.items()} for i, n in enumerate(at_zone)}
     timed = driven_motion(dense) if definition.motion is not None else None
-    forces = _force_zeros(dense), positions_of_rest(dense), _reactions(motion, output)
+    forces = _force_zeros(dense), positions_of_rest(dense), _reactions(motion, dense)
     found = *forces, transitions(dense), contact_of(dense, motion, at_zone), timed, _release(model)
     return Analysis(definition, model, motion, output, zone, *found, case)
 
@@ -196,18 +201,24 @@ def _force_zeros(dense: Motion) -> tuple[float, ...]:
     return tuple(zeros(dense, lambda m: generalised_force(m, rates)))
 
 
-def _reactions(motion: Motion, output: Mapping[str, Any]) -> dict[str, Reaction]:
-    definition = motion.model.definition
-    forces = {} if definition.solve is None else {definition.solve.unknown: output["force"]}
-    joints, _ = reactions(motion, forces, Rates(friction=motion.model.sense))
-    found = {}
-    for name, rows in joints.items():
+def _reactions(motion: Motion, dense: Motion) -> dict[str, Reaction]:
+    definition, found = motion.model.definition, {}
+    rows = _multipliers(motion)
+    everywhere, whole = (rows, motion) if len(motion.s) >= DENSE else (_multipliers(dense), dense)
+    for name, known in everywhere.items():
         # the second row of a prismatic joint is a torque
-        sized = rows[:, :1] if hasattr(definition.joints[name], "prismatic") else rows
+        sized = known[:, :1] if hasattr(definition.joints[name], "prismatic") else known
         size = np.sqrt(np.sum(sized**2, axis=1))
         k = int(np.argmax(size))
-        found[name] = Reaction(float(size[k]), float(motion.s[k]), rows)
+        found[name] = Reaction(float(size[k]), float(whole.s[k]), rows[name])
     return found
+
+
+def _multipliers(motion: Motion) -> dict[str, Any]:
+    """Reactions of all joints while the mechanism is held, with friction of the way on."""
+    held, rates = motion.model.definition.solve, Rates(friction=motion.model.sense)
+    force = {} if held is None else {held.unknown: actuator_force(motion, held.unknown, rates)}
+    return reactions(motion, force, rates)[0]
 
 
 def _release(model: Model) -> FreeMotion | None:

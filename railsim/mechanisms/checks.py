@@ -13,6 +13,7 @@ from railsim.mechanisms.forces import chamber_area, unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion
 from railsim.mechanisms.outputs import actuator_of
+from railsim.mechanisms.quantities import quantity
 
 
 def checks(result: Analysis) -> list[Check]:
@@ -69,7 +70,8 @@ def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:
             yield Check("available_pull", max(-least, 0.0), available, "below", "N", note)
     elif wanted is not None:
         note = "largest amount of the force"
-        yield Check("available_force", result.peak_force, most_wanted, "below", "N", note)
+        unit = quantity("force", result.definition).unit
+        yield Check("available_force", result.peak_force, most_wanted, "below", unit, note)
     if isinstance(unknown, AirSpring) and unknown.supply_pressure is not None:
         found = [result.extremes(k) for k in ("pressure", "pressure_back") if k in result.output]
         limit, note = n(unknown.supply_pressure), "largest pressure that is needed"

@@ -31,12 +31,11 @@ def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
     guess = np.full(len(wanted), np.nan)
     for i, value in enumerate(wanted):
         gap = known - value
-        if abs(gap[0]) <= 1e-12 * size or abs(gap[-1]) <= 1e-12 * size:
-            end = 0 if abs(gap[0]) <= abs(gap[-1]) else -1
-            low[i] = high[i] = guess[i] = motion.s[end]
-            continue
         crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
-        if len(crossed):
+        begins, ends = np.abs(gap[[0, -1]]) <= 1e-12 * size
+        if begins or (ends and not np.any(crossed < len(gap) - 2)):
+            low[i] = high[i] = guess[i] = motion.s[0 if begins else -1]
+        elif len(crossed):
             k = crossed[0]
             low[i], high[i] = motion.s[k], motion.s[k + 1]
             share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.5

@@ -74,9 +74,9 @@ def published_table(result: Analysis) -> Table:
     """Return results that the source prints, beside the computed ones."""
     rows = []
     for name, both in published_data(result).items():
-        unit = "N" if name.endswith("force") else "rad" if name in result.min_angles else "m"
-        if name == "travel":
-            unit = quantity("travel", result.definition).si_unit
+        unit = "rad" if name in result.min_angles else "m"
+        if name in ("travel", "max_force", "min_force"):
+            unit = quantity(name.rpartition("_")[2], result.definition).si_unit
         cells = [shown(both[key], unit, 8) for key in ("published", "ours")]
         rows.append([name, *cells, both["ours"] / both["published"] - 1.0])
     numbers = [Column("published", format=">"), Column("computed", format=">")]

@@ -16,6 +16,7 @@ from railsim.mechanisms.forces import Rates, generalised_force, unit_work
 from railsim.mechanisms.kinematics import derivative, solve, tangents
 from railsim.mechanisms.model import build
 from railsim.mechanisms.outputs import length_points, zone_drivers
+from railsim.mechanisms.quantities import force_unit
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ def sensitivities(
         work = unit_work(motion, definition.actuators[definition.solve.unknown])
         force = -generalised_force(motion, Rates(friction=model.sense)) / work
         for i, label in enumerate(at):
-            add(f"force_{label}", "N", force[:, i])
+            unit = force_unit(definition.solve.unknown, definition)
+            add(f"force_{label}", unit, force[:, i])
     return found
 
 

@@ -14,7 +14,7 @@ from railsim.mechanisms.dynamics import free_motion
 from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
-from railsim.mechanisms.tables import sentences
+from railsim.mechanisms.tables import published_table, sentences
 from railsim.mechanisms.tolerance import scatter
 
 G = 9.81
@@ -358,3 +358,38 @@ def test_temperature_of_a_gas_spring_is_held_against_the_nearer_end(temperature,
     check = by_name(analyse(load_mechanism("tilting_one_spring", changed)))["front_temperature"]
     assert check.limit == end
     assert check.ok == (-30.0 <= temperature <= 80.0)
+
+
+def test_few_positions_hide_neither_a_height_nor_a_reaction(arm):
+    """Pushed square at its tip, where its weight is, the arm bears m g sin(angle) at its hinge."""
+    result = analyse(
+        arm('push = "arm.tip"\nangle = "pi / 2"', 0.0, 2.2, more="\n[sampling]\npoints = 3\n")
+    )
+    found = [row["travel"] for row in result.everywhere("height", 0.99)]
+    assert found == pytest.approx([np.arcsin(0.99), np.pi - np.arcsin(0.99)])
+    assert result.reactions["hinge"].max == pytest.approx(100.0 * G, rel=1e-5)
+    assert result.reactions["hinge"].at == pytest.approx(0.5 * np.pi, abs=3e-3)
+    assert len(result.reactions["hinge"].components) == 3
+
+
+def test_a_height_of_the_end_that_is_met_before_counts_there(arm):
+    high = "\n[zone]\nlow = 0.2\nwork = 0.5\nhigh = 'sin(end)'\n"
+    result = analyse(arm(TORQUE, 0.0, 2.2, more=high))
+    assert result.zone["high"]["travel"] == pytest.approx(np.pi - 2.2, abs=1e-9)
+
+
+def test_a_torque_by_hand_is_shown_in_newton_metres(arm):
+    more = """
+[published]
+max_force = 981.0
+[optimise]
+objective = "peak_force"
+range = "travel"
+available_force = 900.0
+[optimise.bounds]
+mass = [50.0, 150.0]
+"""
+    result = analyse(arm(TORQUE, 0.0, more=more))
+    assert by_name(result)["available_force"].unit == "N m"
+    assert {one.unit for one in scatter(result.definition)} == {"N m"}
+    assert "981 N m" in str(published_table(result))
