@@ -11,9 +11,11 @@ from railsim.arrays import Floats
 from railsim.definitions.mechanism.expressions import Expression
 from railsim.definitions.mechanism.parts import AUTO
 from railsim.mechanisms import forces
-from railsim.mechanisms.inversion import zeros
+from railsim.mechanisms.inversion import largest, zeros
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.outputs import height_of
+
+IN_ZONE = 101  # positions from which the smallest contact force in the zone is looked for
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Contact:
     force: Mapping[str, float]  # at low, work and high height without friction
     rising: Mapping[str, float]  # the same with friction, output on its way from start to end
     falling: Mapping[str, float]  # and back
+    least: float  # the smallest in the whole zone, with friction either way
     curve: Floats  # at all positions, without friction
     bounds: tuple[Floats, Floats]  # the same with friction, rising and falling
     rests: tuple[Rest, ...]  # where the mechanism rests without a contact force
@@ -144,7 +147,11 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     ways = (0, 1, -1)
     zone, up, down = (dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in ways)
     curve, rising, falling = (force(motion, way) for way in ways)
+    whole = solve(dense.model, np.linspace(at_zone["low"], at_zone["high"], IN_ZONE))
+    ends = [largest(whole, lambda m, k=k: -force(m, k), -force(whole, k))[1] for k in ways[1:]]  # type: ignore[misc]
+    least = float(np.min([*up.values(), *down.values(), -max(ends)]))
     missing = not np.all(np.isfinite([*curve, *zone.values()]))
     reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
     heights = tuple((float(min(y)), float(max(y))) for y in edges)
-    return Contact(pressure, zone, up, down, curve, (rising, falling), found, heights, reason)
+    bounds = rising, falling
+    return Contact(pressure, zone, up, down, least, curve, bounds, found, heights, reason)

@@ -393,3 +393,33 @@ mass = [50.0, 150.0]
     assert by_name(result)["available_force"].unit == "N m"
     assert {one.unit for one in scatter(result.definition)} == {"N m"}
     assert "981 N m" in str(published_table(result))
+
+
+def test_the_contact_force_counts_everywhere_in_the_zone(arm):
+    """A spring pulls the arm down between work height and the zone's upper end only."""
+    more = """
+[zone]
+low = 0.5
+work = 0.6
+high = 0.9
+[contact]
+force = 100.0
+[elements.catch]
+torsion_spring = ["arm", "ground"]
+table = [[0.0, 0.0], [0.7, 0.0], [0.8, -400.0], [0.9, 0.0], [2.0, 0.0]]
+"""
+    result = analyse(arm(CYLINDER.format(acts="push"), 0.0, 1.2, friction=5.0, more=more))
+    angle = np.linspace(np.arcsin(0.5), np.arcsin(0.9), 20001)
+
+    def held(angle):
+        """Torque of the cylinder for each newton."""
+        x, y = 0.3 * np.cos(angle) - 0.5, 0.3 * np.sin(angle) + 0.2
+        return (-0.3 * np.sin(angle) * x + 0.3 * np.cos(angle) * y) / np.hypot(x, y)
+
+    weight, work = 100.0 * G * np.cos(angle), np.arcsin(0.6)
+    push = (100.0 * G + 100.0) * np.cos(work) / held(work)
+    catch = np.interp(angle, [0.7, 0.8, 0.9], [0.0, 400.0, 0.0])
+    contact = (push * held(angle) - weight - catch - 5.0) / np.cos(angle)
+    assert contact[[0, -1]].min() > 0.0 > contact.min()
+    found = by_name(result)["contact_force"]
+    assert (found.value, found.ok) == (pytest.approx(contact.min(), abs=0.2), False)
