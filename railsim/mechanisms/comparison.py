@@ -8,11 +8,11 @@ import numpy as np
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.kinematics import solve
-from railsim.mechanisms.outputs import equal_lengths, length_points
+from railsim.mechanisms.outputs import equal_lengths, length_points, outputs
 from railsim.mechanisms.targets import Positions, follow_error
 
 POINTS = 215
-"""Positions in the zone at which ratios are compared, in equal steps of the reference's length."""
+"""Positions in the zone: ratios in equal steps of the reference's length, forces of the travel."""
 
 
 def compare(results: Sequence[Analysis]) -> list[dict[str, Any]]:
@@ -35,9 +35,10 @@ def compare(results: Sequence[Analysis]) -> list[dict[str, Any]]:
             "min_angle": min(limited, default=np.nan),
         }  # fmt: skip
         if result.zone and "force" in result.zone["work"]:
-            forces = [result.zone[k]["force"] for k in ("low", "work", "high")]
-            row["work_force"] = forces[1]
-            row["zone_spread"] = (max(forces) - min(forces)) / float(np.mean(forces))
+            row["work_force"] = result.zone["work"]["force"]
+            s = np.linspace(*(result.zone[k]["travel"] for k in ("low", "high")), POINTS)
+            forces = outputs(solve(result.model, s))["force"]
+            row["zone_spread"] = float(np.ptp(forces) / np.mean(forces))
         rows.append({**row, "error": _error(result, reference)})
     return rows
 

@@ -143,6 +143,8 @@ def test_several_files_are_compared_with_the_first(capsys):
     assert [row["name"] for row in data["comparison"]] == ["ATR95 lift 5", "ATR95 lift 2"]
     assert data["comparison"][0]["error"] == pytest.approx(0.0, abs=1e-20)
     assert data["comparison"][1]["error"] == pytest.approx(0.2823, rel=5e-3)
+    # A23: of the whole zone, not of its three heights alone
+    assert data["comparison"][0]["zone_spread"] == pytest.approx(0.1041, abs=5e-5)
 
 
 @pytest.mark.parametrize("by", ["travel", "length", "time"])
