@@ -11,7 +11,7 @@ from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.components import lid_force, next_size
 from railsim.mechanisms.forces import chamber_area, unit_work
 from railsim.mechanisms.inversion import largest
-from railsim.mechanisms.kinematics import Motion
+from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.outputs import actuator_of
 from railsim.mechanisms.quantities import quantity
 
@@ -161,6 +161,6 @@ def _gas_spring(result: Analysis, name: str, spring: GasSpring) -> Iterator[Chec
 def rod_drop(result: Analysis, name: str) -> float:
     """Height of a gas spring's second end over its first where it is most compressed [m]."""
     pair = points_of(result.definition.elements[name])
-    k = int(np.argmin(result.output[f"{name}_length"]))
-    first, second = (result.motion.point(point)[0][k, 1] for point in pair)
+    motion = solve(result.model, [result.extremes(f"{name}_length").least_at])
+    first, second = (motion.point(point)[0][0, 1] for point in pair)
     return float(second - first)

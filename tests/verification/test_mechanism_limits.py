@@ -372,6 +372,23 @@ def test_few_positions_hide_neither_a_height_nor_a_reaction(arm):
     assert len(result.reactions["hinge"].components) == 3
 
 
+def test_few_positions_do_not_hide_where_a_gas_spring_is_compressed_most(arm):
+    """Its ends and the hinge are in line there."""
+    more = """
+[sampling]
+points = 3
+[elements.gas]
+gas_spring = ["ground.foot", "arm.pin"]
+F1 = 100.0
+progression = 1.3
+stroke = 0.7
+extended = 0.9
+rod_end = "arm.pin"
+"""
+    found = by_name(analyse(arm(TORQUE, -1.0, 2.2, more=more)))["gas_rod_down"]
+    assert found.value == pytest.approx(-0.2 * (1.0 - 0.3 / np.hypot(0.5, 0.2)), rel=1e-5)
+
+
 def test_a_height_of_the_end_that_is_met_before_counts_there(arm):
     high = "\n[zone]\nlow = 0.2\nwork = 0.5\nhigh = 'sin(end)'\n"
     result = analyse(arm(TORQUE, 0.0, 2.2, more=high))
