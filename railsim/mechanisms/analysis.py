@@ -71,7 +71,7 @@ class Analysis:
 
     @property
     def stroke(self) -> float:
-        """Range of the actuator's length; of the driver where there is no such actuator [m]."""
+        """Range of the actuator's length, NaN where there is no such actuator [m]."""
         if "length" not in self.output:
             return np.nan
         length = self.extremes("length")

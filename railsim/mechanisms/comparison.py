@@ -7,7 +7,7 @@ import numpy as np
 
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.outputs import equal_lengths, length_points, outputs
 from railsim.mechanisms.targets import Positions, follow_error
 
@@ -35,9 +35,8 @@ def compare(results: Sequence[Analysis]) -> list[dict[str, Any]]:
             "min_angle": min(limited, default=np.nan),
         }  # fmt: skip
         if result.zone and "force" in result.zone["work"]:
+            forces = outputs(_dense(result, POINTS))["force"]
             row["work_force"] = result.zone["work"]["force"]
-            s = np.linspace(*(result.zone[k]["travel"] for k in ("low", "high")), POINTS)
-            forces = outputs(solve(result.model, s))["force"]
             row["zone_spread"] = float(np.ptp(forces) / np.mean(forces))
         rows.append({**row, "error": _error(result, reference)})
     return rows
@@ -48,12 +47,16 @@ def _reference(result: Analysis) -> Positions | None:
     pair = length_points(result.definition)
     if pair is None or result.definition.output is None:
         return None
-    edges = [result.model.start, result.model.end]
-    if result.zone:
-        edges = [result.zone[k]["travel"] for k in ("low", "high")]
-    dense = solve(result.model, np.linspace(edges[0], edges[1], 101))
+    dense = _dense(result, 101)
     s = equal_lengths(dense, pair, dense.length(pair)[0][[0, -1]], POINTS)
     return Positions.of(solve(result.model, s), pair)
+
+
+def _dense(result: Analysis, count: int) -> Motion:
+    """Positions at equal steps of the driver over the zone, else over the whole travel."""
+    model, zone = result.model, result.zone
+    ends = [zone[k]["travel"] for k in ("low", "high")] if zone else [model.start, model.end]
+    return solve(model, np.linspace(ends[0], ends[1], count))
 
 
 def _error(result: Analysis, reference: Positions | None) -> float:

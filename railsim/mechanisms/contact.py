@@ -15,8 +15,6 @@ from railsim.mechanisms.inversion import largest, zeros
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.outputs import height_of
 
-IN_ZONE = 101  # positions from which the smallest contact force in the zone is looked for
-
 
 @dataclass(frozen=True)
 class Rest:
@@ -147,11 +145,11 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     ways = (0, 1, -1)
     zone, up, down = (dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in ways)
     curve, rising, falling = (force(motion, way) for way in ways)
-    whole = solve(dense.model, np.linspace(at_zone["low"], at_zone["high"], IN_ZONE))
+    whole = solve(dense.model, np.linspace(at_zone["low"], at_zone["high"], len(dense.s)))
     ends = [largest(whole, lambda m, k=k: -force(m, k), -force(whole, k))[1] for k in ways[1:]]  # type: ignore[misc]
     least = float(np.min([*up.values(), *down.values(), -max(ends)]))
     missing = not np.all(np.isfinite([*curve, *zone.values()]))
     reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
     heights = tuple((float(min(y)), float(max(y))) for y in edges)
-    bounds = rising, falling
-    return Contact(pressure, zone, up, down, least, curve, bounds, found, heights, reason)
+    rest = curve, (rising, falling), found, heights, reason
+    return Contact(pressure, zone, up, down, least, *rest)
