@@ -89,7 +89,8 @@ def positions(definition: Mechanism) -> Positions:
     if optimise.sample == "travel":
         s = np.linspace(edges[0], edges[1], optimise.points)
     else:
-        s = equal_lengths(dense, pair, solve(model, edges).length(pair)[0], optimise.points)
+        dense = solve(model, np.linspace(edges[0], edges[1], DENSE))  # no other way to a length
+        s = equal_lengths(dense, pair, dense.length(pair)[0][[0, -1]], optimise.points)
     return Positions.of(solve(model, s), pair)
 
 

@@ -15,6 +15,7 @@ from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import published_table, sentences
+from railsim.mechanisms.targets import positions
 from railsim.mechanisms.tolerance import scatter
 
 G = 9.81
@@ -440,3 +441,27 @@ table = [[0.0, 0.0], [0.7, 0.0], [0.8, -400.0], [0.9, 0.0], [2.0, 0.0]]
     assert contact[[0, -1]].min() > 0.0 > contact.min()
     found = by_name(result)["contact_force"]
     assert (found.value, found.ok) == (pytest.approx(contact.min(), abs=0.2), False)
+
+
+def test_positions_in_the_zone_are_there_although_a_length_is_met_before_it(arm):
+    """The piston is shortest at -0.38 rad, hinge and ends in line; the zone lies behind."""
+    more = """
+[zone]
+low = 1.0
+work = 1.2
+high = 1.6
+[optimise]
+objective = "constant"
+target = 3.0
+points = 5
+[optimise.bounds]
+mass = [50.0, 150.0]
+"""
+    both = TORQUE + '\n[actuators.piston]\npiston = ["ground.foot", "arm.pin"]'
+    definition = arm(both, -1.2, 1.2, more=more)
+    solve_for = definition.solve.model_copy(update={"actuator": "piston"})
+    found = positions(definition.model_copy(update={"solve": solve_for}))
+    x, y = 0.3 * np.cos(found.s) - 0.5, 0.3 * np.sin(found.s) + 0.2
+    assert found.height[[0, -1]] == pytest.approx([1.0, 1.6])
+    assert found.height == pytest.approx(np.sin(found.s) + np.sin(1.2))
+    assert np.ptp(np.diff(np.hypot(x, y))) < 1e-12
