@@ -465,3 +465,23 @@ mass = [50.0, 150.0]
     assert found.height[[0, -1]] == pytest.approx([1.0, 1.6])
     assert found.height == pytest.approx(np.sin(found.s) + np.sin(1.2))
     assert np.ptp(np.diff(np.hypot(x, y))) < 1e-12
+
+
+@pytest.mark.parametrize("pressure", ["'auto'", "5e5"])
+def test_a_double_acting_cylinder_that_must_pull_holds_the_contact_by_pulling(arm, pressure):
+    more = f"""
+[zone]
+low = 0.1
+work = 0.2
+high = 0.4
+[contact]
+force = 100.0
+pressure = {pressure}
+"""
+    pull, both = (
+        analyse(arm(CYLINDER.format(acts=acts), 2.6, 1.6, more=more)).contact
+        for acts in ("pull", "both")
+    )
+    assert both.force == pytest.approx(pull.force)
+    assert both.pressure == pytest.approx(pull.pressure)
+    assert (both.force["work"] == pytest.approx(100.0)) == (pressure == "'auto'")
