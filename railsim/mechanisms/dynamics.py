@@ -144,7 +144,8 @@ def driven_motion(whole: Motion) -> TimedMotion:
     _, slope, bend = moved(motion)
     s1 = speed / slope
     s2 = (acceleration - bend * s1**2) / slope
-    sense = np.where(s1 == 0.0, model.sense, np.sign(s1))  # a table may go back
+    resting = np.abs(s1) <= 1e-12 * np.max(np.abs(s1))  # but for rounding
+    sense = np.where(resting, model.sense, np.sign(s1))  # a table may go back
     force = actuator_force(motion, driving(model.definition), Rates(s1, s2, sense))
     return TimedMotion(time, motion, s1, s2, force)
 

@@ -141,6 +141,9 @@ def test_b11_friction_and_temperature_reconstructed(machines):
     rubbed = analyse(load_mechanism("tilting_one_spring", [*FEW, "parameters.front_friction=50"]))
     assert rubbed.output["force"][0] - plain == pytest.approx(7.878, abs=0.01)
     assert rubbed.output["force_back"][0] - plain == pytest.approx(-7.878, abs=0.01)
+    # come to rest, friction still acts against the way: the piston takes the operator's torque
+    held = rubbed.output["force"][-1] * 0.290 / rubbed.output["rate"][-1]
+    assert rubbed.timed.force[-1] == pytest.approx(held, rel=1e-9)
     for name, force in (("tilting_one_spring", 130.13), ("tilting_two_springs", 55.99)):
         warm = analyse(load_mechanism(name, [*FEW, "parameters.temperature=80"]))
         assert warm.output["force"][0] == pytest.approx(force, abs=0.01)
