@@ -104,20 +104,23 @@ def _rest_ranges(dense: Motion, force: Force) -> tuple[Rest, ...]:
     return tuple(found)
 
 
-def _held_pressure(dense: Motion, work: float) -> float:
-    """Pressure of `[contact]`: stated, or what gives the wanted force at work height [Pa]."""
+def _held(dense: Motion, work: float) -> tuple[float, float]:
+    """Pressure of `[contact]` [Pa], and the force that gives what is wanted at work height [N].
+
+    The pressure is the stated one, or that of the force.
+    """
     definition = dense.model.definition
     contact, solve_for = definition.contact, definition.solve
     assert contact is not None
     assert solve_for is not None
-    stated = contact.pressure
-    automatic = isinstance(stated, Expression) and bool(stated.names & definition.automatic)
-    if stated != AUTO and not automatic:
-        return float(dense.model.number(stated))
     at = solve(dense.model, [work])
     wanted = dense.model.number(contact.force) * height_of(at)[1] - forces.generalised_force(at)
     force = wanted / forces.unit_work(at, definition.actuators[solve_for.unknown])
-    return float(forces.pressure_for(at, solve_for.unknown, force)[0])
+    pressure, stated = forces.pressure_for(at, solve_for.unknown, force)[0], contact.pressure
+    automatic = isinstance(stated, Expression) and bool(stated.names & definition.automatic)
+    if stated != AUTO and not automatic:
+        pressure = dense.model.number(stated)
+    return float(pressure), float(force[0])
 
 
 def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> Contact | None:
@@ -129,10 +132,10 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     if definition.contact is None or definition.solve is None:
         return None
     unknown = definition.solve.unknown
-    pressure = _held_pressure(dense, at_zone["work"])
+    pressure, needed = _held(dense, at_zone["work"])
 
     def generalised(positions: Motion, friction: int) -> Any:
-        push = forces.force_at_pressure(positions, unknown, pressure)
+        push = forces.force_at_pressure(positions, unknown, pressure, needed)
         work = forces.unit_work(positions, definition.actuators[unknown])
         return push * work + forces.generalised_force(positions, forces.Rates(friction=friction))
 

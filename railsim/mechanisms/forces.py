@@ -324,12 +324,17 @@ def pressure_for(motion: Motion, name: str, force: Any) -> Any:
     )
 
 
-def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
-    """Force of an actuator at a pressure [N]; NaN where it has none."""
+def force_at_pressure(motion: Motion, name: str, pressure: Any, needed: float = 0.0) -> Any:
+    """Force of an actuator at a pressure [N]; NaN where it has none.
+
+    Of a double-acting cylinder that of the chamber for a force `needed` [N].
+    """
     actuator = motion.model.definition.actuators[name]
     if isinstance(actuator, parts.AirSpring):
         return table_of(motion, actuator).force(motion.length(actuator.air_spring)[0], pressure)
     assert isinstance(actuator, parts.Cylinder)
+    if actuator.acts == "both" and needed < 0.0:
+        return -pressure * chamber_area(motion.model, actuator, "pull") + 0.0 * motion.s
     return pressure * chamber_area(motion.model, actuator, actuator.acts) + 0.0 * motion.s
 
 
