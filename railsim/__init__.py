@@ -19,6 +19,7 @@ from railsim.version import __version__
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from railsim.animation import animate
     from railsim.assessment import Assessment, assess
     from railsim.assessment.model_comparison import ModelValidation
     from railsim.assessment.model_validation import validate_model
@@ -61,8 +62,9 @@ _HOMES = {
     "Simulation": "railsim.simulation", "StaticLoads": "railsim.model.statics",
     "Track": "railsim.definitions.track.definition",
     "TrailingArmSuspension": "railsim.definitions.spring",
-    "Vehicle": "railsim.definitions.vehicle.definition", "assess": "railsim.assessment",
-    "critical_speed": "railsim.stability.critical_speed", "curving": "railsim.stability.curving",
+    "Vehicle": "railsim.definitions.vehicle.definition", "animate": "railsim.animation",
+    "assess": "railsim.assessment", "critical_speed": "railsim.stability.critical_speed",
+    "curving": "railsim.stability.curving",
     "describe": "railsim.description", "identify": "railsim.identification",
     "load_comfort_limits": "railsim.definitions.loading", "load_measurement": "railsim.measurement",
     "load_mechanism": "railsim.definitions.loading", "load_profile": "railsim.profiles",
@@ -81,7 +83,7 @@ _HOMES = {
 __all__ = [
     "Assessment", "Description", "Identified", "InputError", "Measurement", "Mechanism",
     "ModelError", "ModelValidation", "Profile", "Result", "Sensitivity", "Settings", "Simulation",
-    "StaticLoads", "Track", "TrailingArmSuspension", "Vehicle", "__version__", "assess",
+    "StaticLoads", "Track", "TrailingArmSuspension", "Vehicle", "__version__", "animate", "assess",
     "critical_speed", "curving", "describe", "identify", "load_comfort_limits", "load_measurement",
     "load_mechanism", "load_profile", "load_running_limits", "load_scenario", "load_settings",
     "load_spring", "load_track", "load_vehicle", "mid_curves", "modes", "open_result", "optimise",

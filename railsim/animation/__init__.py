@@ -9,8 +9,56 @@
 Begin reading in `scene.py`.
 """
 
-from railsim.animation.movie import write_movie
-from railsim.animation.page import write_page
-from railsim.animation.scene import Scene, mode_scene, result_scene
+from pathlib import Path
 
-__all__ = ["Scene", "mode_scene", "result_scene", "write_movie", "write_page"]
+from railsim.animation.movie import ENDINGS as FILMS
+from railsim.animation.movie import write_movie
+from railsim.animation.page import ENDINGS as PAGES
+from railsim.animation.page import write_page
+from railsim.animation.scene import FILM_FRAMES, FRAMES, Scene, mode_scene, result_scene
+from railsim.files.access import check_file
+from railsim.result import Result
+
+__all__ = ["Scene", "animate", "mode_scene", "result_scene", "write_movie", "write_page"]
+
+
+def animate(
+    shown: Result | Scene,
+    path: str | Path,
+    *,
+    frames_per_second: int = 20,
+    gain: float = 1.0,
+    overwrite: bool = False,
+) -> Path:
+    """Write a run or a mode as a page that plays in a browser, or as a film.
+
+    Parameters
+    ----------
+    shown : railsim.Result or railsim.animation.Scene
+        Run, or scene of a part of one (`railsim.animation.result_scene`) or of a mode
+        (`railsim.animation.mode_scene`).
+    path : str or path
+        ``.html``, ``.gif`` or ``.mp4``, which needs ffmpeg.
+    frames_per_second, gain : int, float
+        Of a film: pictures a second, magnification of the motion of the bodies [1].
+    overwrite : bool
+        Replace a file that exists.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    railsim.InputError
+        The result lacks something; the name or the location; MP4 without ffmpeg.
+    """
+    check_file(Path(path), overwrite=overwrite, endings=(*PAGES, *FILMS))
+    film = Path(path).suffix.lower() in FILMS
+    if not isinstance(shown, Scene):
+        shown = result_scene(shown, frames=FILM_FRAMES if film else FRAMES)
+    if not film:
+        return write_page(shown, path, overwrite=overwrite)
+    how = {"frames_per_second": frames_per_second, "gain": gain}
+    return write_movie(shown, path, **how, overwrite=overwrite)

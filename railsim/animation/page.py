@@ -11,6 +11,8 @@ from railsim.files.access import check_file, whole_file
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
 
+ENDINGS = (".html", ".htm")
+
 
 def write_page(
     scene: Scene, path: str | Path, *, modes: Sequence[Scene] = (), overwrite: bool = False
@@ -22,7 +24,7 @@ def write_page(
     written.
     """
     path = Path(path)
-    check_file(path, overwrite=overwrite, endings=(".html", ".htm"))
+    check_file(path, overwrite=overwrite, endings=ENDINGS)
     text = rendered(
         "railsim.animation", "page.html", title=scene.title, styles=["page.css"],
         scripts=["page.js"], data=scene_data(scene) | {"modes": [_motion(mode) for mode in modes]},

@@ -21,7 +21,7 @@ from railsim.result import Result
 from railsim.track.alignment import Alignment
 from railsim.track.irregularity import shown_displacement
 
-FRAMES = 600
+FRAMES, FILM_FRAMES = 600, 200  # at most, of a page and of a film of a run
 TRACK_STEP = 1.0  # m
 AROUND = 60.0  # m of track ahead and behind
 NEEDED = ("body_position", "Q", "Y")

@@ -35,15 +35,11 @@ def command(file: str, fps: int, gain: float, output: cli.Output, **how: Any) ->
     Example:
       railsim animate run.h5 --out run.html
     """
-    from railsim.animation import write_movie, write_page
+    from railsim.animation import animate
 
-    path, overwrite = output.file(file, ENDINGS, suffix=".html"), output.overwrite
-    film = path.suffix.lower() in (".gif", ".mp4")
-    scene = _scene(Path(file), film, **how)
-    if film:
-        write_movie(scene, path, frames_per_second=fps, gain=gain, overwrite=overwrite)
-    else:
-        write_page(scene, path, overwrite=overwrite)
+    path = output.file(file, ENDINGS, suffix=".html")
+    scene = _scene(Path(file), path.suffix.lower() in (".gif", ".mp4"), **how)
+    animate(scene, path, frames_per_second=fps, gain=gain, overwrite=output.overwrite)
     output.wrote(path, frames=len(scene.time), title=scene.title)
 
 
@@ -51,7 +47,7 @@ def _scene(
     file: Path, film: bool, vehicle: str | None, mode: str | None, between: Any, frames: int | None
 ) -> "Scene":
     from railsim.animation import mode_scene, result_scene
-    from railsim.animation.scene import FRAMES, chosen_mode
+    from railsim.animation.scene import FILM_FRAMES, FRAMES, chosen_mode
 
     if file.suffix.lower() != ".json":
         from railsim.result import open_run
@@ -61,7 +57,7 @@ def _scene(
             for option, value in (("--vehicle", vehicle), ("--mode", mode))
             if value
         ).check()
-        frames = frames or (200 if film else FRAMES)
+        frames = frames or (FILM_FRAMES if film else FRAMES)
         return result_scene(open_run(file), frames=frames, between=between)
     from railsim.definitions.loading import load_vehicle
     from railsim.linear.eigenmodes import SLOWEST

@@ -270,10 +270,18 @@ def test_a_mode_is_shown_through_whole_cycles(tmp_path, film, frames, cycles, pi
 def test_film_has_a_picture_for_each_frame(result, tmp_path):
     from PIL import Image
 
-    path = write_movie(result_scene(result, frames=4), tmp_path / "run.gif")
+    path = railsim.animate(result_scene(result, frames=4), tmp_path / "run.gif")
     with Image.open(path) as film:
         assert film.n_frames == 4
         assert np.asarray(film.convert("RGB")).std() > 10.0
+
+
+def test_a_result_is_written_as_what_the_name_says(result, tmp_path):
+    page = railsim.animate(result, tmp_path / "run.HTML")
+    assert page.read_text() == write_page(result_scene(result), tmp_path / "same.html").read_text()
+    for name, words in (("run.HTML", "exists"), ("run.png", "in .html or .htm or .gif")):
+        with pytest.raises(InputError, match=words):
+            railsim.animate(result, tmp_path / name)
 
 
 def test_a_film_says_how_many_times_larger_the_motion_is(result):
