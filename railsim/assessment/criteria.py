@@ -19,10 +19,10 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.assessment import signals as of
 from railsim.assessment.sections import TestSection
-from railsim.assessment.signals import Band, Signal, Signals, between
+from railsim.assessment.signals import Band, Signal, Signals
 from railsim.contact.geometry import ContactGeometry
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.result.filters import band_passed, distance_means, window_centres
+from railsim.result.filters import distance_means, window_centres
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"
 VERDICTS = (SAFETY, LOADING, RIDE)
@@ -136,26 +136,30 @@ class Measured:
         return found
 
 
-def instability(signals: Signals, section: TestSection) -> Values:
-    """Largest rms over 100 m of the track shift force within 2 Hz of f0, in zones 1 and 2 [N].
+@dataclass(frozen=True)
+class Instability:
+    """Largest rms over 100 m of a signal within 2 Hz of f0, in zones 1 and 2.
 
     The window has the length of the section where this is shorter.
     """
-    if signals.f0 is None or section.zone not in HUNTING_ZONES:
-        return {}
-    begin, end = section.begin, section.end
-    length = min(RMS_LENGTH, end - begin)
-    centres = window_centres(begin, end, length, RMS_STEP)
-    corners = max(signals.f0 - HALF_BAND, LOWEST), signals.f0 + HALF_BAND
-    found = {}
-    for w, s in enumerate(signals.raw("wheelset_distance").T):
-        # two seconds on either side, for a band of 4 Hz
-        near = between(s, begin - 2.0 * section.speed, end + 2.0 * section.speed)
-        force = signals.raw("Y")[near, w].sum(axis=-1)
-        band = band_passed(force, signals.record.rate, *corners, causal=signals.causal)
-        square = distance_means(s[near], np.square(band), centres, length)
-        found[f"wheelset {w + 1}"] = [float(np.sqrt(np.max(np.maximum(square, 0.0))))]
-    return found
+
+    signal: Callable[[Signals, Band | None], Signal | None]
+
+    def __call__(self, signals: Signals, section: TestSection) -> Values:
+        """Value of a section by place."""
+        if signals.f0 is None or section.zone not in HUNTING_ZONES:
+            return {}
+        band = max(signals.f0 - HALF_BAND, LOWEST), signals.f0 + HALF_BAND
+        signal = signals.signal(self.signal, band)
+        length = min(RMS_LENGTH, section.end - section.begin)
+        centres = window_centres(section.begin, section.end, length, RMS_STEP)
+        found = {}
+        for k, (place, _) in enumerate(signal.places if signal else ()):
+            rows = signal.rows(k, section)
+            s, square = signal.s[rows, k], np.square(signal.values[rows, k])
+            largest = np.max(distance_means(s, square, centres, length))
+            found[place] = [math.sqrt(max(float(largest), 0.0))]
+        return found
 
 
 def steering(signals: Signals, section: TestSection) -> Values:
@@ -234,7 +238,8 @@ _ROWS = (
               Measured(of.quotient, FORCES, high, window=2.0, curves=True),
               meaning="flange climbing of the outer wheel"),
     Criterion("instability", "rms of track shift force, 100 m", "kN", SAFETY, "largest",
-              instability, meaning="instability: half of the limit of the track shift force"),
+              Instability(of.track_shifting_force),
+              meaning="instability: half of the limit of the track shift force"),
     Criterion("Q", "wheel load", "kN", LOADING, "loading", Measured(of.wheel_load, FORCES, high),
               meaning="track loading: 90 kN + Q0, at most a value that depends on the speed"),
     Criterion("Q_qst", "quasi-static wheel load", "kN", LOADING, "quasi_static",
@@ -253,6 +258,9 @@ _ROWS = (
     Criterion("frame_y", "lateral bogie frame acceleration, 10 Hz", "m/s2", SAFETY, "safety",
               Measured(of.frame_lateral, (None, 10.0), outside), SIMPLIFIED,
               "lateral acceleration of the bogie frame, by its mass"),
+    Criterion("frame_instability", "rms of bogie frame acceleration, 100 m", "m/s2", SAFETY,
+              "largest", Instability(of.frame_lateral), SIMPLIFIED,
+              "instability: half of the limit of the acceleration of the bogie frame"),
     Criterion("body_y", "lateral body acceleration", "m/s2", RIDE, "ride",
               Measured(of.body_lateral, RIDE_BAND, both_ends_outside), BOTH,
               "lateral acceleration of the body, ride"),

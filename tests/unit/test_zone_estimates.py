@@ -27,6 +27,7 @@ KIND = {  # statistics of ASSESSMENT, by quantity
     "sum_Y": "safety", "Y_over_Q": "safety", "instability": "largest", "Q": "loading",
     "Q_qst": "quasi_static", "Y_qst": "quasi_static", "body_y_safety": "safety",
     "body_z_safety": "safety", "frame_y": "safety", "body_y": "ride", "body_z": "ride",
+    "frame_instability": "largest",
     "body_y_rms": "ride", "body_z_rms": "ride", "body_y_qst": "quasi_static", "Q_low": "smallest",
     "Y_max": "loading", "B_max": "loading", "B_qst": "quasi_static",
     "Y_over_Q_inner": "quasi_static", "T_qst": "quasi_static", "overturning": "safety",
@@ -43,7 +44,7 @@ def places(name):
         return [f"wheelset {w} outer" for w in (1, 4)]
     if name.startswith(("body", "overturning")):
         return ["floor_front"] if name.startswith("body") else ["front"]
-    return ["frame_1", "frame_4"] if name == "frame_y" else ["wheelset 1", "wheelset 4"]
+    return ["frame_1", "frame_4"] if name.startswith("frame") else ["wheelset 1", "wheelset 4"]
 
 
 def made(zone, count, spread, *, signs=1, high=0.0, seed=0):
@@ -95,10 +96,11 @@ def limit(name, zone, place, service, radius):
     km_h = 3.6 * service.admissible_speed
     most = next((q for v, q in ((160, 200e3), (200, 190e3), (250, 180e3), (300, 170e3))
                  if km_h <= v + 1e-6), 160e3)  # fmt: skip
-    bogie = 2615.0 + 2.0 * 1813.0
+    frame = 12.0 - (2615.0 + 2.0 * 1813.0) / 1e3 / 5.0
     return {
         "sum_Y": shift, "Y_over_Q": 0.8, "instability": 0.5 * shift, "Q": min(90e3 + load, most),
-        "Q_qst": 145e3, "Y_qst": 30e3 + 10500e3 / radius, "frame_y": 12.0 - bogie / 1e3 / 5.0,
+        "Q_qst": 145e3, "Y_qst": 30e3 + 10500e3 / radius, "frame_y": frame,
+        "frame_instability": 0.5 * frame,
         "body_y_safety": {"3": 2.8, "4": 2.6}.get(zone, 3.0), "body_z_safety": 3.0, "body_y": 2.5,
         "body_z": 2.5, "body_y_rms": 0.5, "body_z_rms": 0.75, "body_y_qst": 1.5,
     }.get(name)  # fmt: skip
