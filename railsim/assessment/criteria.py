@@ -92,9 +92,9 @@ def middle_outside(x: Floats, turn: int) -> list[float]:
 
 
 def mean_of_known(x: Floats, _: int) -> list[float]:
-    """Mean where there is a value; nan where there is none."""
+    """Mean where there is a value."""
     known = x[~np.isnan(x)]
-    return [float(np.mean(known)) if len(known) else math.nan]
+    return [float(np.mean(known))] if len(known) else []
 
 
 def rms(x: Floats, _: int) -> list[float]:

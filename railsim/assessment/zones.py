@@ -240,10 +240,13 @@ class _Pooled:
         return one_dimensional(values, getattr(statistics.k, kind))
 
     def _less_high_friction(self, place: str, guiding: Floats) -> Floats | None:
-        """Guiding forces corrected where Y/Q of the inner wheel indicates high friction, if any."""
-        law, inner = self.limits.high_friction, place.replace("outer", "inner")
+        """Guiding forces corrected where Y/Q of the inner wheel indicates high friction, if any.
+
+        A section whose inner wheel carries nothing has no Y/Q and is not corrected.
+        """
+        law, inner = self.limits.high_friction, ("Y_over_Q_inner", place.replace("outer", "inner"))
         own = [v.values for v in self.values if ("Y_qst", place) in v.values]
-        quotient = np.array([values["Y_over_Q_inner", inner][0] for values in own])
+        quotient = np.array([values.get(inner, [0.0])[0] for values in own])
         if law is None or not (quotient > law.threshold).any():
             return None
         return np.asarray(guiding - law.slope * np.maximum(quotient - law.threshold, 0.0))

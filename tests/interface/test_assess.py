@@ -146,6 +146,26 @@ def test_simplified_method_needs_no_limit_of_forces():
     assert frame.limit == pytest.approx(12.0 - (2615.0 + 2 * 1813.0) / 1000.0 / 5.0)
 
 
+def test_an_inner_wheel_without_load_in_one_section_hides_no_guiding_force():
+    """70 kN against 65 kN, Y/Q of 0.5 at the inner wheel: less 5 kN, but for that one section."""
+
+    def Q(t, s):
+        loads = np.full((*s.shape, 2), Q0)
+        loads[(s > 400.0) & (s < 520.0), 1] = -1e3
+        return loads
+
+    def Y(t, s):
+        return np.stack([np.full(s.shape, -70e3), 0.5 * Q(t, s)[..., 1]], axis=-1)
+
+    (found,) = assess(made(track(*curve(300.0, 800.0), cant=0.12), 23.0, Q=Q, Y=Y, **FINE))
+    row, n = rows_of(found, "4", "Y_qst")["wheelset 1 outer"], len(found.zones[-1].values)
+    assert n > 5
+    assert row.uncorrected.mean == pytest.approx(70e3)
+    assert row.estimate.mean == pytest.approx(65e3 + 5e3 / n, rel=1e-3)
+    inner = [one.estimate for one in found.zones[-1].information if one.place == "wheelset 1 inner"]
+    assert [(one.N, one.mean) for one in inner[1:]] == [(n - 1, pytest.approx(0.5, rel=1e-3))]
+
+
 def test_lifted_wheel_is_reported_in_metres_and_is_no_number():
     def Q(t, s):
         loads = np.full((*s.shape, 2), Q0)
