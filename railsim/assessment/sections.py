@@ -175,6 +175,7 @@ def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service
 
 
 def reasons(sections: Sequence[TestSection]) -> list[str]:
-    """Sentences on sections that do not count, grouped by reason."""
+    """Sentences on sections outside the conditions of their zones, grouped by reason."""
     counted = Counter(section.reason for section in sections if section.reason)
-    return [f"{n} section{'s' * (n > 1)} omitted: {why}" for why, n in counted.items()]
+    words = "outside the conditions"
+    return [f"{n} section{'s' * (n > 1)} {words}: {why}" for why, n in counted.items()]
