@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.conditions import Condition, SectionRow
@@ -11,6 +13,10 @@ from railsim.assessment.verdict import DERAILED, FAIL, Verdict
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
+from railsim.plottable import picture_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,10 @@ class Assessment:
                 if before is None or not row.rank <= before[1].rank:
                     found[row.criterion.name] = report, row
         return found
+
+    def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Figure":
+        """Draw estimates against limits, comfort or wear; also into the file of `path`."""
+        return picture_of(self, path, overwrite)
 
     def record(self) -> dict[str, object]:
         """Return the assessment as plain numbers and strings, SI."""

@@ -124,6 +124,10 @@ class Modes(Plottable):
             data["parameter"] = {"key": self.parameter[0], "value": self.parameter[1]}
         return data
 
+    def to_xarray(self) -> Any:
+        """Return what `RootLocus.to_xarray` gives, at this speed."""
+        return RootLocus("speed", (self.speed,), (self,)).to_xarray()
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What the table leaves out, in words."""

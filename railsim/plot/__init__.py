@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURES = {
-    "CriticalSpeed": ("stability", "bifurcation_figure"), "Curving": ("curving", "curving_figure"),
+    "Assessment": ("assessment", "one_figure"), "Curving": ("curving", "curving_figure"),
+    "CriticalSpeed": ("stability", "bifurcation_figure"),
     "Modes": ("modes", "modes_figure"), "Result": ("histories", "histories"),
     "RootLocus": ("modes", "locus_figure"), "Track": ("track", "track_figure"),
     "Vehicle": ("vehicle", "vehicle_figure"),

@@ -16,6 +16,7 @@ from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
+from railsim.errors import input_error
 from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
@@ -35,6 +36,14 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
     if any(a.wear for a in assessments):
         return _wear_figure(assessments)
     return None
+
+
+def one_figure(assessment: Assessment) -> Figure:
+    """Draw one assessment; raises InputError where nothing is to draw."""
+    figure = assessment_figure([assessment])
+    if figure is None:
+        raise input_error("assessment", "nothing to draw", "one with values", assessment.standard)
+    return figure
 
 
 def _limits_figure(assessments: Sequence[Assessment]) -> Figure:

@@ -94,6 +94,8 @@ def test_runs_without_a_section_have_no_empty_picture_and_no_empty_table():
     (found,) = assess({"short": run})
     assert found.zones
     assert assessment_figure([found]) is None
+    with pytest.raises(InputError, match="nothing to draw"):
+        found.plot()
     assert tables(found) == []
 
 
@@ -643,7 +645,7 @@ def test_comfort_is_drawn_over_the_speed_with_classes_and_a_legend_beside():
             driven[name] = (speed, "Straight", rails)
     made = Assessment("A coach", "comfort", tuple(comfort), comfort=comfort, driven=driven,
                       limits=load_comfort_limits("comfort"))  # fmt: skip
-    figure = assessment_figure([made])
+    figure = made.plot()
     mean = figure.axes[0]
     low, high = mean.lines[:2]
     np.testing.assert_allclose(low.get_xdata(), [72.0, 108.0, 144.0])
