@@ -397,9 +397,13 @@ class Output:
         for path in self.written:
             echo(path)
 
-    def finish(self, names: Any, found: Any, parts: Any, remarks: Iterable[object] = ()) -> None:
-        """Write the record and the plot of a result under two names, and answer with them."""
+    def finish(
+        self, names: Any, found: Any, parts: Any, remarks: Iterable[object] = (), **more: Any
+    ) -> None:
+        """Write record, with `more`, and plot of a result under two names, and answer with them."""
         record = found.record()
+        for one in record if isinstance(record, list) else [record]:
+            one |= more
         self.write(names[0], record)
         self.write(names[1], found.plot)
         self.answer(record, parts, remarks)

@@ -155,6 +155,16 @@ def test_all_modes_of_one_speed_are_animated_and_named_after_what_moves(capsys, 
     assert {"wheelsets longitudinal, front", "wheelsets longitudinal, rear"} < set(names)
     assert not [name for name in names if "." in name or "_" in name]
     assert {len(mode["pose"]) for mode in data["modes"]} == {40}
+    # the file says which vehicle these modes are of
+    again = [
+        str(tmp_path / "modes.json"),
+        "--mode",
+        "lower sway",
+        "--out",
+        str(tmp_path / "a.html"),
+    ]
+    assert main(["animate", *again]) == 0
+    assert "lower sway" in (tmp_path / "a.html").read_text()
 
 
 @pytest.mark.parametrize(
