@@ -9,11 +9,10 @@ UNITS = {
     "mrad": 1e-3, "deg": math.pi / 180.0,
 }  # fmt: skip
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_WITH_UNIT = re.compile(rf"({NUMBER})\s*({'|'.join(map(re.escape, UNITS))})")
+_UNIT = rf"({'|'.join(map(re.escape, UNITS))})"
+_WITH_UNIT = re.compile(rf"({NUMBER})\s*{_UNIT}")
 _SPEED = re.compile(rf"({NUMBER})\s*(km/h|m/s)?")
-_RANGE = re.compile(
-    rf"(log:)?({NUMBER}):({NUMBER}):(\d+)(?:\s*({'|'.join(map(re.escape, UNITS))}))?"
-)
+_RANGE = re.compile(rf"(log:)?({NUMBER})\s*{_UNIT}?:({NUMBER})\s*{_UNIT}?:(\d+)\s*{_UNIT}?")
 MOST_VALUES = 100_000  # of a range
 ALLOWED = "first:last:number, with log: before it for equal ratios, such as 10:60:26 or 15:30:4 m/s"
 
@@ -45,20 +44,23 @@ def speed_in_si(value: Any) -> Any:
 def range_values(text: str) -> list[float] | None:
     """Return the values of a range in SI; None where it is nothing of the kind.
 
-    Raises ValueError: fewer than one value or too many of them, or no ratio leads from end to end.
+    The unit stands behind both ends, or once for all of it.  Raises ValueError: fewer than one
+    value or too many of them, or no ratio leads from end to end.
 
     Examples
     --------
     >>> range_values("10:20:3"), range_values("log:1e4:1e6:3"), range_values("36:72:2 km/h")
     ([10.0, 15.0, 20.0], [10000.0, 100000.0, 1000000.0], [10.0, 20.0])
+    >>> range_values("36km/h:72km/h:2"), range_values("36:72km/h:2")
+    ([10.0, 20.0], None)
     """
     found = _RANGE.fullmatch(text.strip())
-    if not found:
+    if not found or (found[3] or found[7]) != (found[5] or found[7]) or (found[3] and found[7]):
         return None
-    first, last, number = float(found[2]), float(found[3]), int(found[4])
+    first, last, number = float(found[2]), float(found[4]), int(found[6])
     if not 1 <= number <= MOST_VALUES:
         raise ValueError(f"{number} values; 1 to {MOST_VALUES} are allowed")
-    scale = UNITS[found[5]] if found[5] else 1.0
+    scale = UNITS[found[3] or found[7] or "m"]
     shares = [k / (number - 1) if number > 1 else 0.0 for k in range(number)]
     if found[1]:
         if not first * last > 0.0:

@@ -302,25 +302,25 @@ def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
 
 
 def values_of(text: str, option: str) -> list[float]:
-    """Return the values of ``A:B:N`` (N values from A to B) or ``A,B,C``.
+    """Return the values of ``A:B:N`` (N values from A to B) or ``A,B,C``; units may stand behind.
 
     Examples
     --------
     >>> values_of("10:20:3", "--speeds"), values_of("0.2,0.4", "--friction")
     ([10.0, 15.0, 20.0], [0.2, 0.4])
+    >>> values_of("36:72:2 km/h", "--speeds"), values_of("36km/h,20", "--speeds")
+    ([10.0, 20.0], [10.0, 20.0])
     """
+    from railsim.units import number_with_unit, range_values
+
     allowed = "first:last:number, such as 10:60:26, or values with commas between"
     try:
-        if ":" in text:
-            first, last, number = text.split(":")
-            count = int(number)
-            if not 1 <= count <= MOST_VALUES:
-                raise ValueError
-            a, b = float(first), float(last)
-            step = (b - a) / (count - 1) if count > 1 else 0.0
-            values = [a + k * step for k in range(count)]
-        else:
-            values = [float(part) for part in text.split(",")]
+        values = range_values(text)
+        if values is None:
+            each = ((number_with_unit(part), part) for part in text.split(","))
+            values = [float(part) if number is None else number for number, part in each]
+        if len(values) > MOST_VALUES:
+            raise ValueError
     except ValueError:
         raise input_error(option, f"found '{text}'", allowed) from None
     if not all(abs(value) < float("inf") for value in values):
