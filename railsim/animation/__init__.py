@@ -60,5 +60,5 @@ def animate(
         shown = result_scene(shown, frames=FILM_FRAMES if film else FRAMES)
     if not film:
         return write_page(shown, path, overwrite=overwrite)
-    how = {"frames_per_second": frames_per_second, "gain": gain}
-    return write_movie(shown, path, **how, overwrite=overwrite)
+    rate = frames_per_second
+    return write_movie(shown, path, frames_per_second=rate, gain=gain, overwrite=overwrite)

@@ -147,14 +147,15 @@ class Instability:
 
     def __call__(self, signals: Signals, section: TestSection) -> Values:
         """Value of a section by place."""
-        if signals.f0 is None or section.zone not in HUNTING_ZONES:
+        if (f0 := signals.f0) is None or section.zone not in HUNTING_ZONES:
             return {}
-        band = max(signals.f0 - HALF_BAND, LOWEST), signals.f0 + HALF_BAND
-        signal = signals.signal(self.signal, band)
+        signal = signals.signal(self.signal, (max(f0 - HALF_BAND, LOWEST), f0 + HALF_BAND))
+        if signal is None:
+            return {}
         length = min(RMS_LENGTH, section.end - section.begin)
         centres = window_centres(section.begin, section.end, length, RMS_STEP)
         found = {}
-        for k, (place, _) in enumerate(signal.places if signal else ()):
+        for k, (place, _) in enumerate(signal.places):
             rows = signal.rows(k, section)
             s, square = signal.s[rows, k], np.square(signal.values[rows, k])
             largest = np.max(distance_means(s, square, centres, length))
