@@ -1,7 +1,7 @@
 """Running tests after EN 14363 and UIC 518: all runs of a vehicle to zones and verdicts."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -168,13 +168,18 @@ def running_limits(standard: str, file: str | Path | None) -> RunningLimits:
     return limits
 
 
-def _service(runs: Mapping[str, Result]) -> Service:
+def common_service(runs: Mapping[str, Result], given: Collection[str] = ()) -> Service | None:
+    """Service table of a vehicle; its conditions may differ in what is `given` otherwise.
+
+    Raises InputError: they differ in something else that limits depend on.
+    """
     services = {name: result.vehicle().service for name, result in runs.items()}
     name, service = next(iter(services.items()))
     differing = {
         key: values
         for key in OF_LIMITS
-        if len(values := {getattr(one, key, None) for one in services.values()}) > 1
+        if key not in given
+        and len(values := {getattr(one, key, None) for one in services.values()}) > 1
     }
     if differing:
         allowed = "the same in all conditions, or give one as an option"
@@ -182,6 +187,11 @@ def _service(runs: Mapping[str, Result]) -> Service:
             Fault(name, f"vehicle.service.{key}", listed([*map(str, values)]), allowed, name)
             for key, values in differing.items()
         )
+    return service
+
+
+def _service(runs: Mapping[str, Result]) -> Service:
+    service, name = common_service(runs), next(iter(runs))
     if service is None:
         allowed = (
             "add [service] with admissible_speed and cant_deficiency to its file, or give "

@@ -91,15 +91,17 @@ def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service 
         return None
     from pydantic import ValidationError
 
+    from railsim.assessment.running import common_service
     from railsim.definitions.vehicle.tables import Service
 
-    service = next(iter(results.values())).vehicle().service
+    service = common_service(results, changes)
     try:
         return Service.model_validate({**(service.model_dump() if service else {}), **changes})
     except ValidationError as error:
+        wrong = {str(e["loc"][0]): f"{e['msg'].lower()}, in SI units" for e in error.errors()}
         raise InputError(
-            Fault(f"--{str(e['loc'][0]).replace('_', '-')}", "", e["msg"].lower(), "in SI units")
-            for e in error.errors()
+            Fault(f"--{key.replace('_', '-')}", "", f"found {changes.get(key, 'nothing')}", words)
+            for key, words in wrong.items()
         ) from None
 
 

@@ -507,6 +507,23 @@ def test_option_of_the_command_leaves_each_vehicle_the_rest_of_its_service_table
         assert limits["A wagon"] == pytest.approx(0.85 * 46.36e3, rel=1e-3)
 
 
+def test_an_option_chooses_no_condition_for_the_rest_of_the_service_table(
+    hunting, tmp_path, capsys
+):
+    """Two conditions of a vehicle for 120 and 90 km/h; the cant deficiency alone is given."""
+    coach = hunting.vehicle().with_values({"service.condition": "new"})
+    slow = coach.with_values({"service.condition": "worn", "service.admissible_speed": 25.0})
+    made_of = {"new": coach, "worn": slow}
+    paths = [str(made(track(STRAIGHT), FAST, vehicle=v.to_toml()).to_hdf5(tmp_path / f"{n}.h5"))
+             for n, v in made_of.items()]  # fmt: skip
+    given = ["assess", *paths, "--cant-deficiency", "0.14", "--coarse"]
+    assert main(given) == 2
+    assert "vehicle.service.admissible_speed" in capsys.readouterr().err
+    assert main([*given, "--admissible-speed", "33.4"]) == 0
+    assert main([*given, "--admissible-speed", "0"]) == 2
+    assert "--admissible-speed: found 0.0; " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("standard", ["comfort", "wear"])
 def test_command_of_other_standards(hunting, tmp_path, capsys, standard):
     path = str(hunting.to_hdf5(tmp_path / "run.h5"))
