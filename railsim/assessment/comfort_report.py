@@ -35,12 +35,13 @@ class PointComfort:
 
     def record(self, limits: ComfortLimits) -> dict[str, object]:
         """Return the values as plain numbers and strings, SI, percentages in per cent."""
-        continuous = self.mean.continuous
+        largest = [float(value) for value in np.max(self.mean.continuous, axis=0)]
         return {
             "place": self.sensor, "x": self.place, "N_MV": self.mean.N_MV, "N_VA": self.mean.N_VA,
             "N_VD": self.mean.N_VD, "class": class_of(limits.mean_comfort, self.mean.N_MV),
             "blocks": self.mean.blocks,
-            "continuous_largest": [float(v) for v in np.max(continuous, axis=0)],
+            "continuous_largest": largest,  # along x, y, z; classes are those of y and z
+            "continuous_class": [class_of(limits.continuous, value) for value in largest[1:]],
             "iso2631_rms": [float(v) for v in self.iso_rms],
             "iso2631_total": float(np.sqrt(np.sum(self.iso_rms**2))), "sperling": self.sperling,
             "P_CT": {

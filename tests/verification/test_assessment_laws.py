@@ -664,6 +664,11 @@ def test_record_of_a_point_has_the_worst_transition_and_the_worst_block_of_each_
     found = point.record(load_comfort_limits("comfort"))
     assert found["P_CT"] == {"standing": 8.0, "seated": 3.0}
     assert found["continuous_largest"] == [0.3, 0.5, 0.9]
+    assert found["continuous_class"] == ["less comfortable", "less comfortable"]
+    for value, name in ((0.19, "very comfortable"), (0.2, "comfortable"), (0.39, "medium")):
+        mean = replace(mean, continuous=np.array([[0.9, value, 0.1]]))
+        found = replace(point, mean=mean).record(load_comfort_limits("comfort"))
+        assert found["continuous_class"] == [name, "very comfortable"]
     assert found["iso2631_total"] == pytest.approx(0.7)
     assert [found[name] for name in ("N_MV", "N_VA", "N_VD", "blocks")] == [1.0, 2.0, 3.0, 2]
     assert short_of_blocks([point]) == "2 blocks of 5 s, EN 12299 requires 60"
