@@ -361,12 +361,29 @@ def test_absolute_gauge_and_another_encoding_are_read_when_the_file_says_so(tmp_
         ("s,z\n3,0\n2,0\n1,0\n0,0", "falling_mileage = true"),
         ("s,z\n0,0\n1,0\n2,5\n3,0", "line 4: a displacement of 5 m"),
         ("s,gauge_mm\n0,1435\n1,1436\n2,1437\n3,1436", "offset = { gauge = 1435.0 }"),
+        ("s,gauge_mm\n0,-435\n1,-436\n2,-435\n3,-434", "line 2: a gauge of -0.435 m"),
     ],
 )
 def test_wrong_measured_file_is_refused(measured, csv, expected):
     with pytest.raises(InputError) as caught:
         load_track(measured(csv))
     assert any(expected in str(fault) for fault in caught.value.faults)
+
+
+def test_names_that_no_column_has_are_refused_with_their_keys(measured):
+    """A sign, a unit or an offset of the file's own name would change nothing."""
+    how = (
+        'columns = { s = "s", z_left = "LL", z_right = "LL", y = "AL" }\n',
+        'columns = { s = "s", z_left = "LL", y = "AL" }\nreverse = ["LL", "y"]\n'
+        'units = { z_rigth = "mm" }\noffset = { gauge = 1.0 }\n',
+    )
+    keys = []
+    for lines in how:
+        with pytest.raises(InputError) as caught:
+            load_track(measured("s,LL,AL\n0,0,0\n1,0,0\n2,0,0\n3,0,0", USE + lines))
+        keys.append([fault.key.removeprefix("irregularities.0.") for fault in caught.value.faults])
+    assert keys == [["columns.z_right"], ["units", "offset", "reverse"]]
+    assert "'LL' is no column that is read" in str(caught.value)
 
 
 def test_missing_measured_file_is_a_fault_of_its_key(measured):

@@ -5,6 +5,7 @@ The rows become part of the track, so that a result carries its irregularities w
 
 import csv
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from railsim.arrays import Floats
 from railsim.definitions.embedding import embed, tables_of
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
-from railsim.errors import Fault, Faults, counted, input_error, nearest
+from railsim.errors import Fault, Faults, changed_faults, counted, input_error, nearest
 from railsim.files.access import TABLE_BYTES, read_bytes
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
@@ -34,6 +35,7 @@ SHARES = {
 # columns of single rails and of the track, of which a file has the ones or the others: they add up
 EITHER = ({"y_left", "y_right"}, {"y", "gauge"}), ({"z_left", "z_right"}, {"z", "cross_level"})
 LARGEST = 0.5  # m
+WIDEST = 0.1  # m, deviation of the gauge, as far as a track may be widened
 # Change of a displacement over distance between two rows beyond which no wheel could follow: a step
 # in the record, or a wrong unit.
 STEEPEST = 0.2
@@ -52,7 +54,8 @@ def _embed(key: str, table: dict[str, Any]) -> None:
     how = _definition(table)
     if how is None:
         return  # refused by the definition
-    rows = read_measured(path, how)
+    with changed_faults(lambda one: one if one.file else replace(one, key=f"{key}.{one.key}")):
+        rows = read_measured(path, how)
     for name in ("file", *READING):
         table.pop(name, None)
     table["rows"] = rows.tolist()
@@ -125,6 +128,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
     columns = [column and _as_told(column, how) for column in columns]
     named = [column for column in columns if column]
     _check_once(path, {column.name for column in named})
+    _check_told(how, [column.name for column in named])
     faults: list[tuple[int, str, str]] = []  # number of the line, found, allowed
     numbers, table = [], []
     for number, line in numbered[1:]:
@@ -162,6 +166,17 @@ def _check_once(path: Path, names: set[str]) -> None:
     faults.check()
 
 
+def _check_told(how: Measured, read: Sequence[str]) -> None:
+    """Raise InputError where a unit, an offset or a sign is given of a column that is not read."""
+    told = {"units": how.units or (), "offset": how.offset or (), "reverse": how.reverse}
+    Faults(
+        Fault("", key, f"'{name}' is no column that is read", nearest(name, read))
+        for key, names in told.items()
+        for name in names
+        if name not in read
+    ).check()
+
+
 def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[float]:
     """Numbers of a row that are read; raises ValueError of what was found and what is allowed."""
     if len(cells) != len(columns):
@@ -196,14 +211,14 @@ def _row_faults(
     for k in np.flatnonzero((step > 0.0) & (change > STEEPEST * step)).tolist():
         allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
         yield k + 1, f"{change[k] * 1e3:.3g} mm within {step[k]:.3g} m", allowed
-    absolute = np.zeros(len(rows), dtype=bool)  # the distance of the rails, not its deviation
+    absolute = np.zeros(len(rows), dtype=bool)  # the distance of the rails, or of another gauge
     for (name, unit, offset), written in zip(columns, values.T, strict=True):
         if name == "gauge":
-            gauge = abs(unit) * (written - offset)
-            absolute |= (gauge > 0.6) & (gauge < 2.0)
-    for k in np.flatnonzero(absolute).tolist():
-        allowed = "its deviation; give the nominal one by offset = { gauge = 1435.0 }"
-        yield k, "an absolute gauge", allowed
+            absolute = np.abs(unit * (written - offset)) > WIDEST
+            allowed = f"{WIDEST} m off the nominal one at most: its unit, or"
+            allowed += " offset = { gauge = 1435.0 } or the like, in this unit"
+            for k in np.flatnonzero(absolute).tolist():
+                yield k, f"a gauge of {abs(unit) * (written[k] - offset):.4g} m", allowed
     largest = rails.max(axis=1)
     for k in np.flatnonzero(~absolute & (largest > LARGEST)).tolist():
         allowed = f"{LARGEST:g} m at most; is the column in mm? then name it so (_mm, or units)"
@@ -246,8 +261,11 @@ def _mapped(path: Path, head: list[str], named: dict[str, str]) -> list[Column |
         elif theirs not in head:
             found = f"no column '{theirs}'"
             faults.append(Fault(str(path), "header", found, nearest(theirs, head)))
+        elif columns[at := head.index(theirs)] is not None:
+            found = f"'{theirs}' is named twice"
+            faults.append(Fault("", f"columns.{name}", found, "once; y and z are of both rails"))
         else:
-            columns[head.index(theirs)] = Column(name)
+            columns[at] = Column(name)
     if "s" not in named:
         faults.append(Fault("", "columns", "no column for s", "the arc length or mileage s"))
     faults.check()
