@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, print_json, show
@@ -60,6 +61,20 @@ def values(names: str, words: str, metavar: str, **more: Any) -> Callable[[F], F
 def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
     """Return an option without a value."""
     return click.option(*name.split(), is_flag=True, help=words, **more)
+
+
+def goes_with(partner: str, met: object, *names: str) -> None:
+    """Refuse parameters that the command line gives without their partner: they do nothing."""
+    context = click.get_current_context()
+    given = [
+        one.opts[0]
+        for one in context.command.params
+        if one.name in names
+        and context.get_parameter_source(one.name) is ParameterSource.COMMANDLINE
+    ]
+    if given and not met:
+        verb = "goes" if len(given) == 1 else "go"
+        raise click.UsageError(f"{' and '.join(given)} {verb} with {partner}")
 
 
 def together(*options: Callable[[Any], Any]) -> Callable[[F], F]:

@@ -43,6 +43,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     from railsim.compare import compare, comparison_table, comparison_tables, difference_table
     from railsim.plot.overlay import difference_figure, overlay
 
+    cli.goes_with("--out", output.folder, "over")
     groups = _groups(files, output)
     output.reserve(*(_named(name, title) for title in groups for name in FILES))
     records, parts = [], list[Any]()

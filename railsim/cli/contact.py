@@ -101,8 +101,11 @@ def command(
         raise input_error("--friction", f"{friction:g}", "above 0, at most 1")
     if gauges and len(gauges) == 1:
         raise click.UsageError("--gauges needs two gauges at least")
-    if overlay and not output.folder:
-        raise click.UsageError("--overlay goes with --out")
+    cli.goes_with("--out", output.folder, "overlay")
+    cli.goes_with("--creep", creep, "friction")
+    cli.goes_with("--build-creep-table", False, "workers")
+    for kind, _ in zip(("wheel", "rail"), profiles, strict=False):
+        cli.goes_with(f"no {kind.upper()}", False, kind)
     compared = load_profile(overlay) if overlay else None
     further = CREEP * creep + MAP * bool(gauges) + (OVERLAY,) * bool(compared)
     output.reserve(*PICTURES, *TABLES, *further)

@@ -56,6 +56,9 @@ def command(
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """
     workers = how.pop("workers")
+    cli.goes_with("--method bifurcation or all", method in ("bifurcation", "all"), "points")
+    tried = method not in ("linear", "continuation")
+    cli.goes_with("--method ramp, bifurcation or all", tried, "excitations")
     output.reserve(*FILES)
     inputs, ranges = given.inputs(), _ranges(conicity, friction, over)
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))

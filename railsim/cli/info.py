@@ -47,8 +47,10 @@ def command(
     runs = os.path.isdir(file) or path.name in STUDY_FILES
     if draw is not None and (result or runs):
         raise click.UsageError(f"{DRAWN}; see `railsim plot`")
-    if track is not None and not static:
-        raise click.UsageError("--track goes with --static")
+    cli.goes_with("--static", static, "track")
+    cli.goes_with(
+        "vehicles and tracks", not (result or runs), "assignments", "load", "speeds", "static"
+    )
     remarks: list[Remark] = []
     if runs:
         found = described_runs(file)
@@ -58,12 +60,14 @@ def command(
 
         found = describe(open_result(file))
     else:
-        from railsim.definitions import Vehicle
+        from railsim.definitions import Track, Vehicle
         from railsim.definitions.loading import load_any, load_track
         from railsim.description import describe
         from railsim.plottable import Plottable
 
         definition = load_any(file, [*assignments, *([f"load={load}"] if load else [])])
+        cli.goes_with("vehicles", isinstance(definition, Vehicle), "static")
+        cli.goes_with("tracks", isinstance(definition, Track), "speeds")
         if draw is not None:
             if not isinstance(definition, Plottable):
                 raise click.UsageError(DRAWN)

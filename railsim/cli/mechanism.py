@@ -54,8 +54,7 @@ def command(
     """
     if searched and len(files) > 1:
         raise click.UsageError("--optimise takes one FILE")
-    if not searched and any(value is not None for value in search.values()):
-        raise click.UsageError("--starts and --seed go with --optimise")
+    cli.goes_with("--optimise", searched, *search)
     from railsim.definitions.loading import load_mechanism
     from railsim.mechanisms.analysis import analyse
     from railsim.mechanisms.optimisation import optimise

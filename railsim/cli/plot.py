@@ -72,6 +72,8 @@ def command(
 
     folder = folder_of(file)
     of_study = os.path.isdir(folder)
+    result = not of_study and Path(file).suffix.lower() in RESULTS
+    cli.goes_with("results (.h5)", result, "over", "by", "between")
     default = folder / "study" if of_study and folder.name else folder
     path = output.file(default, PICTURES, suffix=".png")
     options = {"--against": against, "--family": family, "--kind": kind}
@@ -80,7 +82,7 @@ def command(
     elif wrong := [option for option, value in options.items() if value]:
         found = f"'{file}' is no study's folder"
         raise input_error(wrong[0], found, "a folder of results")
-    elif Path(file).suffix.lower() in RESULTS:
+    elif result:
         from railsim.plot.histories import histories
         from railsim.result import open_run
 

@@ -165,6 +165,11 @@ def test_bad_results_are_refused(files, chosen, words, capsys):
     assert words in capsys.readouterr().err
 
 
+def test_an_axis_without_a_picture_is_refused(files, capsys):
+    assert main(["compare", *files, "--over", "time"]) == 2
+    assert "--over goes with --out" in capsys.readouterr().err
+
+
 def test_one_file_by_two_paths_is_given_twice(files, capsys, monkeypatch):
     path = Path(files[0])
     monkeypatch.chdir(path.parent)

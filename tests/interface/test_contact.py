@@ -201,6 +201,9 @@ def test_what_was_put_right_in_a_file_is_told(tmp_path, capsys):
         (["--back-to-back", "1360"], "--back-to-back"),
         (["--wheel", "none.csv"], "cannot be read"),
         (["--overlay", "S1002"], "--overlay goes with --out"),
+        (["--friction", "0.35"], "--friction goes with --creep"),
+        (["--workers", "2"], "--workers goes with --build-creep-table"),
+        (["S1002_hollow", "--wheel", "S1002"], "--wheel goes with no WHEEL"),
         (["--wheel", "S1002", "--wheel", "S1002", "--wheel", "S1002"], "given 3 times"),
     ],
 )

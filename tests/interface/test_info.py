@@ -126,6 +126,19 @@ def test_a_track_without_the_forces_at_rest_is_refused(capsys):
     assert "--track goes with --static" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["curve_r250", "--static"], "--static goes with vehicles"),
+        (["coach_manchester", "--speed", "20"], "--speed goes with tracks"),
+        (["run.h5", "--load", "laden", "--set", "mass=1"], "--load and --set go with vehicles"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(capsys, arguments, words):
+    assert cli.main(["info", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
 def test_drawing_of_a_spring_is_refused(capsys, tmp_path):
     path = tmp_path / "drawing.png"
     assert cli.main(["info", "turasas_axlebox", "--draw", str(path)]) == 2

@@ -314,6 +314,8 @@ def test_track_is_drawn_by_name(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["plot", "curve_r250"]) == 0
     assert os.listdir() == ["curve_r250.png"]
+    assert main(["plot", "curve_r250", "--between", "300", "400", "--overwrite"]) == 2
+    assert "--between goes with results" in capsys.readouterr().err
     assert main(["plot", "curve_r250", "Y", "--out", "other.png"]) == 2
     assert "quantities belong to results" in capsys.readouterr().err
 

@@ -287,7 +287,18 @@ def test_curving_over_a_grid(capsys, tmp_path):
         (["critical-speed", "coach_manchester", "--to", "500"], "--to"),
         (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
         (["critical-speed", "coach_manchester", "--friction", "0,4"], "--friction: found 4; "),
-        (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
+        (
+            ["critical-speed", "coach_manchester", "--method", "bifurcation", "--points", "1"],
+            "--points: found 1",
+        ),
+        (
+            ["critical-speed", "coach_manchester", "--points", "5"],
+            "--points goes with --method bifurcation or all",
+        ),
+        (
+            ["critical-speed", "coach_manchester", "--method", "linear", "--excitation", "0.002"],
+            "--excitation goes with --method ramp, bifurcation or all",
+        ),
         (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
         (
             ["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"],
