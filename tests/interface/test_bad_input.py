@@ -287,7 +287,7 @@ def test_files_without_an_option_are_not_called_by_one(given, words, tmp_path, m
     [
         (
             "studies.stability_map._computed",
-            f"critical-speed {MAP} --points 0",
+            f"critical-speed {MAP} --method all --points 0",
             "--points: found 0",
         ),
         ("studies.stability_map._computed", f"critical-speed {MAP},9", "--conicity: found 9"),
