@@ -7,7 +7,7 @@ import click
 
 from railsim.cli import common as cli
 from railsim.cli.terminal import show
-from railsim.errors import Fault, Faults
+from railsim.errors import Fault, Faults, changed_faults
 from railsim.threads import keep_freed_memory
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def command(
     from railsim.result.facts import run_facts
     from railsim.result.tables import result_parts
     from railsim.simulation.assumptions import assumptions
+    from railsim.studies.case import of_settings
     from railsim.studies.run import run_case
 
     keep_freed_memory()
@@ -63,11 +64,13 @@ def command(
         *_, start, speed = map(float, resume.groups["state"]["end"])
         extent["start"] = start
     extent["start"] = extent["start"] or 0.0
-    case, path = _checked(given.run(speed, **extent), output, plots)
+    spec = given.run(speed, **extent)
+    case, path = _checked(spec, output, plots)
     quiet, overwrite = output.quiet, output.overwrite
     if not (quiet or output.as_json):
         show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
-    with output.progress(case.name) as progress:
+    found = changed_faults(lambda fault: of_settings(fault, spec))
+    with output.progress(case.name) as progress, found:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record: dict[str, Any] = {"file": str(path)}
     parts: list[Any] = []

@@ -117,6 +117,11 @@ def check_step(vehicle: Vehicle, track: Track, settings: Settings, speed: float)
     _balanced(vehicle, track, settings, speed)[1].at(speed)
 
 
+def check_own_outputs(vehicle: Vehicle, track: Track, settings: Settings) -> None:
+    """Raise InputError: quantities of one's own of what the run does not output."""
+    OutputPlan(assemble(vehicle, track, settings), settings, track, vehicle)
+
+
 def _evaluation(prepared: Preparation, settings: Settings) -> float:
     """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
     begin = float(prepared.state[TIME])

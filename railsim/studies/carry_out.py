@@ -6,7 +6,7 @@
 import errno
 import logging
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from itertools import chain, count
@@ -31,9 +31,9 @@ from railsim.result.facts import OF_FACTS
 from railsim.result.hdf5 import Storage
 from railsim.result.sinks import matches
 from railsim.simulation.outputs import requested
-from railsim.simulation.preparation import check_step
+from railsim.simulation.preparation import check_own_outputs, check_step
 from railsim.studies import execute
-from railsim.studies.case import Case
+from railsim.studies.case import Case, of_settings
 from railsim.studies.journal import JOURNAL, Journal, Records
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Point, check_names
@@ -243,7 +243,9 @@ class State:
             for law in (definition.laws or {}).items()
         )
         if not (execution.resume or execution.trying):
-            _check_steps([case for case in self.cases if case.file_name])
+            runs = {point.name: point.run for point in waiting}
+            varied = {*spec.grid, *(key for table in spec.linked for key in table)}
+            _check_settings([c for c in self.cases if c.file_name], runs, varied)
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""
@@ -328,15 +330,19 @@ class State:
         return Records(journal.path, found)
 
 
-def _check_steps(cases: Sequence[Case]) -> None:
+def _check_settings(
+    cases: Sequence[Case], runs: Mapping[str, RunSpec], grid: Collection[str]
+) -> None:
     """Raise InputError: a given step that is too long for a vehicle at its highest speed.
 
-    Other runs with that step may fail, but few do: whether it is stable takes a second to find out.
+    Or quantities of one's own of what it does not output. Other runs with that step may fail, but
+    few do: whether it is stable takes a second to find out.
     """
     longest: dict[tuple[object, ...], Case] = {}
     for case in cases:
-        if case.settings.step is not None:
-            key = case.labels.get("vehicle"), case.settings.scheme, case.settings.step
+        own = str(case.settings.outputs.own or "")
+        if own or case.settings.step is not None:
+            key = case.labels.get("vehicle"), case.settings.scheme, own, case.settings.step or 0.0
             if key not in longest or case.speed > longest[key].speed:
                 longest[key] = case
     faults, stable = Faults(), set[tuple[object, ...]]()
@@ -345,10 +351,14 @@ def _check_steps(cases: Sequence[Case]) -> None:
             continue  # with a longer step
 
         def told(fault: Fault, name: str = case.name) -> Fault:
-            return replace(fault, file="study", key=f"{name}, settings.{fault.key}")
+            return replace(of_settings(fault, runs[name], grid), found=f"{fault.found}, {name}")
 
+        inputs = case.vehicle, case.track, case.settings
         with faults.caught(told), suppress(ModelError):  # the outcome of the run
-            check_step(case.vehicle, case.track, case.settings, case.speed)
+            if case.settings.outputs.own:
+                check_own_outputs(*inputs)
+            if case.settings.step is not None:
+                check_step(*inputs, case.speed)
             stable.add(tuple(of))
     faults.check()
 

@@ -96,6 +96,27 @@ def _leads_to(name: str, key: str) -> bool:
     return all((str(AXES.index(p)) if p in AXES else p) in parts for p in name.split("."))
 
 
+def as_written(fault: Fault, grid: Collection[str], kind: str = "") -> Fault:
+    """Return the fault of an assignment with its key and option as given."""
+    if fault.file != OVERRIDE:
+        return fault
+    key = f"{kind}.{fault.key}" if kind else fault.key
+    of_grid = any(_leads_to(name, key) for name in grid)
+    parameter, option = ("grid", "--grid") if of_grid else ("assignments", "--set")
+    return replace(fault, file=parameter, option=option, key=key)
+
+
+def of_settings(fault: Fault, run: RunSpec, grid: Collection[str] = ()) -> Fault:
+    """Return a fault of the settings with the file or the assignment that gives them."""
+    if fault.file != "settings":
+        return fault
+    key = f"settings.{fault.key}"
+    given = (text.partition("=")[0].strip() for text in run.assignments)
+    if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in given):
+        return as_written(replace(fault, file=OVERRIDE), grid, "settings")
+    return fault if run.settings is None else replace(fault, file=str(run.settings))
+
+
 class Loader:
     """Loads the definitions of runs, each once, and gathers everything that is wrong with them.
 
@@ -127,26 +148,17 @@ class Loader:
         return self._loaded(kind, getattr(run, kind), self.overrides(run.assignments)[kind])
 
     def _load(self, kind: str, path: str | Path | None, overrides: Overrides) -> Any:
-        with self.faults.caught(lambda fault: self._as_written(fault, kind)):
+        with self.faults.caught(lambda fault: as_written(fault, self._grid, kind)):
             definition = LOADERS[kind](path, overrides)
             self.faults += profile_faults(definition, str(path))
             return definition
         return None
 
-    def _as_written(self, fault: Fault, kind: str = "") -> Fault:
-        """Return the fault of an assignment with its key and option as given."""
-        if fault.file != OVERRIDE:
-            return fault
-        key = f"{kind}.{fault.key}" if kind else fault.key
-        of_grid = any(_leads_to(name, key) for name in self._grid)
-        parameter, option = ("grid", "--grid") if of_grid else ("assignments", "--set")
-        return replace(fault, file=parameter, option=option, key=key)
-
     def _overrides(self, assignments: tuple[str, ...]) -> dict[str, Overrides]:
         """Return the assignments to vehicle, track and settings, each with the file's own keys."""
         found: dict[str, Overrides] = dict.fromkeys(LOADERS, ())
         for text in assignments:
-            with self.faults.caught(self._as_written):
+            with self.faults.caught(lambda fault: as_written(fault, self._grid)):
                 for kind, some in split_overrides([text]).items():
                     found[kind] += tuple(some)
         return found
@@ -202,17 +214,7 @@ class Loader:
 
                 with found.caught(told):
                     check_outputs(vehicle, settings, speed, analysis.standard, coarse=True)
-        return [self._of_settings(fault, run) for fault in found]
-
-    def _of_settings(self, fault: Fault, run: RunSpec) -> Fault:
-        """Return a fault of the settings with the file or the assignment that gives them."""
-        if fault.file != "settings":
-            return fault
-        key = f"settings.{fault.key}"
-        given = (text.partition("=")[0].strip() for text in run.assignments)
-        if any(_leads_to(name, key) or name.startswith(f"{key}.") for name in given):
-            return self._as_written(replace(fault, file=OVERRIDE), "settings")
-        return fault if run.settings is None else replace(fault, file=str(run.settings))
+        return [of_settings(fault, run, self._grid) for fault in found]
 
 
 def _misfits(

@@ -506,7 +506,8 @@ def test_only_the_longest_steps_are_tried_before_a_study_and_at_the_highest_spee
     assert tried == [(0.005, 30.0), (0.0025, 30.0), (0.00125, 30.0)]
     first, second = capsys.readouterr().err.splitlines()
     assert f"{COACH}_" in first
-    assert "settings.step: found 0.005 s; at most 0.002 s" in first
+    assert "settings.step: found 0.005 s" in first
+    assert "at most 0.002 s" in first
     assert "settings.step: found 0.0025 s" in second
     assert simulated == []
     assert not (tmp_path / "s").exists()
@@ -515,3 +516,30 @@ def test_only_the_longest_steps_are_tried_before_a_study_and_at_the_highest_spee
     run_study(StudySpec.of_file(load_study(file)), tmp_path / "tried", trying)
     assert len(simulated) == 8
     assert len(tried) == 3
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ('step = 0.005\n[laws.a]\nfile = "a.py"', "some.toml: step: found 0.005 s, unstable at"),
+        (
+            '[laws.a]\nfile = "a.py"\n[outputs.own.b]\nlaw = "a"\ninputs = { Q = "Q:9:left" }',
+            "some.toml: outputs.own.b.inputs.Q: no label '9', ",
+        ),
+    ],
+)
+def test_settings_that_do_not_fit_a_vehicle_are_named_with_their_file_before_the_first_run(
+    tmp_path, simulated, monkeypatch, capsys, lines, words
+):
+    def check_step(vehicle, track, settings, speed):
+        raise input_error("settings", "found 0.005 s, unstable at 20 m/s", "less", "step")
+
+    monkeypatch.setattr("railsim.studies.carry_out.check_step", check_step)
+    (tmp_path / "a.py").write_text("def a(Q):\n    return 2.0 * Q\n")
+    (tmp_path / "some.toml").write_text(f'format = "railsim-settings/1"\n{lines}\n')
+    file = written(tmp_path, 'speeds = [20.0]\nsettings = "some.toml"\n')
+    given = ["study", file, "--allow-code", "--out", str(tmp_path / "s"), "--workers", "1"]
+    assert main(given) == 2
+    assert words in capsys.readouterr().err
+    assert simulated == []
+    assert not (tmp_path / "s").exists()
