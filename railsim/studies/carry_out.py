@@ -76,7 +76,10 @@ def carry_out(
     a folder of another study; as `State`.
     """
     inputs, keep = spec.stored(), kept_quantities(spec.keep)
-    check_folder(folder, FILES, overwrite=True)
+    beside = list(execution.beside)
+    for point in points if execution.plots else ():
+        beside += f"{point.name}.png", comparison_picture(point.name, point.labels)
+    check_folder(folder, (*FILES, *dict.fromkeys(beside)), overwrite=True)
     remark = execution.on_remark or _LOG.warning
     with ExitStack() as stack:
         known = None
@@ -85,8 +88,7 @@ def carry_out(
         if not (execution.resume or execution.overwrite):
             _refuse_another_study(folder, known, inputs)
         if known is None and not execution.overwrite:
-            pictures = (f"{point.name}.png" for point in points if execution.plots)
-            _refuse_files_of_others(folder, (*execution.beside, *pictures))
+            _refuse_files_of_others(folder, beside)
         state = State(folder, points, load, spec, known, execution)
         client = None if execution.scheduler is None else execute.cluster(execution.scheduler)
         make_folder(folder)
@@ -155,6 +157,11 @@ def _computed(
         if workers > 1
         else execute.in_this_process(work, progress)
     )
+
+
+def comparison_picture(name: str, labels: Mapping[str, str | float]) -> str:
+    """Return the picture of a run beside those that differ in the vehicle only."""
+    return f"compare_{name.removeprefix(str(labels['vehicle']) + '_')}.png"
 
 
 def _refuse_another_study(

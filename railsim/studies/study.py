@@ -15,7 +15,7 @@ from railsim.errors import argument_error
 from railsim.files.access import check_folder, is_file, make_folder, write_text
 from railsim.processes import available_cores
 from railsim.result import Result
-from railsim.studies.carry_out import carry_out
+from railsim.studies.carry_out import carry_out, comparison_picture
 from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
 from railsim.studies.plan import Plan
@@ -196,10 +196,11 @@ def _draw(outcome: Outcome) -> None:
         if not picture.exists() or picture.stat().st_mtime < file.stat().st_mtime:
             save(histories(result), picture, overwrite=True)
         vehicle = str(record["labels"]["vehicle"])
-        alike.setdefault(record["name"].removeprefix(f"{vehicle}_"), {})[vehicle] = result
-    for rest, some in alike.items():
+        together = comparison_picture(record["name"], record["labels"])
+        alike.setdefault(together, {})[vehicle] = result
+    for name, some in alike.items():
         if len(some) > 1:
-            save(overlay(some), outcome.folder / f"compare_{rest}.png", overwrite=True)
+            save(overlay(some), outcome.folder / name, overwrite=True)
 
 
 def stored_spec(folder: Path) -> tuple[StudySpec, Path]:

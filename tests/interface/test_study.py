@@ -317,6 +317,17 @@ def test_files_of_the_user_are_not_replaced(tmp_path, simulated, capsys, name, w
     assert main(arguments(tmp_path, 20, more=["--overwrite"])) == 0
 
 
+@pytest.mark.parametrize("name", [f"{COACH}_{CURVE}_20", f"compare_{CURVE}_20"])
+def test_a_folder_called_like_a_picture_is_met_before_the_first_run(
+    tmp_path, simulated, capsys, name
+):
+    (tmp_path / f"{name}.png").mkdir()
+    assert main(arguments(tmp_path, 20, more=["--plots"])) == 2
+    assert f"{name}.png is a folder; rename it" in capsys.readouterr().err
+    assert simulated == []
+    assert [path.name for path in tmp_path.iterdir()] == [f"{name}.png"]
+
+
 def test_results_that_exist_are_kept_where_only_the_summary_would_be(tmp_path, simulated):
     assert main(arguments(tmp_path, 20)) == 0
     result = tmp_path / f"{COACH}_{CURVE}_20.h5"
