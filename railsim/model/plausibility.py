@@ -62,14 +62,28 @@ def vehicle_remarks(
     >>> print(vehicle_remarks(coach)[0])
     carbody: a moment of inertia is above the sum of the other two: Ixx, Iyy, Izz in this order?
     """
-    found = kept(vehicle, "_remarks_without_supports", lambda: _without_supports(flatten(vehicle)))
+    found = kept(vehicle, "_remarks_without_supports", lambda: _without_supports(vehicle))
     return [*found, *(_supports(vehicle, balanced) if supports else ())]
 
 
-def _without_supports(flat: FlatVehicle) -> list[Remark]:
-    found = [*_below_the_rails(flat), *_lengths(flat), *_by_text(_far_from_axles(flat))]
-    found += [*_inertias(flat), *_wheel_load(flat), *_vertical_modes(flat)]
-    return [*found, *_by_text(_pulling(flat))]
+def _without_supports(vehicle: Vehicle) -> list[Remark]:
+    flat, service = flatten(vehicle), vehicle.service
+    points = {f"sensors.{name}": point.position for name, point in vehicle.sensors.items()}
+    if service is not None:
+        points |= {f"service.points.{name}": at.position for name, at in service.points.items()}
+        points["service.floor_height"] = (0.0, 0.0, -service.floor_height)
+    found = [*_bodies(flat, points), *_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
+    found += _by_text(_pulling(flat))
+    for name in vehicle.loads:
+        of_load = _bodies(flatten(vehicle.model_copy(update={"load": name})), points)
+        found += [Remark(f"loads.{name}: {r.key}", r.text) for r in of_load if r not in found]
+    return found
+
+
+def _bodies(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> list[Remark]:
+    """Remarks on places, `points` by name among them, inertias and the mass."""
+    found = [*_below_the_rails(flat, points), *_lengths(flat, points)]
+    return [*found, *_inertias(flat), *_wheel_load(flat)]
 
 
 def gauge_remarks(flat: FlatVehicle, track: Track) -> list[Remark]:
@@ -93,9 +107,10 @@ def gathered(what: str, names: Sequence[str]) -> Remark:
     return Remark(listed(names), what)
 
 
-def _below_the_rails(flat: FlatVehicle) -> Iterator[Remark]:
+def _below_the_rails(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterator[Remark]:
     heights = {body.name: body.position[2] for body in flat.bodies if body.kind == "body"}
     heights |= {e.name: max(e.point1[2], e.point2[2]) for e in flat.elements}
+    heights |= {name: point[2] for name, point in points.items()}
     names = [name for name, z in heights.items() if z > 0.0]
     if names:
         low = max(heights.values())
@@ -103,10 +118,11 @@ def _below_the_rails(flat: FlatVehicle) -> Iterator[Remark]:
         yield gathered(text, names)
 
 
-def _lengths(flat: FlatVehicle) -> Iterator[Remark]:
+def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterator[Remark]:
     """Remarks on lengths that are not those of a railway vehicle in metres."""
     far = {body.name: max(map(abs, body.position)) for body in flat.bodies}
     far |= {e.name: max(map(abs, (*e.point1, *e.point2))) for e in flat.elements}
+    far |= {name: max(map(abs, point)) for name, point in points.items()}
     names = [name for name, most in far.items() if most > LONGEST]
     if names:
         yield gathered(f"up to {max(far.values()):g} m from the origin: are lengths in m?", names)

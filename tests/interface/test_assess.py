@@ -540,6 +540,7 @@ def test_wrong_command_lines_end_with_status_2(hunting, tmp_path, capsys):
         [str(tmp_path / "no.h5")], [path, path], [str(tmp_path / "empty")],
         [path, "--limits", "nothing"], [path, "--limits", "comfort"],
         [path, "--cant-deficiency", "-1"],
+        [path, "--cant-deficiency", "100"],
     ):  # fmt: skip
         assert main(["assess", *wrong]) == 2, wrong
         assert "Traceback" not in capsys.readouterr().err

@@ -113,6 +113,33 @@ def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):
     assert any(names in remark.key and words in remark.text for remark in found), found
 
 
+@pytest.mark.parametrize(
+    ("tables", "key", "words"),
+    [
+        (
+            {"sensors": {"seat": {"body": "frame", "position": [0.0, 0.0, 1.2]}}},
+            "sensors.seat",
+            "below the rails, z up to 1.2 m",
+        ),
+        (
+            {"loads": {"full": {"bodies": {"frame": {"position": [0.0, 0.0, -1200.0]}}}}},
+            "loads.full: frame",
+            "up to 1200 m from the origin",
+        ),
+        (
+            {"service": {"admissible_speed": 20.0, "cant_deficiency": 0.1, "floor_height": 950.0}},
+            "service.floor_height",
+            "up to 950 m from the origin",
+        ),
+    ],
+)
+def test_slips_of_sensors_loads_and_service_are_remarked_too(tables, key, words):
+    data = vehicle().model_dump(exclude_none=True)
+    (found,) = vehicle_remarks(Vehicle.model_validate({**data, **tables}))
+    assert found.key == key
+    assert found.text.startswith(words)
+
+
 def test_bodies_joined_in_a_ring_bounce_as_one():
     """Three bodies, each on both others: f = sqrt(k/(3 m))/(2 pi) on the springs of the axle."""
     data = vehicle(spring={"stiffness": [2e3, 2e3, 4e2]}).model_dump(exclude_none=True)

@@ -1,6 +1,6 @@
 """Parts of a vehicle file: bodies, wheelsets, axleboxes, assemblies, points, service."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -111,7 +111,7 @@ class Service(Definition):
 
     admissible_speed: Speed
     """Highest speed in service [m/s]"""
-    cant_deficiency: Positive
+    cant_deficiency: Annotated[Positive, Field(le=0.5)]
     """Admissible cant deficiency [m]"""
     category: Literal["passenger", "freight", "locomotive", "multiple_unit"] = "passenger"
     """Category, which decides on limits"""
