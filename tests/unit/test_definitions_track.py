@@ -107,6 +107,19 @@ def test_contradicting_track_is_refused(plan, cant, expected):
         ([CIRCLE], [CANTED], {"gauge": 1.0}, "100 mm here are 71 mm between rails 1.065 m apart"),
         ([STRAIGHT], [], {"irregularities": [DIP]}, "irregularities.0: from 498 to 502 m"),
         ([STRAIGHT], [], {"irregularities": [{**RANDOM, "begin": 100.0, "end": 200.0}]}, "beyond"),
+        ([STRAIGHT], [], {"irregularities": [{**RANDOM, "begin": 200.0}]}, "from 200 m on, beyond"),
+        (
+            [STRAIGHT],
+            [],
+            {"check_rail": [{"rail": "left", "flangeway": [[200.0, 0.05], [220.0, 0.05]]}]},
+            "check_rail.0: from 200 to 220 m, beyond the track's",
+        ),
+        (
+            [STRAIGHT],
+            [],
+            {"gauge_widening": [[5200.0, 0.0], [5220.0, 0.01]]},
+            "gauge_widening: from 5200 to 5220 m, beyond",
+        ),
         # from 12100 to 12150 m with its shift of 100 m; its first row is at 12000 m
         ([STRAIGHT], [], {"irregularities": [RECORDED]}, "shift = -12000 puts its begin at s = 0"),
     ],

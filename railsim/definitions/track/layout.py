@@ -5,10 +5,10 @@ that leave an end open take it from their neighbour.  What contradicts itself is
 allowed but unusual is a remark.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from railsim.constants import CANT_BASE, WIDENED
 from railsim.definitions.base import Remark
@@ -105,16 +105,30 @@ def track_remarks(track: "Track") -> list[Remark]:
     for k, part in enumerate(track.sections):
         if text := part.unusual():
             remarks.append(Remark(f"sections.{k}", text))
-    for k, shape in enumerate(track.irregularities):
-        begin, end = shape.extent(track.length)
+    for key, begin, end, shift in _spans(track):
         if end <= 0.0 or begin >= track.length:  # the track sees nothing of it
-            text = f"from {begin:g} to {end:g} m, beyond the track's {track.length:g} m"
-            if isinstance(shape, Measured):
-                text += (
-                    f"; is it a mileage? shift = {shape.shift - begin:g} puts its begin at s = 0"
-                )
-            remarks.append(Remark(f"irregularities.{k}", text))
+            span = f"from {begin:g} to {end:g} m" if begin <= end else f"from {begin:g} m on"
+            text = f"{span}, beyond the track's {track.length:g} m"
+            if shift is not None:
+                text += f"; is it a mileage? shift = {shift - begin:g} puts its begin at s = 0"
+            remarks.append(Remark(key, text))
     return remarks
+
+
+def _spans(track: "Track") -> Iterator[tuple[str, float, float, float | None]]:
+    """What belongs to a part of the track: key, begin, end, and `shift` of a recording [m]."""
+    for k, shape in enumerate(track.irregularities):
+        shift = shape.shift if isinstance(shape, Measured) else None
+        yield f"irregularities.{k}", *shape.extent(track.length), shift
+    for k, part in enumerate(track.sections):
+        yield f"sections.{k}", part.begin, part.end, None
+    tables: dict[str, Any] = {
+        f"check_rail.{k}": c.flangeway for k, c in enumerate(track.check_rail)
+    }
+    tables |= {key: getattr(track, key) for key in ("gauge_widening", "friction_table")}
+    for key, rows in (tables | {"support.variation": track.support.variation}).items():
+        if rows and len(rows) > 1:
+            yield key, rows[0][0], rows[-1][0], None
 
 
 # elements ---------------------------------------------------------------------------------------
