@@ -254,3 +254,15 @@ def test_a_sensor_on_no_body_is_a_fault():
     data["sensors"] = {"seat": {"body": "carbodi", "position": [5.0, 0.8, -1.6]}}
     with pytest.raises(railsim.InputError, match=r"sensors.seat.body: no body 'carbodi'"):
         railsim.static_loads(Vehicle.model_validate(data))
+
+
+def test_a_sensor_in_the_place_of_another_one_is_a_fault():
+    """An assessment would take the accelerations at the wrong point."""
+    data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    point = {"body": "carbody", "position": [5.0, 0.8, -1.6]}
+    data["sensors"] = {"seat": point, "frame_1": point}
+    data["service"]["points"] = {"seat": point, "floor_front": point, "floor_cab": point}
+    with pytest.raises(railsim.InputError) as caught:
+        railsim.static_loads(Vehicle.model_validate(data))
+    keys = [fault.key for fault in caught.value.faults]
+    assert keys == ["service.points.floor_front", "sensors.seat", "sensors.frame_1"]

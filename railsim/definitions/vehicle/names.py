@@ -5,6 +5,7 @@ together with wrong numbers.  A name is looked for in the innermost assembly fir
 a dotted name reaches into other assemblies.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -17,6 +18,8 @@ Scope = tuple[str, ...]
 Wrong = tuple[str, str, Callable[[], str]]
 """Key, what was found, and what is allowed."""
 SIDES = ("left", "right")
+STANDARD = re.compile(r"floor_(front|middle|rear)|frame_[1-9]\d*|axlebox_[1-9]\d*_(left|right)")
+"""Sensors that every vehicle has."""
 KINDS = {"bodies": "body", "wheelsets": "wheelset", "axleboxes": "axlebox"}
 MOST_PARTS = 5000  # a train of twenty coaches has some 2000
 MOST_WHEELSETS = 200
@@ -194,6 +197,10 @@ def _wrong_references(parts: Mapping[str, Any], known: Mapping[str, str]) -> Ite
     points = _members(service, "points") if isinstance(service, Mapping) else {}
     for table, members in (("service.points", points), ("sensors", _members(parts, "sensors"))):
         named |= {f"{table}.{name}.body": point.get("body") for name, point in members.items()}
+        for name in members:
+            if STANDARD.fullmatch(name) or (members is not points and name in points):
+                found = "the name of another sensor, in whose place it would be"
+                yield f"{table}.{name}", found, lambda: "a name of its own"
     for key, name in named.items():
         if isinstance(name, str) and name not in candidates:
             yield key, f"no body '{name}'", partial(nearest, name, candidates)
