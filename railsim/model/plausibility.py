@@ -4,6 +4,7 @@ What is looked at needs no rails and no run: where the bodies lie, the vertical 
 on their springs with the wheelsets held, and how the weight is shared by the supports.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,9 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.base import Remark, kept
-from railsim.definitions.elements.base import FreeLength
+from railsim.definitions.elements.base import Element, FreeLength
 from railsim.definitions.elements.friction import SideBearer
-from railsim.definitions.elements.springs import SpringDamper
+from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.errors import ModelError, listed
 
@@ -32,6 +33,8 @@ WHEEL_LOAD = (8e3, 250e3)
 """Mean static wheel load [N]: an empty light railcar has 20 kN, an ore wagon 200 kN."""
 LONGEST = 500.0
 """Coordinate of a part [m]: trains measure up to 400 m; a vehicle in mm reaches thousands."""
+TRAVEL = 1.0
+"""Clearance of a stop or side bearer [m]: railways have some centimetres."""
 WHEEL_RADIUS = (0.1, 1.2)
 """Wheel radius [m]: roller wagons have 0.16 m, steam locomotives 1.1 m."""
 BACK_TO_BACK = 2.5
@@ -126,6 +129,10 @@ def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterat
     names = [name for name, most in far.items() if most > LONGEST]
     if names:
         yield gathered(f"up to {max(far.values()):g} m from the origin: are lengths in m?", names)
+    travels = {e.name: _travel(e.definition) for e in flat.elements}
+    names = [name for name, most in travels.items() if most > TRAVEL]
+    if names:
+        yield gathered(f"no force before {max(travels.values()):g} m of travel: is it in m?", names)
     low, high = WHEEL_RADIUS
     usual = f"railways have {low:g} to {high:g} m"
     texts: dict[str, list[str]] = {}
@@ -141,6 +148,13 @@ def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterat
             texts.setdefault(text, []).append(body.name)
     for text, parts in texts.items():
         yield gathered(f"{text}: is it in m?", list(dict.fromkeys(parts)))
+
+
+def _travel(element: Element) -> float:
+    """How far an element moves before it acts: clearance, or free travel of a stop [m]."""
+    if isinstance(element, BumpStop):
+        return min((abs(x) for x, force in element.table if force != 0.0), default=math.inf)
+    return element.clearance if isinstance(element, SideBearer) else 0.0
 
 
 def _far_from_axles(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:

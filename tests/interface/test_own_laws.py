@@ -7,7 +7,7 @@ import pytest
 
 import railsim
 from railsim import laws
-from railsim.definitions.vehicle.laws import Law
+from railsim.definitions.vehicle.laws import Law, Signal
 from railsim.description.rest import describe_statics
 from railsim.errors import InputError
 from railsim.laws import binding
@@ -221,6 +221,20 @@ def test_faults_are_one_line(coach, track, element, words):
     with pytest.raises(InputError, match=words) as raised:
         railsim.simulate(with_element(coach, element), track, **WAY)
     assert len(str(raised.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "of"),
+    [
+        ("position", [0.0, 0.0, -1.0], "displacement, velocity, acceleration"),
+        ("axis", "y", "displacement, velocity, acceleration, angle, .*power"),
+        ("ahead", 20.0, "curvature, cant_angle"),
+    ],
+)
+def test_keys_of_a_signal_that_its_quantity_does_not_use_are_refused(key, value, of):
+    wheel = {"quantity": "Q", "wheelset": "axle", "side": "left", key: value}
+    with pytest.raises(ValueError, match=f"'{key}' belongs to {of} and only to them"):
+        Signal.model_validate(wheel)
 
 
 CONTROLLER = binding.Takes("a controller", ("time",), ("v",))

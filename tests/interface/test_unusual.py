@@ -32,6 +32,14 @@ SPRING = {
     "damping": [0.0, 0.0, 5e3],
 }
 
+STOP = {
+    "kind": "bump_stop",
+    "bodies": ["frame", "axle"],
+    "point": [0.0, 1.0, -0.6],
+    "sides": "both",
+    "axis": "z",
+}
+
 INCLINED = {  # 3 parts across, 4 down of 5
     "kind": "spring_damper",
     "points": [[0.0, 0.7, -1.0], [0.0, 1.0, -0.6]],
@@ -80,6 +88,11 @@ def vehicle(body=(), spring=(), axle=(), **others):
             vehicle(spring={"points": [[-6.0, 1.0, -0.9], [-6.0, 1.0, -0.6]]}),
             "spring.left, spring.right",
             "acts on axle from 6 m along the vehicle",
+        ),
+        (
+            vehicle(stop={**STOP, "table": [[0.0, 0.0], [20.0, 0.0], [30.0, 5e3]]}),
+            "stop.left, stop.right",
+            "no force before 30 m of travel: is it in m?",
         ),
         # a plate, the limit, has Izz = Ixx + Iyy = 14000 kg m2
         (vehicle(body={"inertia": [5e3, 9e3, 20e3]}), "frame", "above the sum of the other"),

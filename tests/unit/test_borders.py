@@ -191,7 +191,7 @@ BORDERS = {
         friction, [TINY, 1e3], [0.0]
     ),
     "and by the load alone too": (
-        lambda mu: friction(0.0, mu), [TINY, 0.3], [0.0]
+        lambda mu: friction(0.0, mu, stiffness=[0, 0, 1e3]), [TINY, 0.3], [0.0]
     ),
     "what slides sticks elastically": (
         lambda k: friction(TINY, 0.0, k), [TINY, 1e6], [0.0]

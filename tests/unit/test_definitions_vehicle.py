@@ -319,6 +319,12 @@ WRONG = [  # element, key that is at fault, what is said of it
         "",
         "no friction: 'friction_force' or 'friction_coefficient' is needed",
     ),
+    # without a vertical spring force nothing presses the surfaces together
+    (
+        {**PAD, "friction_coefficient": [0.0, 0.0, 0.3]},
+        "",
+        "'friction_coefficient' needs 'stiffness' or 'preload' along z",
+    ),
     ({**PAD, "stick_stiffness": [0.0, 0.0, 0.0]}, "", "along z needs 'stick_stiffness' along z"),
     (
         {**PAD, "friction_coefficient": [0.0, -0.1, 0.0]},

@@ -84,6 +84,9 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
         for axis, sliding, sticking in zip("xyz", slides, self.stick_stiffness, strict=True):
             if sliding and sticking == 0.0:
                 raise ValueError(f"friction along {axis} needs 'stick_stiffness' along {axis}")
+        pressed = self.stiffness[2] > 0.0 or (self.preload != "auto" and self.preload[2] != 0.0)
+        if any(self.friction_coefficient) and not pressed:
+            raise ValueError("'friction_coefficient' needs 'stiffness' or 'preload' along z")
 
     def rows(self) -> list[Mount]:
         """One mount with pads along the axes that have friction."""

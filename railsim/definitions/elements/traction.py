@@ -27,7 +27,9 @@ class AxleTorque(PairElement):
     """Slip (omega r - V)/V at which the torque begins to fall, and slip at which it is gone [1]"""
 
     @check
-    def _slip_rises(self) -> None:
+    def _tables_mean_something(self) -> None:
+        if self.over == "distance" and self.demand_table is None:
+            raise ValueError("'over' needs 'demand_table'")
         if self.slip_control is not None and self.slip_control[0] >= self.slip_control[1]:
             raise ValueError("'slip_control' needs two rising slips, such as [0.01, 0.02]")
 

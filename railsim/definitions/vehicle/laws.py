@@ -126,6 +126,14 @@ class Signal(base.Definition):
             raise ValueError(f"the axis of {self.quantity} is x, y or z")
         if not linear and self.quantity in BODY_SIGNALS and self.axis in ("x", "y", "z"):
             raise ValueError(f"the axis of {self.quantity} is roll, pitch or yaw")
+        only = {
+            "position": ("displacement", "velocity", "acceleration"),
+            "axis": (*BODY_SIGNALS, *ELEMENT_SIGNALS),
+            "ahead": ("curvature", "cant_angle"),
+        }
+        for key, quantities in only.items():
+            if self.quantity not in quantities and getattr(self, key):
+                raise ValueError(f"'{key}' belongs to {', '.join(quantities)} and only to them")
         if self.rate is None and (self.delay > 0.0 or self.noise > 0.0):
             raise ValueError("'delay' and 'noise' need 'rate'")
 
