@@ -58,6 +58,7 @@ def likeness(measured: Floats, simulated: Floats, step: float) -> Likeness:
     energy = float(np.sqrt(np.sum(a**2))), float(np.sqrt(np.sum(b**2)))
     if known.sum() < 10 or not all(energy):
         return Likeness(np.nan, np.nan, np.nan, np.nan)
+    a, b = (np.where(known, one - one[known].mean(), 0.0) for one in (measured, simulated))
     correlation, lag = _best(a, b, step)
     return Likeness(correlation, energy[0] / energy[1], lag, _drift(a, b, step))
 
@@ -77,6 +78,7 @@ def _drift(a: Floats, b: Floats, step: float) -> float:
 
 
 def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:
+    a, b = a - a.mean(), b - b.mean()  # a wheel load is alike at any shift but for its changes
     size = 2 * len(a)
     product = np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
     reach = min(int(LONGEST / step), len(a) // 4)

@@ -99,6 +99,14 @@ def test_likeness_is_the_lag_the_ratio_and_the_correlation(sign, late, drift):
         assert found.correlation == pytest.approx(1.0, abs=0.02)
 
 
+def test_a_wheel_load_lags_by_what_its_changes_do():
+    """Its mean is alike at any shift: without taking it off the best one would be none."""
+    step, late = 0.02, 17
+    changes = np.cumsum(np.random.default_rng(5).normal(size=3000 + late))
+    load = 50e3 + 2e3 * (changes - changes.mean()) / changes.std()
+    assert likeness(load[:3000], load[late:], step).lag == pytest.approx(late * step)
+
+
 def test_a_channel_that_says_nothing_is_like_none():
     some, none = signal(np.arange(200.0)), np.zeros(200)
     few = np.where(np.arange(200) < 9, some, np.nan)
