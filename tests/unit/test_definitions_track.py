@@ -100,6 +100,7 @@ def test_contradicting_track_is_refused(plan, cant, expected):
             {"vertical": [{"type": "CST", "length": 50.0, "gradient": g} for g in (0.0, 0.01)]},
             "the gradient steps",
         ),
+        ([STRAIGHT], [], {"support": {"pad_vertical": [80.0, 60.0]}}, "a stiffness of 80 N/m"),
         ([STRAIGHT], [], {"friction": 4.0}, "friction: a coefficient of 4 is beyond"),
         ([STRAIGHT], [], {"friction": [0.4, 1.1]}, "friction: a coefficient of 1.1 is beyond"),
         ([STRAIGHT], [], {"friction_table": [[0.0, 0.3], [9.0, 3.0]]}, "friction_table: a coeff"),

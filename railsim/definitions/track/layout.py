@@ -28,6 +28,8 @@ HIGHEST_CANT = 0.20
 ASTRAY_CANT = 1e-3
 # Coefficient of friction that is remarked on; dry steel on steel reaches 0.7.
 MOST_FRICTION = 1.0
+# Stiffness of a support that is remarked on [N/m]: under 50 kN it would yield by 50 mm.
+SOFTEST = 1e6
 # Smallest cant that counts as cant, smallest difference of length that counts [m].
 SMALL = 1e-6
 
@@ -93,6 +95,11 @@ def track_remarks(track: "Track") -> list[Remark]:
         remarks.append(Remark(key, f"{text} {MOST_FRICTION:g}"))
     if track.friction_table and track.friction != type(track).model_fields["friction"].default:
         remarks.append(Remark("friction", "has no effect: friction_table takes its place"))
+    for name in ("pad_vertical", "pad_lateral", "ballast_vertical", "ballast_lateral"):
+        spring = getattr(track.support, name)
+        if spring is not None and spring[0] < SOFTEST:
+            text = f"a stiffness of {spring[0]:g} N/m; railways have 1e7 to 1e9 N/m"
+            remarks.append(Remark(f"support.{name}", text))
     if track.speed is not None:
         remarks += alignment_remarks(plan, cant, track.speed)
     for section in (*plan, *cant, *vertical):
