@@ -131,9 +131,9 @@ class Signal(base.Definition):
             "axis": (*BODY_SIGNALS, *ELEMENT_SIGNALS),
             "ahead": ("curvature", "cant_angle"),
         }
-        for key, quantities in only.items():
-            if self.quantity not in quantities and getattr(self, key):
-                raise ValueError(f"'{key}' belongs to {', '.join(quantities)} and only to them")
+        for key, those in only.items():
+            if self.quantity not in those and getattr(self, key):
+                raise ValueError(f"'{key}' belongs to {', '.join(those)} and only to them")
         if self.rate is None and (self.delay > 0.0 or self.noise > 0.0):
             raise ValueError("'delay' and 'noise' need 'rate'")
 

@@ -197,10 +197,10 @@ def _wrong_references(parts: Mapping[str, Any], known: Mapping[str, str]) -> Ite
     points = _members(service, "points") if isinstance(service, Mapping) else {}
     for table, members in (("service.points", points), ("sensors", _members(parts, "sensors"))):
         named |= {f"{table}.{name}.body": point.get("body") for name, point in members.items()}
-        for name in members:
-            if STANDARD.fullmatch(name) or (members is not points and name in points):
+        for sensor in members:
+            if STANDARD.fullmatch(sensor) or (members is not points and sensor in points):
                 found = "the name of another sensor, in whose place it would be"
-                yield f"{table}.{name}", found, lambda: "a name of its own"
+                yield f"{table}.{sensor}", found, lambda: "a name of its own"
     for key, name in named.items():
         if isinstance(name, str) and name not in candidates:
             yield key, f"no body '{name}'", partial(nearest, name, candidates)
