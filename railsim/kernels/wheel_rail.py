@@ -75,9 +75,10 @@ from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.own_laws import own_friction
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rails import locate_rails
-from railsim.kernels.state import ARC_LENGTH
+from railsim.kernels.state import ARC_LENGTH, LAST_STEP
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions, step_compliance
+from railsim.kernels.system import IMPLICIT
 from railsim.kernels.transient import follow_creepages, give_back_creepages
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
@@ -87,6 +88,7 @@ def add_creep_forces(system, work, n, speed, state):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
     patch, force, wheel = work.patch, work.rail_force, work.wheel
+    stiff = work.watch[IMPLICIT] * abs(state[LAST_STEP])
     for k in range(n):
         w, side = work.patch_index[k, 0], work.patch_index[k, 1]
         b = contact.body[w]
@@ -129,6 +131,8 @@ def add_creep_forces(system, work, n, speed, state):
             across /= 1.0 + across * (c * c * y + s * s * z)
             contact_damping = damping + lag * patch[NORMAL_STIFFNESS, k]
             damping /= 1.0 + contact_damping * (s * s * y + c * c * z)
+        else:
+            damping += stiff * patch[NORMAL_STIFFNESS, k]
         work.contact_jacobian[b, J_ALONG] += patch[SLOPE_ALONG, k]
         work.contact_jacobian[b, J_SECANT] += secant
         work.contact_jacobian[b, J_SECANT_LEVER] += secant * cz

@@ -24,7 +24,7 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import LAST_STEP, N_SCALARS, SPEED
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE, WEIGHT
-from railsim.kernels.system import PARTS, PER_PART, SHARE, SIDEWAYS, System, Work
+from railsim.kernels.system import IMPLICIT, PARTS, PER_PART, SHARE, SIDEWAYS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import parts_of_wheel, work_arrays
@@ -34,6 +34,12 @@ Situation = tuple[System, Floats]
 SCHEMES = {"fast": FAST, "rk4": RK4}
 # s; beyond them accuracy, not stability, decides
 LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
+# the same on smooth rigid rails
+LONGEST_STEP_SMOOTH = LONGEST_STEP | {"fast": 5e-3 / 3.0}
+# rigid rails: longer steps than this, beyond which Verlet's method does not follow the vibration of
+# a wheel at 200 Hz with the margin, take the stiffness k of the contact implicitly too: as a
+# damping of k times the step times this.  Its error goes with the accelerations of the rails
+LONGEST_EXPLICIT, OF_STIFFNESS = 1.3e-3, 0.2
 # the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
 LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 2.5e-3}
 # the same with dry friction: an empty wagon on link suspension sticks and slides within few steps
@@ -114,6 +120,11 @@ def divide_strikes(work: Work, scheme: int, step: float, longest: float = math.i
     work.watch[SHARE] = FORCE_CHANGE_ELASTIC if elastic else FORCE_CHANGE
     work.watch[PER_PART] = PART_CHANGE_ELASTIC if elastic else PART_CHANGE
     work.watch[SIDEWAYS] = SIDEWAYS_ELASTIC if elastic else SIDEWAYS_RIGID
+    work.watch[IMPLICIT] = _implicit_share(step)
+
+
+def _implicit_share(step: float) -> float:
+    return OF_STIFFNESS if step > LONGEST_EXPLICIT else 0.0
 
 
 # Growth in one step up to which friction at its limit may be the cause; steps beyond the stability
@@ -128,7 +139,8 @@ class Stability:
     `SCHEMES`; `curving`: takes a step that is stable on straight track; returns systems and settled
     states in the tightest curve: none where there is no flange contact, or one that has to have the
     margin, and perhaps a second one for which half of it (its root) is enough; `on_straight`: takes
-    a step and what judges it on straight track, and returns the judgement.
+    a step and what judges it on straight track, and returns the judgement; `smooth`: whether the
+    rails and wheels of the run are.
     """
 
     def __init__(
@@ -139,8 +151,10 @@ class Stability:
         scheme: str,
         curving: Callable[[float], Sequence[Situation]],
         on_straight: Callable[[float, Callable[[], bool]], bool] = lambda _, judge: judge(),
+        smooth: bool = False,
     ) -> None:
         self._model, self._scheme, self._curving = model, scheme, curving
+        self._smooth = smooth
         self._on_straight = on_straight
         self._straight = system, state
         self._flange: Sequence[Situation] | None = None
@@ -151,11 +165,14 @@ class Stability:
         """Longest step that accuracy allows [s]."""
         system, state = self._straight
         speed = float(state[SPEED])
-        if not system.support.elastic:
-            return min(LONGEST_STEP[self._scheme], LONGEST_TRAVEL / speed)
-        most = LONGEST_STEP_ELASTIC[self._scheme]
+        elastic, longest = system.support.elastic, LONGEST_STEP_ELASTIC
+        if not elastic:
+            longest = LONGEST_STEP_SMOOTH if self._smooth else LONGEST_STEP
+        most = longest[self._scheme]
         if (system.internal.kind == PAD).any():
             most = min(most, LONGEST_STEP_FRICTION)
+        if not elastic:
+            return min(most, LONGEST_TRAVEL / speed)
         usual, stable = LONGEST_TRAVEL_ELASTIC / speed, LONGEST_TRAVEL_STABLE / speed
         if usual < most:
             growth = _step_growth(self._model, system, state, self._scheme, usual)
@@ -185,7 +202,7 @@ class Stability:
 
     def holds_on_straight(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable on straight track."""
-        return self._on_straight(margin * h, lambda: self._within(0, *self._straight, margin * h))
+        return self._on_straight(margin * h, lambda: self._within(0, *self._straight, h, margin))
 
     def holds(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable, in flange contact too."""
@@ -195,14 +212,20 @@ class Stability:
             self._flange = self._curving(min(h, self.longest))
         margins = margin, math.sqrt(margin)
         return all(
-            self._within(number, *at, factor * h)
+            self._within(number, *at, h, factor)
             for number, (at, factor) in enumerate(zip(self._flange, margins, strict=False), 1)
         )
 
-    def _within(self, number: int, system: System, state: Floats, h: float) -> bool:
-        """Whether a step is stable; `number`: 0 on straight track, from 1 in flange contact."""
-        more = GROWTH_IN_FLANGE if number else GROWTH
-        growth = _step_growth(self._model, system, state, self._scheme, h, more)
+    def _within(
+        self, number: int, system: System, state: Floats, h: float, margin: float = 1.0
+    ) -> bool:
+        """Whether a step `margin` times as long as `h` is stable.
+
+        `number`: 0 on straight track, from 1 in flange contact.
+        """
+        more, implicit = GROWTH_IN_FLANGE if number else GROWTH, _implicit_share(h)
+        h *= margin
+        growth = _step_growth(self._model, system, state, self._scheme, h, more, implicit)
         if growth > more and number not in self._allowed:  # for most the question does not arise
             vehicle_growth = _vehicle_growth(self._model, system, state)
             self._allowed[number] = max(0.0, vehicle_growth) + more
@@ -238,16 +261,23 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
 
 
 def _step_growth(
-    model: Model, system: System, state: Floats, scheme: str, h: float, enough: float = 0.0
+    model: Model,
+    system: System,
+    state: Floats,
+    scheme: str,
+    h: float,
+    enough: float = 0.0,
+    implicit: float = 0.0,
 ) -> float:
     """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails.
 
     Where `enough` is given, that is returned instead of what surely is smaller, and a lower bound
-    of what more than doubles a mode in each step.
+    of what more than doubles a mode in each step.  `implicit`: see `Work.watch`.
     """
-    if scheme == "fast" and system.support.elastic:
+    if scheme == "fast":
         system, state = _after_step(system, state, h)
     arrays = system, work_arrays(system)
+    arrays[1].watch[IMPLICIT] = implicit
     rest = np.zeros_like(state), np.zeros((3, len(state))), empty_recorder(model, 1)
     one = SCHEMES[scheme], h, Chunk(1, 1, _NEVER)
 
@@ -285,6 +315,8 @@ def _after_step(system: System, state: Floats, h: float) -> tuple[System, Floats
     """
     state = state.copy()
     state[LAST_STEP] = h
+    if not system.support.elastic:
+        return system, state
     end = len(state) - N_SCALARS
     state[end - SUPPORT_SIZE * len(system.contact.body) : end][WEIGHT::SUPPORT_SIZE] = 0.5
     return system._replace(contact=system.contact._replace(load=1e6 * system.contact.load)), state

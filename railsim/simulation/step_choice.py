@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -215,7 +216,10 @@ class StepChoice:
                 "straight", f"{digest.hexdigest()} {h!r}", lambda: {"holds": bool(judge())}
             )
 
-        shared = {"on_straight": on_straight} if of_class else {}
+        shared: dict[str, Any] = {"on_straight": on_straight} if of_class else {}
+        shared["smooth"] = not (
+            self._track.irregularities or self._track.sections or self._model.wheels.uneven
+        )
         return Stability(model, level, rolling, self._settings.scheme, curving, **shared)
 
 

@@ -45,6 +45,26 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(name, step, monkeypatch)
     assert len(judged) == 2
 
 
+ROUGH = [{"type": "random", "spectrum": "erri_b176_low"}]
+DIP = [{"type": "dip", "rail": "left", "s": 20.0, "length": 1.0, "depth": 0.002}]
+
+
+@pytest.mark.parametrize(
+    ("speed", "changes", "step"),
+    [
+        (20.0, {}, 5e-3 / 3.0),  # the stiffness of the contact is implicit
+        (20.0, {"irregularities": ROUGH}, 1.25e-3),
+        (20.0, {"irregularities": DIP}, 1.25e-3),
+        (37.0, {}, 1.25e-3),  # 0.06 m of track a step
+    ],
+)
+def test_longer_steps_on_rigid_rails_where_nothing_shakes_the_wheels(speed, changes, step):
+    track = load_track("straight").replace(support={"preset": "rigid"}, **changes)
+    vehicle = load_vehicle("coach_manchester")
+    steps = prepare(vehicle, track, Settings(), speed, duration=1.0).steps
+    assert steps.at(speed)[0] == pytest.approx(step)
+
+
 def test_dry_friction_is_followed_in_short_steps():
     """Stable at 2.5 ms, where sum_Y in R 250 m is off by 3.8 % from RK4; here 1 %."""
     vehicle, track = load_vehicle("wagon_uic_link_empty"), load_track("straight")

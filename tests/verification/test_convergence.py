@@ -62,6 +62,39 @@ def test_slow_in_a_curve_the_default_step_finds_the_position_of_a_short_one(vehi
     np.testing.assert_allclose(runs[0].Y[-1], runs[1].Y[-1], rtol=0.0, atol=20.0)
 
 
+@pytest.mark.parametrize(("hand", "speed", "friction"), [(1.0, 15.0, 0.4), (-1.0, 18.0, 0.2)])
+def test_the_long_step_on_smooth_rigid_rails_agrees_with_the_reference_scheme(
+    hand, speed, friction
+):
+    """Over the transition, where flanges come into contact: peaks within 0.5 %, no more than 1 %
+    of the largest guiding force at any instant."""
+    lengths = (30.0, 30.0, 20.0)
+    plan = [
+        {"type": kind, "length": length} | ({"radius": hand * 250.0} if kind == "CIR" else {})
+        for kind, length in zip(("STR", "CLO", "CIR"), lengths, strict=True)
+    ]
+    track = load_track("curve_r250").replace(
+        plan=plan, cant=[], support={"preset": "rigid"}, friction=friction
+    )
+    fast, reference = (
+        simulate(
+            load_vehicle("coach_manchester"),
+            track,
+            speed=speed,
+            until=80.0,
+            settings=Settings(**scheme),
+        )
+        for scheme in ({}, {"scheme": "rk4", "step": 5e-4})
+    )
+    assert fast.attributes["step"] == pytest.approx(5e-3 / 3.0)
+    for name in ("Q", "Y", "sum_Y"):
+        found, expected = (np.abs(r.groups["peaks"][name]).max() for r in (fast, reference))
+        assert found == pytest.approx(expected, rel=5e-3)
+    rows = min(len(fast.time), len(reference.time))  # a run may end with one more output
+    difference = np.abs(fast.Y[:rows] - reference.Y[:rows])
+    assert difference.max() < 0.01 * np.abs(fast.Y).max()
+
+
 def test_halving_the_step_moves_no_peak_by_half_a_per_cent(run, default):
     assert peaks(run(step=0.5 * default.attributes["step"])) == pytest.approx(
         peaks(default), rel=5e-3
