@@ -51,6 +51,7 @@ def assess(
     coarse: bool = False,
     all_sections: bool = False,
     law: str | None = None,
+    sections: str | Path | None = None,
 ) -> list[Assessment]:
     """Assess results: one assessment for each vehicle among them.
 
@@ -73,6 +74,8 @@ def assess(
         Include sections outside the conditions of their zones.
     law : str, optional
         Of ``wear``: one of `railsim.assessment.wear.LAWS`, or a file of one; by default all.
+    sections : str or Path, optional
+        File of test sections, in place of those cut from the tracks.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def assess(
         raise argument_error("standard", standard, "one of " + ", ".join(STANDARDS))
     check_options(
         standard, limits=limits, service=service, method=method != "normal", causal=causal,
-        all_sections=all_sections, law=law,
+        all_sections=all_sections, law=law, sections=sections,
     )  # fmt: skip
     groups = by_vehicle(results, loads=standard in RUNNING)
     if standard in RUNNING:
@@ -113,6 +116,7 @@ def assess(
             assess_running(
                 runs, standard, limits, service,
                 method=method, causal=causal, coarse=coarse, all_sections=all_sections,
+                sections=sections,
             )
             for runs in groups
         ]  # fmt: skip

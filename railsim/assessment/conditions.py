@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.assessment.sections import TestSection, reasons
+from railsim.assessment.sections import TestSection, reasons, section_length
 from railsim.assessment.zones import Population, ZoneReport
 from railsim.constants import WIDENED
 from railsim.definitions.limits import (
@@ -114,6 +114,15 @@ def zone_conditions(
     found = [_number(place, words, wanted, met=enough)]
     if not n:
         return found
+    lengths = [(v.section.end - v.section.begin, v.section.speed) for v in report.values]
+    odd = [own for own, speed in lengths if abs(own - section_length(wanted, speed)) > 0.5]
+    if odd:
+        ends = dict.fromkeys(f"{length:.4g}" for length in (min(odd), max(odd)))
+        words = f"{len(odd)} of {n} have {' to '.join(ends)} m"
+        standard = sorted({section_length(wanted, speed) for _, speed in lengths})
+        required = " or ".join(f"{length:g} m" for length in standard)
+        about = "lengths of the sections", place, NOT_MET, words, required
+        found.append(Condition(*about, source, checked))
     if (ends := wanted.mean_radius) is not None:
         met, wide = ends[0] <= report.radius <= ends[1], f"{ends[0]:.0f} to {ends[1]:.0f} m"
         about = "mean radius", place, _stated(met), f"{report.radius:.0f} m", wide

@@ -22,15 +22,16 @@ from railsim.assessment.en14363 import (
 )
 from railsim.assessment.influences import influences
 from railsim.assessment.record import Record
-from railsim.assessment.sections import TestSection, track_sections
+from railsim.assessment.sections import TestSection, own_sections, track_sections
 from railsim.assessment.track_quality import TrackQuality, quality_class
 from railsim.assessment.verdict import all_verdicts, overall
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.limits import RunningLimits
-from railsim.definitions.loading import load_running_limits
+from railsim.definitions.loading import load_own_sections, load_running_limits
+from railsim.definitions.own_sections import OwnSections
 from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import Fault, InputError, input_error, listed, nearest
+from railsim.errors import Fault, Faults, InputError, input_error, listed, nearest
 from railsim.result import Result
 
 OF_LIMITS = ("admissible_speed", "cant_deficiency", "category")
@@ -98,22 +99,25 @@ def assess_running(
     causal: bool,
     coarse: bool,
     all_sections: bool,
+    sections: str | Path | None = None,
 ) -> Assessment:
     """Assess all runs of a vehicle; arguments as of `railsim.assessment.assess`.
 
     Raises InputError: no service table; a run lacks a quantity, is sampled too coarsely or too
-    short; limits of another standard, or not those of the assessed quantities.
+    short; limits of another standard, or not those of the assessed quantities; sections outside a
+    run.
     """
     limits = running_limits(standard, file)
+    own = _own_sections(sections, runs) if sections else None
     service = service or _service(runs)
     done = []
     populations = _populations(runs)
     for name, result in runs.items():
         if result.status == "complete":
             record = Record(result, name, coarse=coarse)
-            sections = _sections(record, limits, service)
-            counting = [s for s in sections if s.zone and (all_sections or not s.reason)]
-            done.append(_Run(record, populations[name], sections, counting))
+            cut = _sections(record, limits, service, own)
+            counting = [s for s in cut if s.zone and (all_sections or not s.reason)]
+            done.append(_Run(record, populations[name], cut, counting))
     if done and not any(run.sections for run in done):
         allowed = "a longer run, or other sections in the limits file (--limits)"
         raise input_error(done[0].record.name, "too short for one section", allowed, "distance")
@@ -129,8 +133,8 @@ def assess_running(
         result = members[0].record.result
         population = Population(name, result.vehicle(), result["Q0"])
         values = [v for run in members for v in run.values]
-        sections = [s for run in members for s in run.sections]
-        reports = zone_reports(population, values, sections, service, limits, method)
+        of_all = [s for run in members for s in run.sections]
+        reports = zone_reports(population, values, of_all, service, limits, method)
         zones += reports
         conditions += missing_zones(population, reports, limits)
         for report in reports if not population.fault else ():
@@ -202,13 +206,41 @@ def _service(runs: Mapping[str, Result]) -> Service:
     return service
 
 
-def _sections(record: Record, limits: RunningLimits, service: Service) -> list[TestSection]:
-    """Return the sections of a run; raises InputError where it lacks a quantity."""
+def _own_sections(file: str | Path, runs: Mapping[str, Result]) -> tuple[str, OwnSections]:
+    """Return a file of sections, each on the track of a run."""
+    own, tracks = load_own_sections(file), {result.track().name for result in runs.values()}
+    Faults(
+        Fault(str(file), f"sections.{k}.track", f"'{one.track}'", nearest(one.track, tracks))
+        for k, one in enumerate(own.sections)
+        if one.track and one.track not in tracks
+    ).check()
+    return str(file), own
+
+
+def _sections(
+    record: Record, limits: RunningLimits, service: Service, own: tuple[str, OwnSections] | None
+) -> list[TestSection]:
+    """Return the sections of a run; raises InputError where it lacks a quantity, or one of these.
+
+    `own`: Those of a file of the user's own, in place of those cut from the track.
+    """
     record.need_quantities(limits.standard)
     if "Q0" not in record.result:
         raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
     covered, track = record.covered(), record.result.track()
-    return track_sections(track, limits, service, covered, record.speed_at)
+    if own is None:
+        return track_sections(track, limits, service, covered, record.speed_at)
+    file, given = own[0], own[1].sections
+    there = [(k, one) for k, one in enumerate(given) if one.track in (None, track.name)]
+    allowed = (
+        f"within {math.ceil(covered[0])} to {math.floor(covered[1])} m, as all of {record.name}"
+    )
+    Faults(
+        Fault(file, f"sections.{k}", f"{one.begin:g} to {one.end:g} m", allowed)
+        for k, one in there
+        if one.begin < covered[0] or one.end > covered[1]
+    ).check()
+    return own_sections(track, limits, service, [one for _, one in there], record.speed_at)
 
 
 def _section_rows(run: _Run, service: Service) -> list[SectionRow]:

@@ -13,6 +13,7 @@ from itertools import product
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.limits import RunningLimits, Zone, up_to
+from railsim.definitions.own_sections import OwnSection
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.section import Section
@@ -100,6 +101,40 @@ def track_sections(
             deficiency = outer_deficiency(speed, radius, cant)
             why = reason or _outside(limits.zones[zone], radius, deficiency, speed, service)
             found.append(TestSection(zone, first, first + length, radius, deficiency, speed, why))
+    return found
+
+
+def own_sections(
+    track: Track,
+    limits: RunningLimits,
+    service: Service,
+    given: Sequence[OwnSection],
+    speed_at: Callable[[float], float],
+) -> list[TestSection]:
+    """Sections that the user gives, with their reasons; arguments as of `track_sections`.
+
+    Radius and cant are those of the part of constant curvature and cant that holds most of one.
+    """
+    parts, found = _constant(track) or [(0.0, 0.0, math.inf, 0.0)], []
+    for one in sorted(given, key=lambda one: one.begin):
+        begin, end, radius, cant = max(
+            parts, key=lambda part: min(one.end, part[1]) - max(one.begin, part[0])
+        )
+        speed, why = speed_at(0.5 * (one.begin + one.end)), []
+        deficiency = outer_deficiency(speed, radius, cant)
+        own = zone_of(radius, deficiency, limits)
+        name = (one.zone or own) if begin < one.end and one.begin < end else ""
+        zone = limits.zones.get(name)
+        if not begin - 1e-6 <= one.begin < one.end <= end + 1e-6:
+            why = [f"not within {begin:.0f} to {end:.0f} m of constant curvature and cant"]
+        elif zone is None:
+            why = [f"no zone has the radius {abs(radius):.6g} m"]
+        low, high = (zone.radius if zone else None) or (math.inf, math.inf)
+        if zone and name != own and not low <= abs(radius) <= high:
+            why.append(f"given as of zone {name}, the radius of {abs(radius):.6g} m is not")
+        why += [_outside(zone, radius, deficiency, speed, service)] if zone else []
+        about = radius, deficiency, speed, "; ".join(filter(None, why))
+        found.append(TestSection(name if zone else "", one.begin, one.end, *about))
     return found
 
 

@@ -32,6 +32,7 @@ FILES = [f"assessment{ending}" for ending in ENDINGS]
 @cli.choice("--category", "Instead of the vehicle's.", CATEGORIES, default=None)
 @cli.flag("--causal", "Causal filters, with phase, as in measuring amplifiers.")
 @cli.flag("--coarse", "Also accept results below 1000 samples per second.")
+@cli.option("--sections", "File of test sections, instead of those cut from the track.", "F")
 @cli.flag("--all-sections", "Also use sections outside a zone's conditions.")
 @cli.fail_option
 @cli.output_options("Folder for assessment.json, .csv and .png.")

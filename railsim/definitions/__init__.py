@@ -23,6 +23,7 @@ settings       settings files: how to compute, not what
 measurement    measured runs
 embedding      files that others name
 section_files  lists of profile sections along a rail or around a wheel
+own_sections   test sections of the user's own
 limits, wear_law, published  limit values, laws of wear, published results, each with its source
 mirror         mirror images of vehicles and tracks
 creep_law      the creep laws: names, numbers, labels

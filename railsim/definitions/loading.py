@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         WheelLimits,
     )
     from railsim.definitions.mechanism.definition import Mechanism
+    from railsim.definitions.own_sections import OwnSections
     from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.study.definition import Study
     from railsim.definitions.study.scenario import Scenario
@@ -49,6 +50,7 @@ FORMATS = {
     "railsim-stationary-limits/1": "limits:StationaryLimits",
     "railsim-wear-law/1": "wear_law:WearLawFile",
     "railsim-wheel-limits/1": "limits:WheelLimits",
+    "railsim-sections/1": "own_sections:OwnSections",
     "railsim-measurement/1": "measurement:MeasurementFile",
     "railsim-validation-limits/1": "limits:ValidationLimits",
 }
@@ -164,6 +166,13 @@ def load_wear_law(path: str | Path) -> "WearLawFile":
     from railsim.definitions.wear_law import WearLawFile
 
     return loaded(WearLawFile, sources.read_source(Path(path), "limits"), ())
+
+
+def load_own_sections(path: str | Path) -> "OwnSections":
+    """Load test sections of the user's own."""
+    from railsim.definitions.own_sections import OwnSections
+
+    return loaded(OwnSections, sources.read_source(Path(path), "limits"), ())
 
 
 def load_study(path: str | Path, overrides: Overrides = ()) -> "Study":

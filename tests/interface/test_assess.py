@@ -194,6 +194,70 @@ def test_sections_outside_the_conditions_do_not_count_unless_asked():
     assert len(next(z for z in found.zones if z.zone == "4").values) == 11
 
 
+def linear(speed=23.0, length=800.0):
+    """Guiding force of the outer wheel 10 kN and 50 N/m, in a right-hand curve of R 300 m."""
+
+    def Y(t, s):
+        return np.stack([-10e3 - 50.0 * s, np.zeros(s.shape)], axis=-1)
+
+    return made(track(*curve(300.0, length), cant=0.12), speed, Y=Y, **FINE)
+
+
+def own_sections(folder, *rows):
+    file = folder / "sections.toml"
+    file.write_text(f'format = "railsim-sections/1"\nsections = [{", ".join(rows)}]\n')
+    return file
+
+
+def test_own_sections_take_the_place_of_those_of_the_program(tmp_path):
+    """Medians of a force that is linear along the track are those of the middles: 345 and 445 m."""
+    rows = "{begin = 410, end = 480}", "{begin = 310, end = 380, zone = '4'}"
+    (found,) = assess(linear(), sections=own_sections(tmp_path, *rows))
+    row = rows_of(found, "4", "Y_qst")["wheelset 1 outer"]
+    assert (row.estimate.N, [s.section.begin for s in found.sections]) == (2, [310.0, 410.0])
+    # the instants nearest to the ends are up to 23 mm off
+    assert row.estimate.mean == pytest.approx(10e3 + 50.0 * 395.0, abs=1.0)
+    assert not any("lengths" in one.name for one in found.conditions)
+
+
+def test_own_sections_of_other_lengths_and_places_are_told(tmp_path):
+    """Zone 4 has 70 m; the curve is from 200 to 1000 m, its kinks are rounded over 10 m."""
+    rows = ("{begin = 310, end = 410}", "{begin = 959, end = 1029}", "{begin = 600, end = 670, "
+            "zone = '3'}", "{begin = 1030, end = 1040}", "{begin = 700, end = 770}")  # fmt: skip
+    (found,) = assess(linear(), sections=own_sections(tmp_path, *rows))
+    said = {row.section.begin: (row.section.zone, row.section.reason) for row in found.sections}
+    constant = "not within 205 to 995 m of constant curvature and cant"
+    assert [said[310.0], said[700.0]] == [("4", ""), ("4", "")]
+    assert said[959.0] == ("4", constant)
+    assert said[1030.0] == ("", constant)
+    assert said[600.0] == ("3", "given as of zone 3, the radius of 300 m is not")
+    (lengths,) = (one for one in found.conditions if one.name == "lengths of the sections")
+    assert lengths.sentence == (
+        "zone 4: lengths of the sections not met: 1 of 2 have 100 m; required 70 m"
+    )
+
+
+@pytest.mark.parametrize(("rows", "words"), [
+    (["{begin = 310, end = 380}", "{begin = 379, end = 449}"],
+     "sections.1: 379 to 449 m; outside sections.0"),
+    (["{begin = 310, end = 300}"], "sections.0.end: 300 m; 315 m at least"),
+    (["{begin = 310, end = 'x'}"], "sections.0.end: "),
+    (["{begin = 310, end = 380, track = 'made'}"], "sections.0.track: 'made'"),
+    (["{begin = 310, end = 380, zone = '5'}"], "zone: '5'; must be '1', '2', '3' or '4'"),
+    (["{begin = 10, end = 80}"], "sections.0: 10 to 80 m; within 8"),
+    ([], "sections: "),
+])  # fmt: skip
+def test_own_sections_that_cannot_be_are_refused(tmp_path, capsys, rows, words):
+    """3 s of 23 m/s are 69 m, to which what is ahead of the coach's middle adds."""
+    linear(length=150.0).save(tmp_path / "r.h5")
+    file = own_sections(tmp_path, *rows)
+    assert main(["assess", str(tmp_path / "r.h5"), "--sections", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert f"{file}: " in said
+    assert words in said
+    assert "Traceback" not in said
+
+
 def test_more_cant_deficiency_takes_the_two_dimensional_method():
     plan = [e for r in (290.0, 310.0, 330.0) for e in curve(r, 500.0)]
     run = made(track(*plan, cant=0.12), 23.0, Y=lambda t, s: both_sides(-1e3 + 0.0 * s))
@@ -289,6 +353,7 @@ def test_vehicle_without_a_service_table_is_refused():
     ("comfort", "law", "usfd"),
     ("comfort", "admissible_speed", 30.0),
     ("wear", "causal", True),
+    ("comfort", "sections", "sections.toml"),
     ("safety", "method", "simplified"),
     ("comfort", "all_sections", True),
 ])  # fmt: skip

@@ -1,0 +1,50 @@
+"""Files of test sections of the user's own, `railsim-sections/1`, as a laboratory has them."""
+
+from itertools import combinations
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from railsim.definitions.base import Definition, NonNegative, Positive, Text
+from railsim.definitions.file_definition import FileDefinition
+from railsim.errors import Fault
+
+SHORTEST = 5.0  # m
+
+
+class OwnSection(Definition):
+    """A test section."""
+
+    begin: NonNegative
+    """Arc length of its beginning [m]"""
+    end: Positive
+    """Arc length of its end [m]"""
+    zone: Literal["1", "2", "3", "4"] | None = None
+    """Test zone, instead of that of its radius and cant deficiency"""
+    track: Text | None = None
+    """Name of its track; without it on the tracks of all runs"""
+
+
+class OwnSections(FileDefinition):
+    """Test sections of the user's own, in place of those that are cut from the track."""
+
+    KIND: ClassVar = "limits"
+
+    format: Literal["railsim-sections/1"]
+    sections: Annotated[tuple[OwnSection, ...], Field(min_length=1)]
+    """Test sections, in any order"""
+
+    def contradictions(self) -> list[Fault]:
+        """Return sections too short for means over 2 m, and those that overlap on a track."""
+        each = list(enumerate(self.sections))
+        found = [
+            Fault("", f"sections.{k}.end", f"{one.end:g} m", f"{one.begin + SHORTEST:g} m at least")
+            for k, one in each
+            if one.end < one.begin + SHORTEST
+        ]
+        for (k, one), (n, other) in combinations(each, 2):
+            same = one.track == other.track or None in (one.track, other.track)
+            if same and one.begin < other.end and other.begin < one.end:
+                words = f"{other.begin:g} to {other.end:g} m", f"outside sections.{k}"
+                found.append(Fault("", f"sections.{n}", *words))
+        return found
