@@ -117,8 +117,8 @@ def zone_conditions(
     lengths = [(v.section.end - v.section.begin, v.section.speed) for v in report.values]
     odd = [own for own, speed in lengths if abs(own - section_length(wanted, speed)) > 0.5]
     if odd:
-        ends = dict.fromkeys(f"{length:.4g}" for length in (min(odd), max(odd)))
-        words = f"{len(odd)} of {n} have {' to '.join(ends)} m"
+        span = dict.fromkeys(f"{length:.4g}" for length in (min(odd), max(odd)))
+        words = f"{len(odd)} of {n} have {' to '.join(span)} m"
         standard = sorted({section_length(wanted, speed) for _, speed in lengths})
         required = " or ".join(f"{length:g} m" for length in standard)
         about = "lengths of the sections", place, NOT_MET, words, required
