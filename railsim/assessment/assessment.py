@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.conditions import Condition, SectionRow
+from railsim.assessment.en14363 import SectionValues
 from railsim.assessment.influences import Influence
 from railsim.assessment.safety import SafetyReport
 from railsim.assessment.verdict import DERAILED, FAIL, Verdict
@@ -41,6 +42,8 @@ class Assessment:
         Conditions of the test.
     sections : tuple of SectionRow
         Sections of all runs.
+    transitions : dict
+        Values of the transitions, which are in no statistics, by run.
     hunting_frequency : float or None
         Frequency at which the instability is judged [Hz].
     influences : tuple of Influence
@@ -74,6 +77,7 @@ class Assessment:
     safety: Mapping[str, SafetyReport] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     limits: RunningLimits | ComfortLimits | None = None
+    transitions: Mapping[str, Sequence[SectionValues]] = field(default_factory=dict)
 
     @property
     def exceeded(self) -> bool:
@@ -127,7 +131,9 @@ class Assessment:
             "zones": [zone.record() for zone in self.zones],
             "hunting_frequency": self.hunting_frequency,
             "regression": [one.record() for one in self.influences],
-            "sections": [row.record() for row in self.sections], "comfort": comfort,
+            "sections": [row.record() for row in self.sections],
+            "transitions": {run: [v.record() for v in x] for run, x in self.transitions.items()},
+            "comfort": comfort,
             "wear": {run: [w.record() for w in wheels] for run, wheels in self.wear.items()},
             "safety": {run: report.record() for run, report in self.safety.items()},
             "remarks": list(self.remarks),

@@ -26,6 +26,7 @@ from railsim.result.filters import distance_means, window_centres
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"
 VERDICTS = (SAFETY, LOADING, RIDE)
+DYNAMIC = (SAFETY, LOADING)  # of groups and kinds: what is given for transitions
 WORDS = {
     SAFETY: "running safety", LOADING: "track loading", RIDE: "ride",
     INFORMATION: "for information",

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.criteria import CRITERIA, FORCES, HUNTING_ZONES
+from railsim.assessment.criteria import CRITERIA, FORCES, HUNTING_ZONES, Criterion
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection
 from railsim.assessment.signals import Signals, wheel_load
@@ -31,6 +31,13 @@ class SectionValues:
     values: dict[tuple[str, str], list[float]] = field(default_factory=dict)
     lifted: dict[str, float] = field(default_factory=dict)  # length without load by wheel [m]
 
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI; of two percentiles the larger."""
+        about = {name: getattr(self.section, name) for name in ("begin", "end", "radius", "speed")}
+        each = self.values.items()
+        rows = [{"name": name, "place": place, "value": max(x)} for (name, place), x in each]
+        return {**about, "lifted": self.lifted, "quantities": rows}
+
 
 def section_values(
     record: Record,
@@ -38,22 +45,23 @@ def section_values(
     *,
     f0: float | None = None,
     causal: bool = False,
+    criteria: Sequence[Criterion] | None = None,
 ) -> list[SectionValues]:
     """Values of the given sections of a run.
 
     `record`: Run with all that is needed, and accelerations or body motions. `sections`: In the
     order of the track. `f0`: Frequency of the instability [Hz]; without it the instability is not
     judged. `causal`: Use causal filters, as in a measuring amplifier, instead of zero-phase
-    filters.
+    filters. `criteria`: What is measured, by default all.
     """
     found = []
     for group in _neighbours(sections):
         signals = Signals(record, group[0].begin, group[-1].end, f0=f0, causal=causal)
         for section in group:
             values: dict[tuple[str, str], list[float]] = {}
-            for name, criterion in CRITERIA.items():
+            for criterion in CRITERIA.values() if criteria is None else criteria:
                 measured = criterion.measure(signals, section)
-                values |= {(name, place): numbers for place, numbers in measured.items()}
+                values |= {(criterion.name, place): numbers for place, numbers in measured.items()}
             found.append(SectionValues(section, values, _lifted(signals, section)))
     return found
 

@@ -13,7 +13,7 @@ from railsim.assessment.conditions import (
     vehicle_conditions,
     zone_conditions,
 )
-from railsim.assessment.criteria import CRITERIA, INFORMATION
+from railsim.assessment.criteria import CRITERIA, DYNAMIC, INFORMATION
 from railsim.assessment.en14363 import (
     SectionValues,
     hunting_frequency,
@@ -22,7 +22,7 @@ from railsim.assessment.en14363 import (
 )
 from railsim.assessment.influences import influences
 from railsim.assessment.record import Record
-from railsim.assessment.sections import TestSection, own_sections, track_sections
+from railsim.assessment.sections import TestSection, own_sections, track_sections, transitions
 from railsim.assessment.track_quality import TrackQuality, quality_class
 from railsim.assessment.verdict import all_verdicts, overall
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
@@ -148,6 +148,7 @@ def assess_running(
         next(iter(runs.values())).vehicle().name, standard, tuple(runs),
         overall(verdicts, limits.deciding), verdicts, tuple(zones), tuple(conditions), tuple(rows),
         f0, tuple(influences(zones, service)), remarks=_remarks(done, zones, limits), limits=limits,
+        transitions={run.record.name: _on_transitions(run, method, causal=causal) for run in done},
     )  # fmt: skip
 
 
@@ -241,6 +242,14 @@ def _sections(
         if one.begin < covered[0] or one.end > covered[1]
     ).check()
     return own_sections(track, limits, service, [one for _, one in there], record.speed_at)
+
+
+def _on_transitions(run: _Run, method: str, *, causal: bool) -> list[SectionValues]:
+    record = run.record
+    parts = transitions(record.result.track(), record.covered(), record.speed_at)
+    criteria = [one for one in CRITERIA.values() if method in one.methods and one.kind in DYNAMIC]
+    criteria = [one for one in criteria if one.group in DYNAMIC]
+    return section_values(record, parts, causal=causal, criteria=criteria)
 
 
 def _section_rows(run: _Run, service: Service) -> list[SectionRow]:

@@ -9,11 +9,11 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.limits import RunningLimits, Zone, up_to
-from railsim.definitions.own_sections import OwnSection
+from railsim.definitions.own_sections import SHORTEST, OwnSection
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.section import Section
@@ -101,6 +101,26 @@ def track_sections(
             deficiency = outer_deficiency(speed, radius, cant)
             why = reason or _outside(limits.zones[zone], radius, deficiency, speed, service)
             found.append(TestSection(zone, first, first + length, radius, deficiency, speed, why))
+    return found
+
+
+def transitions(
+    track: Track, covered: tuple[float, float], speed_at: Callable[[float], float]
+) -> list[TestSection]:
+    """All whole transitions that a run covers: from one constant curvature and cant to the next.
+
+    They belong to no zone.  The radius is that of the tighter end, infinite between curves of
+    opposite hands, where neither wheel is the outer one; kinks that are rounded only are left out.
+    Arguments as of `track_sections`.
+    """
+    found = []
+    for (_, begin, before, _), (end, _, after, _) in pairwise(_constant(track)):
+        least = max(track.rounding + 1e-6, SHORTEST)
+        if covered[0] <= begin < end - least and end <= covered[1]:
+            opposite = 1.0 / before / after < 0.0
+            radius = math.inf if opposite else min(before, after, key=abs)
+            speed = speed_at(0.5 * (begin + end))
+            found.append(TestSection("", begin, end, radius, math.nan, speed, "transition"))
     return found
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 from railsim.assessment.assessment import Assessment
 from railsim.assessment.comfort_report import PointComfort
-from railsim.assessment.criteria import WORDS
+from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.safety import SafetyReport
+from railsim.assessment.sections import TestSection
 from railsim.assessment.wear import LAWS
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
@@ -22,6 +23,7 @@ def tables(assessment: Assessment) -> list[Table]:
     """Return the tables of an assessment."""
     return [
         *(zone_table(zone) for zone in assessment.zones if zone.nearest),
+        *([transition_table(assessment)] if any(assessment.transitions.values()) else []),
         *(_comfort(run, points) for run, points in assessment.comfort.items()),
         *(_wear(run, wheels) for run, wheels in assessment.wear.items()),
         *(table for run, report in assessment.safety.items() for table in _safety(run, report)),
@@ -38,6 +40,26 @@ def zone_table(zone: ZoneReport) -> Table:
         Column("share", "% of limit", format=".1f"),
     ]  # fmt: skip
     return Table(columns, map(_row, zone.nearest))
+
+
+def transition_table(assessment: Assessment) -> Table:
+    """Of each quantity the largest value on all transitions, and where it is."""
+    largest: dict[str, tuple[float, str, str, TestSection]] = {}
+    for run, own in assessment.transitions.items():
+        for one in own:
+            for (name, place), values in one.values.items():
+                found = max(values), place, run, one.section
+                largest[name] = max(largest.get(name, found), found, key=lambda row: row[0])
+    number = sum(map(len, assessment.transitions.values()))
+    head = f"{number} transition{'s' * (number > 1)}, in no statistics"
+    rows = [
+        [c.words, place, c.unit, c.text(value), run, f"{s.begin:.0f} to {s.end:.0f}", s.radius]
+        for name, (value, place, run, s) in largest.items()
+        for c in [CRITERIA[name]]
+    ]
+    columns = [Column("quantity", head), *map(Column, ("location", "unit", "largest", "run")),
+               Column("part", unit="m"), Column("radius", "R", "m", ".0f")]  # fmt: skip
+    return Table(columns, rows)
 
 
 def _row(row: Assessed) -> list[object]:

@@ -10,12 +10,13 @@ from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.influences import RADIUS
 from railsim.assessment.record import RUNNING
 from railsim.assessment.running import by_vehicle
+from railsim.assessment.tables import transition_table
 from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError, listed
-from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table
+from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, of_values
 from railsim.report.inputs import differing
 from railsim.result import Result
 from railsim.result.sensors import sensors
@@ -69,6 +70,8 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Sect
         found.tables.append(_reasons(one))
         found.details += [_conditions(one), _sections(one), *_rows(one)]
         found.details += [_influences(one)] if one.influences else []
+        if any(one.transitions.values()):
+            found.details.append(of_values(transition_table(one), f"Transitions: {one.vehicle}"))
     found.tables += _zones(running)
     found.details += [_setup(one, runs) for one in running]
     found.details += [_sources(one.limits) for one in running[:1] if one.limits]

@@ -258,6 +258,38 @@ def test_own_sections_that_cannot_be_are_refused(tmp_path, capsys, rows, words):
     assert "Traceback" not in said
 
 
+def test_transitions_stand_apart_and_are_in_no_statistics(tmp_path):
+    """Clothoids from 120 to 200 and 1000 to 1080 m, rounded over 10 m; the force is 10 kN + 50 N/m.
+
+    The second is passed up to 1085 m: means over 2 m end at 1084 m, of which 99.85 % lie within
+    0.15 % of their range.
+    """
+    (found,) = assess({"r": linear()})
+    first, second = found.record()["transitions"]["r"]
+    assert (first["begin"], first["end"], first["radius"]) == (115.0, 205.0, 300.0)
+    assert (second["begin"], second["end"]) == (995.0, 1085.0)
+    values = {(row["name"], row["place"]): row["value"] for row in second["quantities"]}
+    assert {name for name, _ in values} == {"sum_Y", "Y_over_Q", "Q"}
+    force = 10e3 + 50.0 * (996.0 + 0.9985 * 88.0)
+    assert values["sum_Y", "wheelset 2"] == pytest.approx(force, abs=5.0)
+    assert values["Y_over_Q", "wheelset 2 outer"] == pytest.approx(force / Q0, rel=2e-4)
+    (zone,) = (z for z in found.zones if z.zone == "4")
+    assert max(v.section.end for v in zone.values) <= 995.0
+    table = next(one for one in tables(found) if "transitions" in one.columns[0].heading)
+    assert [row[5] for row in table.rows] == ["995 to 1085", "995 to 1085", "115 to 205"]
+
+
+def test_between_curves_of_opposite_hands_no_wheel_is_the_outer_one():
+    plan = [
+        {"type": "CIR", "length": 300.0, "radius": 400.0}, {"type": "CLO", "length": 60.0},
+        {"type": "CIR", "length": 300.0, "radius": -400.0}, {"type": "STR", "length": 200.0},
+    ]  # fmt: skip
+    (found,) = assess({"r": made(track(*plan, cant=0.0), 20.0, Y=lambda t, s: both_sides(s))})
+    (one,) = found.transitions["r"]  # the end of the curve is a kink and none
+    assert (one.section.begin, one.section.end, one.section.radius) == (295.0, 365.0, math.inf)
+    assert {place for name, place in one.values if name == "Q"} >= {"wheelset 1 left"}
+
+
 def test_more_cant_deficiency_takes_the_two_dimensional_method():
     plan = [e for r in (290.0, 310.0, 330.0) for e in curve(r, 500.0)]
     run = made(track(*plan, cant=0.12), 23.0, Y=lambda t, s: both_sides(-1e3 + 0.0 * s))
