@@ -27,6 +27,8 @@ class PointComfort:
     place: float  # along the vehicle, from the reference body forwards [m]
     mean: comfort.MeanComfort  # N_MV, N_VA, N_VD and the root mean squares of 5 s
     iso_rms: Floats  # weighted root mean squares after ISO 2631-1 along x, y, z [m/s2], float64[3]
+    MTVV: Floats  # largest running root mean squares over 1 s, likewise [m/s2], float64[3]
+    VDV: Floats  # vibration dose values, likewise [m/s1.75], float64[3]
     sperling: dict[str, float]  # wz ``lateral`` and ``vertical``
     transitions: tuple[comfort.TransitionComfort, ...]
     events: dict[str, float]  # largest P_DE by posture [%]
@@ -43,7 +45,9 @@ class PointComfort:
             "continuous_largest": largest,  # along x, y, z; classes are those of y and z
             "continuous_class": [class_of(limits.continuous, value) for value in largest[1:]],
             "iso2631_rms": [float(v) for v in self.iso_rms],
-            "iso2631_total": float(np.sqrt(np.sum(self.iso_rms**2))), "sperling": self.sperling,
+            "iso2631_total": float(np.sqrt(np.sum(self.iso_rms**2))),
+            "iso2631_MTVV": self.MTVV.tolist(), "iso2631_VDV": self.VDV.tolist(),
+            "sperling": self.sperling,
             "P_CT": {
                 posture: max((getattr(t, posture) for t in self.transitions), default=None)
                 for posture in ("standing", "seated")
@@ -90,7 +94,8 @@ def comfort_report(record: Record) -> list[PointComfort]:
         PointComfort(
             name, record.sensor_offset(name),
             comfort.mean_comfort(np.concatenate(into.blocks), np.concatenate(into.back)),
-            np.sqrt(into.iso / into.count),
+            np.sqrt(into.iso / into.count), np.sqrt(into.largest),
+            (into.fourth / record.rate) ** 0.25,
             {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
             tuple(transitions[number]), into.events,
             float(into.hunting / into.iso[1]) if frequency else 0.0,
@@ -107,7 +112,7 @@ class _Gathered:
         self.hunting = 0.0
         self.blocks: list[Floats] = []
         self.back: list[Floats] = []
-        self.iso = np.zeros(3)
+        self.iso, self.fourth, self.largest = np.zeros((3, 3))
         self.sperling: dict[Direction, float] = {"lateral": 0.0, "vertical": 0.0}
         self.events = {"standing": 0.0, "seated": 0.0}
         self.count = 0
@@ -122,6 +127,10 @@ class _Gathered:
         size, count = counted.stop - counted.start, self.count
         iso = np.column_stack([floor[:, 0], floor[:, 1], WK.weighted(a[:, 2], rate)])
         self.iso += np.sum(iso[counted] ** 2, axis=0)
+        self.fourth += np.sum(iso[counted] ** 4, axis=0)
+        first = counted.start - round(rate) * bool(count)  # windows reach into the part before
+        running = comfort.running_mean(iso[first : counted.stop] ** 2, rate, 1.0)
+        self.largest = np.max([self.largest, np.max(running, axis=0, initial=0.0)], axis=0)
         self.count += size
         if self.frequency:
             low, high = (share * self.frequency for share in NEAR)

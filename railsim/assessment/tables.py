@@ -81,6 +81,7 @@ def _comfort(run: str, points: Sequence[PointComfort]) -> Table:
         Column("place", run), Column("x", unit="m", format=".2f"),
         *(Column(name, format=".2f") for name in ("N_MV", "N_VA", "N_VD")),
         Column("iso2631_total", "ISO a_v", "m/s2", ".3f"),
+        Column("MTVV", unit="m/s2", format=".3f"), Column("VDV", unit="m/s1.75", format=".2f"),
         Column("lateral", "Wz lateral", format=".2f"),
         Column("vertical", "Wz vertical", format=".2f"),
         Column("P_CT", "P_CT standing (%)", format=".1f"),
@@ -90,6 +91,7 @@ def _comfort(run: str, points: Sequence[PointComfort]) -> Table:
         {
             "place": p.sensor, "x": p.place, "N_MV": p.mean.N_MV, "N_VA": p.mean.N_VA,
             "N_VD": p.mean.N_VD, "iso2631_total": float((p.iso_rms**2).sum() ** 0.5), **p.sperling,
+            "MTVV": p.MTVV.max(), "VDV": p.VDV.max(),
             "P_CT": max((t.standing for t in p.transitions), default=None),
             "P_DE": p.events["standing"],
         }

@@ -7,7 +7,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from example_result import example_result
+from example_result import BODIES, example_result
 from made_record import FINE, Q0, curve, made, track
 
 import railsim
@@ -439,6 +439,29 @@ def test_comfort_of_known_vibration():
     assert any("60" in remark for remark in found.remarks)
 
 
+def test_shock_in_two_parts_of_a_run_is_in_the_values_of_iso_2631():
+    """5 Hz of 0.1 m/s2 upwards, 1 m/s2 for 1 s: half before, half after 63 s, where parts meet.
+
+    Wk is 1.039 at 5 Hz; a sine has 1/2 of the square and 3/8 of the fourth power of its amplitude.
+    """
+
+    def vertical(t):
+        a = np.zeros((len(t), len(BODIES), 3))
+        size = np.where((t >= 62.5) & (t < 63.5), 1.0, 0.1)
+        a[:, 0, 2] = size * np.sin(2.0 * np.pi * 5.0 * (t - 62.5))
+        return a
+
+    run = made(track({"type": "STR", "length": 2500.0}), 20.0, accelerations=vertical)
+    (found,) = assess(run, "comfort")
+    middle = next(p for p in next(iter(found.comfort.values())) if p.sensor == "floor_middle")
+    assert middle.MTVV[2] == pytest.approx(1.039 / math.sqrt(2.0), rel=0.03)
+    dose = 1.039 * (0.375 * (1.0 + 121.0 * 1e-4)) ** 0.25
+    assert middle.VDV[2] == pytest.approx(dose, rel=0.03)
+    assert middle.record(load_comfort_limits("comfort"))["iso2631_VDV"][2] == middle.VDV[2]
+    (table,) = tables(found)
+    assert {"MTVV", "VDV"} <= {column.name for column in table.columns}
+
+
 def test_wear_of_a_known_wear_number():
     def T_gamma(t, s):
         return np.stack([np.full(s.shape, 65.0), np.full(s.shape, 250.0)], axis=-1)
@@ -753,8 +776,8 @@ def test_comfort_is_drawn_over_the_speed_with_classes_and_a_legend_beside():
         for speed in (40.0, 20.0, 30.0):
             name = f"{rails} {speed}"
             comfort[name] = [
-                PointComfort(place, x, MeanComfort(n, n, n, np.zeros((60, 3)), 60), np.zeros(3),
-                             {"lateral": n, "vertical": n}, (), {})
+                PointComfort(place, x, MeanComfort(n, n, n, np.zeros((60, 3)), 60),
+                             *np.zeros((3, 3)), {"lateral": n, "vertical": n}, (), {})
                 for place, x, n in (("middle", 0.0, factor * speed / 20), ("end", 9.0, speed / 5))
             ]  # fmt: skip
             driven[name] = (speed, "Straight", rails)

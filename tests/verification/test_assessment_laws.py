@@ -660,7 +660,8 @@ def test_record_of_a_point_has_the_worst_transition_and_the_worst_block_of_each_
     blocks = np.array([[0.1, 0.5, 0.2], [0.3, 0.4, 0.9]])
     mean = MeanComfort(1.0, 2.0, 3.0, blocks, 2)
     passed = [TransitionComfort(0.0, 1.0, 0.5, 0.1, 1.0, *p) for p in ((8.0, 2.0), (5.0, 3.0))]
-    point = PointComfort("floor_front", 9.5, mean, np.array([0.2, 0.3, 0.6]), {}, tuple(passed), {})
+    iso = np.array([[0.2, 0.3, 0.6], [0.3, 0.4, 0.9], [1.0, 2.0, 3.0]])
+    point = PointComfort("floor_front", 9.5, mean, *iso, {}, tuple(passed), {})
     found = point.record(load_comfort_limits("comfort"))
     assert found["P_CT"] == {"standing": 8.0, "seated": 3.0}
     assert found["continuous_largest"] == [0.3, 0.5, 0.9]
@@ -670,6 +671,7 @@ def test_record_of_a_point_has_the_worst_transition_and_the_worst_block_of_each_
         found = replace(point, mean=mean).record(load_comfort_limits("comfort"))
         assert found["continuous_class"] == [name, "very comfortable"]
     assert found["iso2631_total"] == pytest.approx(0.7)
+    assert (found["iso2631_MTVV"], found["iso2631_VDV"]) == ([0.3, 0.4, 0.9], [1.0, 2.0, 3.0])
     assert [found[name] for name in ("N_MV", "N_VA", "N_VD", "blocks")] == [1.0, 2.0, 3.0, 2]
     assert short_of_blocks([point]) == "2 blocks of 5 s, EN 12299 requires 60"
     whole = replace(point, mean=replace(mean, blocks=60))
