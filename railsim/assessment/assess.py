@@ -8,6 +8,7 @@ from railsim.assessment.comfort_report import caused_by_hunting, comfort_report,
 from railsim.assessment.record import RUNNING, Record
 from railsim.assessment.running import assess_running, by_vehicle, running_limits
 from railsim.assessment.safety import safety_report
+from railsim.assessment.wear import WholeLifeRailModel
 from railsim.assessment.wear_report import wear_report
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits
@@ -139,6 +140,9 @@ def _by_runs(
     about = vehicle, standard, tuple(runs)
     if standard == "wear":
         wear = {name: wear_report(record, law) for name, record in records.items()}
+        if (model := next(iter(wear.values()))[0].model) != WholeLifeRailModel():
+            counted = f"threshold {model.threshold:g} N, counted: {model.counted}"
+            remarks.append(f"Whole Life Rail Model of {law}: {counted}")
         return Assessment(*about, wear=wear, remarks=tuple(remarks))
     if standard == "safety":
         safety = {name: safety_report(record) for name, record in records.items()}

@@ -14,7 +14,7 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.loading import load_wear_law
 from railsim.definitions.wear_law import ArchardMap, FrictionWork
-from railsim.errors import argument_error
+from railsim.errors import argument_error, input_error
 
 YIELD_IN_SHEAR = 300e6  # yield stress in shear k of rail steel, default value [Pa]
 
@@ -117,7 +117,20 @@ def wear_law(name: str) -> WearLaw:
         law: Callable[[Patches], Floats] = partial(archard, law=file.archard)
     elif file.krause_poll is not None:
         law = partial(krause_poll, law=file.krause_poll)
+    else:
+        allowed = "archard or krause_poll; whole_life_rail_model is only for `railsim assess`"
+        raise input_error(name, "no law of wear", allowed)
     return WearLaw(file.name, f"{file.name} ({file.source})", law, file.to_toml())
+
+
+def laws_and_rail_model(law: str | None) -> tuple[dict[str, WearLaw], "WholeLifeRailModel"]:
+    """Laws by name and model of the rail that `law` stands for: None, a name or a file."""
+    file = load_wear_law(law) if law and law.endswith(".toml") else None
+    rail = file and file.whole_life_rail_model
+    model = WholeLifeRailModel(**rail.model_dump()) if rail else WholeLifeRailModel()
+    if law is None or (file and file.archard is None and file.krause_poll is None):
+        return dict(LAWS), model
+    return {law: wear_law(law)}, model
 
 
 def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:
@@ -171,6 +184,7 @@ class WholeLifeRailModel:
     peak: float = 65.0
     balance: float = 175.0
     damage: float = 10e-6
+    counted: str = "against"  # travel, along it or all: direction of the forces on the rail
 
     def __call__(self, T_gamma: Floats) -> Floats:
         """Damage of one passing axle [1].
@@ -183,6 +197,12 @@ class WholeLifeRailModel:
         falling = (self.balance - T) / (self.balance - self.peak)
         growth, removal = np.maximum(np.minimum(rising, falling), 0.0), np.minimum(falling, 0.0)
         return np.asarray(self.damage * growth + self.damage * removal)
+
+    def of_patches(self, T_gamma: Floats, along: Floats) -> Floats:
+        """Damage by patches whose forces on the rail along travel have the sign of `along` [1]."""
+        sign = {"against": -1.0, "along": 1.0}.get(self.counted)
+        counts = True if sign is None else sign * along > 0.0
+        return np.where(counts, self(T_gamma), 0.0)
 
 
 def surface_fatigue_index(

@@ -1,6 +1,6 @@
 """Wear and fatigue of wheels and rails over a run, wheel by wheel, read part by part."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,9 +22,9 @@ class WheelWear:
     `worn_area`: Worn area of the wheel profile per distance by each law, by its name or file, sum
     over the contact patches [m2/m].  Of a result without them that of Pearce and Sherratt is the
     one of `T_gamma`, as if all forces acted in one patch, and the others are None. `rail_damage`:
-    Whole Life Rail Model, mean over the distance; only forces on the rail against the direction of
-    travel count.  With contact patches that of tread, flange root or flange, whichever has the
-    largest magnitude: what one part of the rail suffers, another does not repair [1].
+    Whole Life Rail Model, mean over the distance; by default only forces on the rail against the
+    direction of travel count.  With contact patches that of tread, flange root or flange, whichever
+    has the largest magnitude: what one part of the rail suffers, another does not repair [1].
     `utilised_friction`, `pressure_ratio`: T/N and p0/k of that patch, its coordinates in the
     shakedown map [1]; None likewise.
     """
@@ -38,10 +38,13 @@ class WheelWear:
     fatigue_index: float | None  # largest FI_surf [1]; None without contact patches
     utilised_friction: float | None
     pressure_ratio: float | None
+    # of `rail_damage`
+    model: wear.WholeLifeRailModel = field(default_factory=wear.WholeLifeRailModel)
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
-        plain = {name: value for name, value in self.__dict__.items() if name != "worn_area"}
+        apart = "worn_area", "model"
+        plain = {name: value for name, value in self.__dict__.items() if name not in apart}
         return plain | self.worn_area
 
 
@@ -53,7 +56,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
     all.
     """
     record.need_quantities("wear")
-    model = wear.WholeLifeRailModel()
+    laws, model = wear.laws_and_rail_model(law)
     flat = flatten(record.result.vehicle())
     radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])
     shape = radii.shape
@@ -62,7 +65,6 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
     damage: Floats = np.zeros((*shape, 1))
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
-    laws = dict(wear.LAWS) if law is None else {law: wear.wear_law(law)}
     needed = (*PATCHES, "patch_T_gamma")
     of_file = any(one.constants for one in laws.values())
     if of_file:
@@ -88,7 +90,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
             load = record.result.part("patch_N", rows)
             mu = record.result.part("patch_friction", rows) if of_file else mu
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
-        passes = np.where(along < 0.0, model(each), 0.0) * ways[..., None]
+        passes = model.of_patches(each, along) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
         speed = (way / np.gradient(record.time))[rows, None, None, None]
         of_patches = wear.Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
@@ -107,7 +109,7 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
                 {f"{p:g}": stream.percentile(p) for p in (50.0, 95.0, 99.85)}, stream.width,
                 {n: float(worn[n][w, k] / length) if n in worn else None for n in laws},
                 float(damage[w, k, worst_damage] / length),
-                *(worst[:, w, k].tolist() if patches else [None] * 3),
+                *(worst[:, w, k].tolist() if patches else [None] * 3), model=model,
             )
         )  # fmt: skip
     return wheels

@@ -1,6 +1,8 @@
 """Files of a law of wear, `railsim-wear-law/1`: constants of the user's own, with their source."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
 
 from railsim.definitions.base import Definition, NonNegative, Positive, Text, check
 from railsim.definitions.file_definition import FileDefinition
@@ -36,8 +38,17 @@ class FrictionWork(Definition):
     """Power of friction over the area of the patch [W/m2]"""
 
 
+class RailFatigue(Definition):
+    """Parameters of the Whole Life Rail Model."""
+
+    threshold: Annotated[Positive, Field(lt=65)] = 15.0
+    """Wear number below which there is no damage; 15 or 20 in use [N]"""
+    counted: Literal["against", "along", "all"] = "against"
+    """Which patches count: by the direction of their force on the rail, against or along travel"""
+
+
 class WearLawFile(FileDefinition):
-    """A law of wear: one of the tables, with constants of the user's own."""
+    """A law of wear, with constants of the user's own, and parameters of the damage of the rail."""
 
     KIND: ClassVar = "limits"
 
@@ -50,10 +61,13 @@ class WearLawFile(FileDefinition):
     """Archard with a map of coefficients"""
     krause_poll: FrictionWork | None = None
     """Work of friction, mild and severe"""
+    whole_life_rail_model: RailFatigue | None = None
+    """Damage of the rail; alone, the laws of wear stay as without a file"""
 
     @check
     def _one(self) -> None:
-        if (self.archard is None) == (self.krause_poll is None):
+        given = (self.archard is not None) + (self.krause_poll is not None)
+        if given > 1 or not (given or self.whole_life_rail_model):
             raise ValueError("give one of the tables archard and krause_poll")
         if self.archard is not None and self.archard.speeds[0] >= self.archard.speeds[1]:
             raise ValueError("archard.speeds must increase")

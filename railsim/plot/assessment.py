@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from railsim.assessment import Assessment
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.criteria import WORDS
-from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
+from railsim.assessment.wear import shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
@@ -338,7 +338,7 @@ def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
 
 def _life_model(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) -> None:
     """Whole Life Rail Model with the wear numbers' 50 and 95 % values of every wheel."""
-    model = WholeLifeRailModel()
+    model = runs[0][1][0].model
     values = [w.percentiles[p] for _, wheels in runs for w in wheels for p in ("50", "95")]
     T = np.linspace(0.0, max(200.0, 1.05 * max(values)), 400)
     axes.plot(T, 1e6 * model(T), color="0.3", lw=1.0)

@@ -16,6 +16,7 @@ from railsim.assessment.comfort import MeanComfort, event_comfort
 from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.safety import flange_angle
 from railsim.assessment.tables import tables
+from railsim.assessment.wear import wear_law
 from railsim.cli import main
 from railsim.cli.assess import FILES
 from railsim.definitions.loading import load_comfort_limits
@@ -482,16 +483,19 @@ def with_patches(whole, patches):
     )  # fmt: skip
 
 
-def wheel_with_patches(*T_gamma):
-    """Wear of a wheel whose patches have these wear numbers [N], each of 4 mm by 4 mm if any."""
+def wheel_with_patches(*T_gamma, along=(-1.0, -1.0, -1.0), law=None):
+    """Wear of a wheel whose patches have these wear numbers [N], each of 4 mm by 4 mm if any.
+
+    `along`: Sign of their forces on the rail along travel.
+    """
     run = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(sum(T_gamma) + 0.0 * s))
     each = np.broadcast_to(T_gamma, (*run.T_gamma.shape, 3))
     loaded = np.sign(each)
     patches = {
         "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
-        "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
+        "patch_b": 2e-3 * loaded, "patch_T_x": 5e3 * loaded * along, "patch_T_y": 0.0 * each,
     }  # fmt: skip
-    (found,) = assess(with_patches(run, patches), "wear")
+    (found,) = assess(with_patches(run, patches), "wear", law=law)
     return next(iter(found.wear.values()))[0]
 
 
@@ -512,6 +516,25 @@ def test_laws_of_wear_hold_for_each_patch():
 def test_rail_damage_is_that_of_the_part_with_the_largest_magnitude(strong, damage):
     """One part at 40 N, +5e-6; the other wears: (175 - T)/110 of 1e-5."""
     assert wheel_with_patches(40.0, strong, 0.0).rail_damage == pytest.approx(damage)
+
+
+@pytest.mark.parametrize(("counted", "T_gamma", "damage"), [
+    ("against", 65.0, 5e-6), ("along", 65.0, 10e-6), ("all", 65.0, 10e-6), ("all", 197.0, 5e-6),
+])  # fmt: skip
+def test_threshold_and_direction_of_the_rail_damage_are_in_a_file(
+    tmp_path, counted, T_gamma, damage
+):
+    """From 20 N: (42.5 - 20)/(65 - 20) of 1e-5 against travel; 197 N along it are -2e-6."""
+    (file := tmp_path / "rail.toml").write_text(
+        'format = "railsim-wear-law/1"\nname = "own"\nsource = "made up"\n'
+        f'[whole_life_rail_model]\nthreshold = 20.0\ncounted = "{counted}"\n'
+    )
+    wheel = wheel_with_patches(42.5, 0.0, T_gamma, along=(-1.0, 1.0, 1.0), law=str(file))
+    assert wheel.rail_damage == pytest.approx(damage)
+    assert list(wheel.worn_area) == ["pearce_sherratt", "usfd"]
+    assert 1e6 * wheel.model(np.array([20.0, 42.5])) == pytest.approx([0.0, 5.0])
+    with pytest.raises(InputError, match="no law of wear; archard or krause_poll"):
+        wear_law(str(file))
 
 
 def by_hand(T, area, against, D):
