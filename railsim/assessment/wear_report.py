@@ -1,6 +1,6 @@
 """Wear and fatigue of wheels and rails over a run, wheel by wheel, read part by part."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,11 +35,10 @@ class WheelWear:
     bound: float  # largest deviation of a percentile from that of the whole record [N]
     worn_area: dict[str, float | None]
     rail_damage: float
+    model: wear.WholeLifeRailModel  # of `rail_damage`
     fatigue_index: float | None  # largest FI_surf [1]; None without contact patches
     utilised_friction: float | None
     pressure_ratio: float | None
-    # of `rail_damage`
-    model: wear.WholeLifeRailModel = field(default_factory=wear.WholeLifeRailModel)
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
@@ -108,8 +107,8 @@ def wear_report(record: Record, law: str | None = None) -> list[WheelWear]:
                 f"wheelset {w + 1} {SIDES[k]}", float(mean[w, k] / length),
                 {f"{p:g}": stream.percentile(p) for p in (50.0, 95.0, 99.85)}, stream.width,
                 {n: float(worn[n][w, k] / length) if n in worn else None for n in laws},
-                float(damage[w, k, worst_damage] / length),
-                *(worst[:, w, k].tolist() if patches else [None] * 3), model=model,
+                float(damage[w, k, worst_damage] / length), model,
+                *(worst[:, w, k].tolist() if patches else [None] * 3),
             )
         )  # fmt: skip
     return wheels
