@@ -7,8 +7,8 @@ A fault mode needs only one judged section, in any zone.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -67,11 +67,14 @@ class SectionRow:
     conicity: float  # equivalent, of the leading wheelset for 3 mm; nan where it is not known [1]
     realisation: str  # what the track's irregularities are, seed included
     counts: bool
+    # of the track where it has irregularities, see `TrackQuality.further` [m]
+    further: Mapping[str, float | str] = field(default_factory=dict)
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
-        own = {k: v for k, v in self.__dict__.items() if k not in ("section", "realisation")}
-        return {**own, **self.section.__dict__}
+        apart = "section", "realisation", "further"
+        own = {k: v for k, v in self.__dict__.items() if k not in apart}
+        return {**own, **self.section.__dict__, **self.further}
 
 
 def _stated(met: bool) -> str:

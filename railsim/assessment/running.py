@@ -23,7 +23,7 @@ from railsim.assessment.en14363 import (
 from railsim.assessment.influences import influences
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection, own_sections, track_sections, transitions
-from railsim.assessment.track_quality import TrackQuality, quality_class
+from railsim.assessment.track_quality import D1, D2, D3, TrackQuality, quality_class
 from railsim.assessment.verdict import all_verdicts, overall
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.limits import RunningLimits
@@ -257,14 +257,17 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
     track = run.record.result.track()
     quality = None
     if run.sections and track.irregularities:
-        quality = TrackQuality(track, run.sections[0].begin, run.sections[-1].end)
+        ends = run.sections[0].begin, run.sections[-1].end
+        quality = TrackQuality(track, *ends, (D1, D2, D3))
     conicity = run.record.conicity if run.counting else math.nan
     realisation = repr(track.irregularities)
     rows = []
     for s in run.sections:
         alignment, level = quality.deviations(s.begin, s.end) if quality else (0.0, 0.0)
-        name = quality_class(min(s.speed, service.admissible_speed), alignment, level)
-        found = alignment, level, name, conicity, realisation, s in run.counting
+        speed = min(s.speed, service.admissible_speed)
+        name = quality_class(speed, alignment, level)
+        further = quality.further(s.begin, s.end, speed) if quality else {}
+        found = alignment, level, name, conicity, realisation, s in run.counting, further
         rows.append(SectionRow(run.record.name, run.population, s, *found))
     return rows
 

@@ -1,18 +1,21 @@
-"""Track geometry quality along a run: standard deviations of alignment and longitudinal level.
+"""Track geometry quality along a run: alignment and longitudinal level.
 
 Zero-phase Butterworth band-pass filter of order 4 over the wavelengths D1 = 3 to 25 m (EN 13848-1;
-EN 14363 annex M); per section, the worse of the two rails.
+EN 14363 annex M), D2 = 25 to 70 m, D3 = 70 to 150 m; per section, the worse of the two rails:
+standard deviations, and single defects, the largest deviation in D1.
 """
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
 from railsim.result.filters import butterworth, filtered
 from railsim.track.irregularity import displacement
 
-D1 = (3.0, 25.0)  # m, shortest and longest wavelength
+D1, D2, D3 = (3.0, 25.0), (25.0, 70.0), (70.0, 150.0)  # m, shortest and longest wavelength
 SPACING = 0.25  # m
 AT_ONCE = 20_000  # positions that are evaluated at once, to limit the memory for long tracks
 
@@ -23,27 +26,74 @@ QN = (
     (160.0, (1.0, 1.3), (1.4, 1.7)), (200.0, (0.8, 1.1), (1.2, 1.5)),
     (300.0, (0.7, 1.0), (1.0, 1.3)),
 )  # fmt: skip
+# likewise of single defects: QN1 of both, QN2 of alignment and of level [mm]; QN3 is 1.3 QN2
+DEFECTS = (
+    (80.0, 12.0, (14.0, 16.0)), (120.0, 8.0, (10.0, 12.0)), (160.0, 6.0, (8.0, 10.0)),
+    (200.0, 5.0, (7.0, 9.0)), (300.0, 4.0, (6.0, 8.0)),
+)  # fmt: skip
 
 
 class TrackQuality:
-    """Standard deviations over any part of a track between `begin` and `end` [m]."""
+    """Values of any part of a track between `begin` and `end` [m]; `bands`: wavelengths [m]."""
 
-    def __init__(self, track: Track, begin: float, end: float) -> None:
-        short, long = D1
-        margin = 6.0 * long
-        self._s = np.arange(begin - margin, end + margin, SPACING)
-        self._rails = np.zeros((len(self._s), 4))
+    def __init__(
+        self, track: Track, begin: float, end: float, bands: Sequence[tuple[float, float]] = (D1,)
+    ) -> None:
+        margins = [6.0 * long for _, long in bands]
+        s = np.arange(begin - max(margins), end + max(margins), SPACING)
+        rails = np.zeros((len(s), 4))
         if (function := displacement(track)) is not None:
-            parts = np.array_split(self._s, math.ceil(len(self._s) / AT_ONCE))
+            parts = np.array_split(s, math.ceil(len(s) / AT_ONCE))
             at = [np.asarray(function(part)[0]).reshape(4, -1).T for part in parts]
+            rails = np.concatenate(at)
+        self._bands = {}
+        for (short, long), margin in zip(bands, margins, strict=True):
+            # the same places whatever the other bands are
+            own = np.arange(begin - margin, end + margin, SPACING)
+            cut = round((max(margins) - margin) / SPACING)
             response = butterworth(1.0 / long, 1.0 / short)
-            self._rails = filtered(np.concatenate(at), 1.0 / SPACING, response, margin)
+            found = filtered(rails[cut:][: len(own)], 1.0 / SPACING, response, margin)
+            self._bands[short, long] = own[: len(found)], found
 
-    def deviations(self, begin: float, end: float) -> tuple[float, float]:
+    def deviations(
+        self, begin: float, end: float, band: tuple[float, float] = D1
+    ) -> tuple[float, float]:
         """Standard deviations of alignment and level between two arc lengths, worse rail [m]."""
-        there = self._rails[(self._s >= begin) & (self._s <= end)]
-        left_y, left_z, right_y, right_z = np.std(there, axis=0)
+        return self._worse(np.std, begin, end, band)
+
+    def largest(self, begin: float, end: float) -> tuple[float, float]:
+        """Largest deviations in D1 of alignment and level, worse rail [m]."""
+        return self._worse(lambda x, axis: np.max(np.abs(x), axis), begin, end, D1)
+
+    def _worse(
+        self, value: Callable[..., Floats], begin: float, end: float, band: tuple[float, float]
+    ) -> tuple[float, float]:
+        s, rails = self._bands[band]
+        left_y, left_z, right_y, right_z = value(rails[(s >= begin) & (s <= end)], axis=0)
         return float(max(left_y, right_y)), float(max(left_z, right_z))
+
+    def further(self, begin: float, end: float, speed: float) -> dict[str, float | str]:
+        """Values beside those of D1 by name [m], and the class of the single defects."""
+        both = [self.deviations(begin, end, band) for band in (D2, D3)]
+        names = [
+            f"{name}_{of}" for of in ("D2", "D3", "largest") for name in ("alignment", "level")
+        ]
+        largest = self.largest(begin, end)
+        values = dict(zip(names, (*both[0], *both[1], *largest), strict=True))
+        return {**values, "defects": defect_class(speed, *largest)}
+
+
+def defect_class(speed: float, alignment: float, level: float) -> str:
+    """Class of the single defects of a section after UIC 518; arguments as of `quality_class` [m].
+
+    >>> defect_class(40.0, 7e-3, 9e-3), defect_class(40.0, 10.5e-3, 9e-3)
+    ('between QN1 and QN2', 'worse than QN3')
+    """
+    _, first, second = next((row for row in DEFECTS if 3.6 * speed <= row[0] + 1e-3), DEFECTS[-1])
+    limits = (first, first), second, tuple(1.3 * value for value in second)
+    over = [1e3 * alignment > of_y or 1e3 * level > of_z for of_y, of_z in limits]
+    names = "better than QN1", "between QN1 and QN2", "between QN2 and QN3", "worse than QN3"
+    return names[sum(over)]
 
 
 def quality_class(speed: float, alignment: float, level: float) -> str:

@@ -147,20 +147,29 @@ def _conditions(one: Assessment) -> Table:
 
 def _sections(one: Assessment) -> Table:
     header = ["run", "zone", "from (m)", "to (m)", "R (m)", "I (mm)", "speed (m/s)",
-              "alignment (mm)", "level (mm)", "conicity", "quality", "not counted"]  # fmt: skip
+              "alignment (mm)", "level (mm)", "conicity", "quality", "D2, D3 (mm)",
+              "single defects (mm)", "not counted"]  # fmt: skip
     rows = [
         [
             row.run, s.zone, f"{s.begin:.0f}", f"{s.end:.0f}",
             "straight" if math.isinf(s.radius) else f"{s.radius:.0f}",
             f"{1e3 * s.cant_deficiency:.0f}", f"{s.speed:.2f}", f"{1e3 * row.alignment:.2f}",
             f"{1e3 * row.level:.2f}", "" if math.isnan(row.conicity) else f"{row.conicity:.2f}",
-            row.quality,
-            "" if row.counts else s.reason or "no zone",
+            row.quality, *_further(row.further), "" if row.counts else s.reason or "no zone",
         ]
         for row in one.sections
         for s in [row.section]
     ]  # fmt: skip
-    return Table(header, rows, f"Sections: {one.vehicle}", (0, 10, 11))
+    return Table(header, rows, f"Sections: {one.vehicle}", (0, 10, 11, 12, 13))
+
+
+def _further(values: Mapping[str, Any]) -> list[str]:
+    """Alignment / level in D2 and D3, and the largest in D1 with their class."""
+    if not values:
+        return ["", ""]
+    texts = [f"{1e3 * value:.1f}" for value in values.values() if not isinstance(value, str)]
+    d2, d3, largest = (" / ".join(texts[k : k + 2]) for k in (0, 2, 4))
+    return [f"{d2}, {d3}", f"{largest}, {values['defects']}"]
 
 
 def _rows(one: Assessment) -> list[Table]:

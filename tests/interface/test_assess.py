@@ -321,11 +321,16 @@ def test_track_quality_stands_beside_the_sections():
     alignment = np.mean([q.alignment for q in found.quality])
     # 0.71 mm of the whole spectrum in 3 to 25 m; the worse rail, six sections of 250 m
     assert alignment == pytest.approx(0.71e-3, rel=0.2)
+    rows = found.record()["sections"]
+    assert all(row["alignment_largest"] > 2.0 * row["alignment"] for row in rows)
+    assert {"alignment_D2", "level_D3", "level_largest"} <= rows[0].keys()
+    assert {row["defects"] for row in rows} == {"better than QN1"}
 
 
 def test_track_quality_is_judged_at_the_admissible_speed(monkeypatch):
     """Level of 1.3 mm: QN1 is 1.4 mm up to 160 km/h and 1.2 mm up to 200 km/h; run at 1.1 V."""
-    quality = Mock(**{"return_value.deviations.return_value": (0.5e-3, 1.3e-3)})
+    found = {"deviations": (0.5e-3, 1.3e-3), "further": {"defects": "better than QN1"}}
+    quality = Mock(**{f"return_value.{name}.return_value": value for name, value in found.items()})
     monkeypatch.setattr(running, "TrackQuality", quality)
     random = {"type": "random", "spectrum": "erri_b176_low", "seed": 3}
     on = track(STRAIGHT, irregularities=[random])

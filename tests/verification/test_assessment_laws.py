@@ -37,7 +37,7 @@ from railsim.assessment.safety import (
 )
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
-from railsim.assessment.track_quality import TrackQuality, quality_class
+from railsim.assessment.track_quality import D1, D2, D3, TrackQuality, defect_class, quality_class
 from railsim.assessment.wear import (
     Patches,
     WholeLifeRailModel,
@@ -654,6 +654,49 @@ def test_track_quality_is_that_of_the_worse_rail_between_3_and_25_m(worse, monke
         across, along = (np.sqrt(((size * left(of)) ** 2 + rest) / 2.0)
                          for size, of in ((2e-3, 20.0), (3e-3, 4.0)))  # fmt: skip
         assert found == pytest.approx((across, along), rel=0.01)
+
+
+def test_waves_in_d2_and_d3_and_the_largest_deviation_in_d1(monkeypatch):
+    """Lateral waves of 42 and 102 m, vertical ones of 8.66 m, the middles of D2, D3 and D1.
+
+    In the middle of its band a wave passes whole, x = 0; of 42 m 0.091 are in D1, of 102 m 0.002:
+    1/sqrt(1 + x^8) with x = -1.82 and -4.62.
+    """
+    lengths = [math.sqrt(short * long) for short, long in (D2, D3, D1)]
+
+    def rails(s):
+        across, wide, along = (np.sin(2.0 * np.pi * s / length) for length in lengths)
+        y, z = 4e-3 * across + 6e-3 * wide, 9e-3 * along
+        return np.stack([y, 0.5 * z, 0.5 * y, z]), np.zeros((4, len(s)))
+
+    monkeypatch.setattr(track_quality, "displacement", lambda _: rails)
+    found = TrackQuality(Mock(), 0.0, 3000.0, (D1, D2, D3)).further(100.0, 2800.0, 40.0)
+    root = math.sqrt(2.0)
+    assert found["alignment_D2"] == pytest.approx(4e-3 / root, rel=0.02)
+    assert found["alignment_D3"] == pytest.approx(6e-3 / root, rel=0.02)
+    assert found["level_largest"] == pytest.approx(9e-3, rel=0.01)
+    assert found["alignment_largest"] == pytest.approx(4e-3 * 0.091 + 6e-3 * 0.0022, rel=0.02)
+    assert max(found["level_D2"], found["level_D3"]) < 3e-5
+    assert found["defects"] == "between QN1 and QN2"  # 6 and 10 mm up to 160 km/h
+
+
+@pytest.mark.parametrize(
+    ("km_h", "alignment", "level"),
+    [
+        (80.0, (12.0, 14.0, 18.2), (12.0, 16.0, 20.8)),
+        (120.0, (8.0, 10.0, 13.0), (8.0, 12.0, 15.6)),
+        (160.0, (6.0, 8.0, 10.4), (6.0, 10.0, 13.0)),
+        (200.0, (5.0, 7.0, 9.1), (5.0, 9.0, 11.7)),
+        (300.0, (4.0, 6.0, 7.8), (4.0, 8.0, 10.4)),
+    ],
+)
+def test_single_defects_change_their_class_at_the_values_of_uic_518(km_h, alignment, level):
+    """QN1, QN2 and QN3 = 1.3 QN2 in mm, up to each speed."""
+    classes = "better than QN1", "between QN1 and QN2", "between QN2 and QN3", "worse than QN3"
+    for k in (0, 1, 2):
+        for factor, expected in ((0.999, classes[k]), (1.001, classes[k + 1])):
+            assert defect_class(km_h / 3.6, 1e-3 * factor * alignment[k], 0.0) == expected
+            assert defect_class(km_h / 3.6, 0.0, 1e-3 * factor * level[k]) == expected
 
 
 def test_record_of_a_point_has_the_worst_transition_and_the_worst_block_of_each_axis():
