@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.weighting import WB, WC, WD, WF, WK, Weighting
+from railsim.assessment.weighting import WB, WC, WD, WF
 from railsim.result.filters import integral, low_passed
 
 BLOCK = 5.0  # s
@@ -66,13 +66,9 @@ def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
 
 def weighted_for_comfort(a: Floats, rate: float) -> tuple[Floats, Floats]:
     """Accelerations along x, y, z with Wd, Wd, Wb, and along x with Wc (seat back) [m/s2]."""
-    return _along_axes(a, rate, WB), WC.weighted(a[:, 0], rate)
-
-
-def _along_axes(a: Floats, rate: float, vertical: Weighting) -> Floats:
-    """Accelerations along x, y with Wd, along z with another weighting."""
-    weightings = enumerate((WD, WD, vertical))
-    return np.stack([weighting.weighted(a[:, k], rate) for k, weighting in weightings], axis=-1)
+    axes = enumerate((WD, WD, WB))
+    floor = np.stack([weighting.weighted(a[:, k], rate) for k, weighting in axes], axis=-1)
+    return floor, WC.weighted(a[:, 0], rate)
 
 
 def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
@@ -89,31 +85,6 @@ def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
         continuous=rms,
         blocks=len(rms),
     )
-
-
-@dataclass(frozen=True)
-class Vibration:
-    """Evaluation after ISO 2631-1."""
-
-    rms: Floats  # weighted root mean squares along x, y, z [m/s2], float64[3]
-    total: float  # vibration total value a_v [m/s2]
-    MTVV: Floats  # largest running root mean square over 1 s [m/s2], float64[3]
-    VDV: Floats  # fourth power vibration dose value [m/s1.75], float64[3]
-
-
-def iso2631_vibration(a: Floats, rate: float) -> Vibration:
-    """Weighted accelerations of a seated person: Wd, Wd, Wk, factors 1 (ISO 2631-1:1997).
-
-    a_v = sqrt(awx^2 + awy^2 + awz^2); VDV = (integral of aw^4 dt)^(1/4).
-
-    `a` (float64[time, 3]): Acceleration along x, y, z [m/s2]. `rate`: Samples per second [1/s].
-    """
-    weighted = _along_axes(a, rate, WK)
-    rms = np.sqrt(np.mean(weighted**2, axis=0))
-    running = running_mean(weighted**2, rate, 1.0)
-    largest = np.sqrt(np.max(running, axis=0)) if len(running) else np.full(3, math.nan)
-    dose = (np.sum(weighted**4, axis=0) / rate) ** 0.25
-    return Vibration(rms, float(np.sqrt(np.sum(rms**2))), largest, dose)
 
 
 def running_mean(x: Floats, rate: float, length: float) -> Floats:

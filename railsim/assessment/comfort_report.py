@@ -105,7 +105,10 @@ def comfort_report(record: Record) -> list[PointComfort]:
 
 
 class _Gathered:
-    """Sums and blocks of one point over the parts of a run that hunts at `frequency`, or 0 [Hz]."""
+    """Sums and blocks of one point over the parts of a run that hunts at `frequency`, or 0 [Hz].
+
+    ISO 2631-1:1997 of a seated person: Wd, Wd, Wk, factors 1; VDV = (integral of aw^4 dt)^(1/4).
+    """
 
     def __init__(self, frequency: float) -> None:
         self.frequency = frequency
