@@ -233,9 +233,8 @@ def _sections(
         return track_sections(track, limits, service, covered, record.speed_at)
     file, given = own[0], own[1].sections
     there = [(k, one) for k, one in enumerate(given) if one.track in (None, track.name)]
-    allowed = (
-        f"within {math.ceil(covered[0])} to {math.floor(covered[1])} m, as all of {record.name}"
-    )
+    most = f"{math.ceil(covered[0])} to {math.floor(covered[1])} m"
+    allowed = f"within {most}, where all of the vehicle was in the run {record.name}"
     Faults(
         Fault(file, f"sections.{k}", f"{one.begin:g} to {one.end:g} m", allowed)
         for k, one in there

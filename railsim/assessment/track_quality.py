@@ -61,10 +61,6 @@ class TrackQuality:
         """Standard deviations of alignment and level between two arc lengths, worse rail [m]."""
         return self._worse(np.std, begin, end, band)
 
-    def largest(self, begin: float, end: float) -> tuple[float, float]:
-        """Largest deviations in D1 of alignment and level, worse rail [m]."""
-        return self._worse(lambda x, axis: np.max(np.abs(x), axis), begin, end, D1)
-
     def _worse(
         self, value: Callable[..., Floats], begin: float, end: float, band: tuple[float, float]
     ) -> tuple[float, float]:
@@ -74,13 +70,13 @@ class TrackQuality:
 
     def further(self, begin: float, end: float, speed: float) -> dict[str, float | str]:
         """Values beside those of D1 by name [m], and the class of the single defects."""
-        both = [self.deviations(begin, end, band) for band in (D2, D3)]
-        names = [
-            f"{name}_{of}" for of in ("D2", "D3", "largest") for name in ("alignment", "level")
-        ]
-        largest = self.largest(begin, end)
-        values = dict(zip(names, (*both[0], *both[1], *largest), strict=True))
-        return {**values, "defects": defect_class(speed, *largest)}
+        d2, d3 = (self.deviations(begin, end, band) for band in (D2, D3))
+        most = self._worse(lambda x, axis: np.max(np.abs(x), axis), begin, end, D1)
+        return {
+            "alignment_D2": d2[0], "level_D2": d2[1], "alignment_D3": d3[0], "level_D3": d3[1],
+            "alignment_largest": most[0], "level_largest": most[1],
+            "defects": defect_class(speed, *most),
+        }  # fmt: skip
 
 
 def defect_class(speed: float, alignment: float, level: float) -> str:
