@@ -62,6 +62,7 @@ def command(
 
     if speeds is not None and over is not None:
         raise input_error("--over", "given together with --speeds", "one of the two")
+    cli.goes_with("--linearisation harmonic", how["linearisation"] == "harmonic", "amplitude")
     coach, rails, settings = given.inputs()
     if animate is not None and (output.out is None or speeds is not None or over is not None):
         wrong = "given without --out" if output.out is None else "given with --speeds or --over"

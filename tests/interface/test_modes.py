@@ -10,6 +10,7 @@ from selection import points
 
 import railsim
 from railsim.cli import main
+from railsim.errors import InputError
 from railsim.linear.modes import Mode, Modes
 from railsim.linear.vehicle import Contact
 
@@ -95,7 +96,8 @@ def test_root_locus_over_a_key(capsys):
         (["--conicity", "3"], "--conicity"),
         (["--linearisation", "harmonic", "--amplitude", "0.2"], "--amplitude"),
         (["--linearisation", "harmonic", "--amplitude", "-1"], "--amplitude"),
-        (["--amplitude", "0.001"], "--amplitude: found 0.001 m; only with linearisation harmonic"),
+        (["--amplitude", "0.001"], "--amplitude goes with --linearisation harmonic"),
+        (["--amplitude", "0.003"], "--amplitude goes with --linearisation harmonic"),  # default
         (["--set", "vehicle.bodies.carbody.mas=3"], "mas"),
         (["--radius", "100", "--speed", "60"], "no steady state"),
     ],
@@ -105,6 +107,11 @@ def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     error = capsys.readouterr().err
     assert words in error
     assert "Traceback" not in error
+
+
+def test_an_amplitude_of_the_tangent_is_refused_in_python():
+    with pytest.raises(InputError, match="amplitude: found 0.001 m; only with linearisation"):
+        railsim.modes(railsim.load_vehicle("coach_manchester"), speed=20.0, amplitude=1e-3)
 
 
 def test_a_vehicle_of_which_all_is_held_has_no_modes(capsys):
