@@ -23,6 +23,7 @@ At = Callable[[float], Linearisation]
 
 SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are looked for
 SLOWEST = 1e-3  # Hz; below it a mode is no oscillation
+GROWS = 0.05  # 1/s of motions about an unstable state
 SAME = 0.6  # pairing of neighbouring modes that needs no look in between
 UNRELATED = 0.1  # pairing below which two modes are not the same
 EQUAL = 0.02  # relative distance of eigenvalues that cannot be distinguished
@@ -158,6 +159,19 @@ def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     values[there] = modes.eigenvalues[indices[there]]
     shapes[there], left[there] = modes.shapes[indices[there]], modes.left[indices[there]]
     return Eigenmodes(modes.linearisation, values, shapes, left)
+
+
+def left_aside(modes: Eigenmodes) -> tuple[str, ...]:
+    """Remark on an equilibrium that is left without an oscillation: a real lambda > 0."""
+    still = modes.eigenvalues[np.abs(modes.frequencies) < SLOWEST].real
+    growth = float(np.max(still, initial=0.0))
+    if growth < GROWS:
+        return ()
+    return (
+        f"a motion that does not oscillate grows by {growth:.3g} 1/s: the vehicle leaves the state "
+        "that is linearised for one beside it, as on hollow treads, whose radius falls towards the "
+        "flange at first; modes and linear critical speeds are not those of where it runs",
+    )
 
 
 @dataclass(frozen=True)

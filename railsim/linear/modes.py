@@ -13,7 +13,14 @@ from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
 from railsim.errors import argument_error, nearest
-from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
+from railsim.linear.eigenmodes import (
+    SEARCHED,
+    SLOWEST,
+    Eigenmodes,
+    eigenmodes,
+    followed,
+    left_aside,
+)
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
@@ -404,7 +411,8 @@ def _named(
         shown = (positions / largest if largest else positions).tolist()
         shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
         listed.append(Mode(name, complex(value), _participation(parts, shape), shapes))
-    about = prepared.remarks, parameter, prepared.name, prepared.place
+    remarks = (*prepared.remarks, *left_aside(found))
+    about = remarks, parameter, prepared.name, prepared.place
     return Modes(speed, prepared.contact, tuple(listed), *about)
 
 

@@ -20,6 +20,7 @@ from railsim.linear.eigenmodes import (
     Eigenmodes,
     LossOfStability,
     eigenmodes,
+    left_aside,
     loss_of_stability,
     oscillations,
 )
@@ -223,9 +224,9 @@ def _loss_of_hunting(
 def _linear(
     found: CriticalSpeed, prepared: LinearVehicle
 ) -> tuple[LinearLoss | None, float | None]:
-    """The linear critical speed; a remark where there is none, or where friction sticks.
+    """The linear critical speed; from which speed a mode is undamped as friction sticks [m/s].
 
-    Besides: from which speed another mode is undamped as long as friction sticks [m/s].
+    Remarks where there is none, or where friction sticks.
     """
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
@@ -236,6 +237,7 @@ def _linear(
         )
 
     lost, stuck = _loss_of_hunting(prepared, low, high), None
+    found.remarks += left_aside(eigenmodes(prepared.linearised(low)))
     if prepared.sticking:
         other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
         mode = other.modes[0]
@@ -455,15 +457,15 @@ def _conclude(
 ) -> None:
     """Find type and limits from all branches.
 
-    Where rest is unstable at the lower end already, or nothing was seen to hunt where it becomes
-    so, the type is not known.
+    Where rest is unstable at the lower end, or nothing hunts where it becomes so: type not known.
     """
     lowest, at = found.lowest, begins.parameter
+    already = begins.already or left_aside(eigenmodes(prepared.linearised(found.low)))
     if not found.nonlinear:
         return  # every method failed, as the remarks say
     if lowest is None:
-        found.type = "" if begins.already or at is not None else "none"
-    elif begins.already or (at is not None and lowest.speed > _far_above(at)):
+        found.type = "" if already or at is not None else "none"
+    elif already or (at is not None and lowest.speed > _far_above(at)):
         found.type = found.onset
     elif at is None or lowest.speed < at - RESOLUTION or found.onset == "subcritical":
         found.type = "subcritical"
@@ -479,10 +481,10 @@ def _conclude(
     top = found.searched_to
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", top)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", top)
-    if only_ramp and (found.amplitude_limit.reached or found.instability_limit.reached):
+    if only_ramp and lowest is not None:
         found.remarks.append(
-            "limits: lowest speeds on the falling ramp; at constant speed they are exceeded from "
-            "up to 2 m/s above (bifurcation)"
+            "limits: on the falling ramp alone; at constant speed they are exceeded from up to "
+            "2 m/s above, after other disturbances perhaps where this motion does not (bifurcation)"
         )
 
 

@@ -29,7 +29,7 @@ from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import POSITION, circle, left_out, placed
 from railsim.linear.coordinates import FreeVehicle, coordinates
-from railsim.linear.eigenmodes import eigenmodes
+from railsim.linear.eigenmodes import GROWS, eigenmodes
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
@@ -74,7 +74,7 @@ METHODS = (
     "by time integration",
     "mean: does not come to rest",
 )
-GROWS, SAME = 0.05, 1e-4  # 1/s of motions about an unstable state; m and rad, of equal states
+SAME = 1e-4  # m and rad, of equal states
 STILL = 1e-4  # share of the wheel loads by which forces still change after a second
 
 

@@ -178,6 +178,7 @@ def test_where_rest_is_unstable_from_the_start_the_type_is_not_known():
     assert found.lowest is not None
     assert (found.type, found.verdict()) == ("", "")
     assert "unstable at its lower end" in str(found.table())
+    assert any("after other disturbances perhaps" in remark for remark in found.remarks)
 
 
 @pytest.mark.slow

@@ -4,7 +4,13 @@ import cooperrider
 import numpy as np
 import pytest
 
-from railsim.linear.eigenmodes import eigenmodes, followed, loss_of_stability, oscillations
+from railsim.linear.eigenmodes import (
+    eigenmodes,
+    followed,
+    left_aside,
+    loss_of_stability,
+    oscillations,
+)
 from railsim.linear.system import Linearisation, jacobian
 from railsim.stability.periodic import Shooting
 
@@ -42,6 +48,16 @@ def motions(birth):
     turns = [k for k in range(1, len(found)) if found[k - 1].tangent[-1] < 0 < found[k].tangent[-1]]
     (k,) = turns
     return found, branch.fold(found[k - 1], found[k], 2.0)
+
+
+@pytest.mark.parametrize("conicity", [0.04, -0.04])
+def test_a_wheelset_of_negative_conicity_leaves_the_middle(conicity):
+    """Klingel: y'' = -conicity V^2 y/(r b): a wave, or a growth of V sqrt(-conicity/(r b))."""
+    rate = conicity * 40.0**2 / (0.46 * 0.75)
+    free = Linearisation(("y", "y'"), np.array([[0.0, 1.0], [-rate, 0.0]]), np.zeros(2), 40.0)
+    remarks = left_aside(eigenmodes(free))
+    assert len(remarks) == (conicity < 0.0)
+    assert all("grows by 13.6 1/s" in remark for remark in remarks)
 
 
 @pytest.mark.parametrize(("conicity", "critical"), [(0.05, 40.671), (0.20, 20.329)])
