@@ -76,6 +76,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             wheelsets,
             irregular=irregular,
             uneven=uneven,
+            struck=bool(model.check.check.size),
             elastic=bool(support.elastic),
             hunts=hunts,
         ),
@@ -248,12 +249,14 @@ def vibration(
     irregular: bool,
     elastic: bool,
     uneven: bool = False,
+    struck: bool = False,
     hunts: bool = False,
 ) -> str:
     """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
 
     `measured`: see `railsim.kernels.vibration`; `Q0`: static wheel loads [N]; `irregular`,
-    `elastic`: the rails; `uneven`: wheels are not round; `hunts`: the vehicle hunts.
+    `elastic`: the rails; `uneven`: wheels are not round; `struck`: there are check rails, whose
+    blow or friction may be the cause; `hunts`: the vehicle hunts.
     """
     if not len(measured):
         return ""
@@ -269,7 +272,8 @@ def vibration(
     elif irregular:
         cause = "excited by the irregularities of the rails"
     else:
-        cause = "self-excited by sliding friction in flange contact, on smooth rails"
+        by = "a check rail, or " * struck
+        cause = f"excited by {by}sliding friction in flange contact, on smooth rails"
     if not elastic:
         cause += "; the rails are rigid, [support] of the track makes them elastic"
     return (
