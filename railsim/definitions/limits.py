@@ -398,6 +398,8 @@ class StationaryLimits(FileDefinition):
     """(Q0 - Q)/Q0 of the least loaded wheel on a cant equal to the admissible cant deficiency"""
     lean_angle: Value
     """Angle of the floor from horizontal on it [rad]"""
+    gauge: Value | None = None
+    """Nominal gauge of the tracks for which the limits hold [m]"""
 
 
 class Difference(Sourced):

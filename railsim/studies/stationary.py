@@ -22,10 +22,11 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.cant import cant_deficiency
-from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
+from railsim.constants import CANT_BASE, WIDENED
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.limits import StationaryLimits, Value
 from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
+from railsim.definitions.vehicle.loads import DESIGN
 from railsim.errors import Fault, InputError, argument_error, input_error
 from railsim.linear.circle import circle, left_out
 from railsim.linear.sliding import has_pads
@@ -78,14 +79,14 @@ class Stationary:
     edition: str
     held: bool  # whether the wheelsets were held across the track
     values: tuple[StationaryValue, ...]
-    reasons: tuple[str, ...]  # cases without a steady state, a sentence each
+    reasons: tuple[str, ...]  # why it is incomplete, a sentence each
     # wheel loads on the way to each twist, to the opposite one and back, by its name
     loops: dict[str, TwistLoop] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()  # what is left out
 
     @property
     def verdict(self) -> str:
-        """``fail`` if a limit is exceeded, ``incomplete`` if a case has no steady state."""
+        """``fail`` if a limit is exceeded, ``incomplete`` where there are reasons."""
         if any(value.exceeded for value in self.values):
             return "fail"
         return "incomplete" if self.reasons else "pass"
@@ -202,11 +203,11 @@ def stationary(
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
     remarks = (*balance.remarks, *left_out(vehicle, track, settings, model))
-    if abs(track.gauge - NORMAL_GAUGE) > WIDENED:
-        text = (
-            f"limits are those of {1e3 * NORMAL_GAUGE:g} mm, the gauge is {1e3 * track.gauge:g} mm"
-        )
-        remarks = (*remarks, text)
+    if vehicle.loads:
+        remarks = (f"load case: {vehicle.load or DESIGN}", *remarks)
+    if limits.gauge is not None and abs(track.gauge - limits.gauge.value) > WIDENED:
+        nominal = f"{1e3 * limits.gauge.value:g} mm"
+        reasons.append(f"limits are those of {nominal}, the gauge is {1e3 * track.gauge:g} mm")
     judged = tuple(values), tuple(reasons), loops, remarks
     return Stationary(vehicle.name, limits.edition, held, *judged)
 
