@@ -188,9 +188,9 @@ def _simpack(file: str, lines: list[str]) -> Points:
             values[key.lower()] = parsed
         elif key.lower() in NUMERIC_KEYS:
             raise _fault(file, number, f"{key} is not a number: {value!r}", "give a number")
-    if not rows:
+    if inside or not rows:
         allowed = "SIMPACK files hold them from point.begin to point.end"
-        raise input_error(file, "no points", allowed)
+        raise input_error(file, "no point.end: cut off" if inside else "no points", allowed)
     per_metre = values.get("units.len.f", 1.0)
     if per_metre <= 0.0:
         allowed = "units per metre, 1000 for millimetres"
@@ -267,7 +267,10 @@ def _miniprof(file: str, lines: list[str]) -> Points:
     found = _points(file, rows, unit=1e-3)
     stated = facts.get("xypoints", "") if facts.get("columndef") else ""
     if stated.isdigit() and int(stated) != len(rows):
-        found.notes.append(f"the header announces {stated} points, the file holds {len(rows)}")
+        words = f"the header announces {stated} points, the file holds {len(rows)}"
+        if len(rows) < int(stated):
+            raise input_error(file, words, "a whole file, or as many XYPoints as it holds")
+        found.notes.append(words)
     return found
 
 

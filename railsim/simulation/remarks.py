@@ -270,7 +270,7 @@ def vibration(
     elif uneven:
         cause = "excited by wheels that are not round"
     elif irregular:
-        cause = "excited by the irregularities of the rails"
+        cause = "excited by the irregularities or sections of the rails"
     else:
         by = "a check rail, or " * struck
         cause = f"excited by {by}sliding friction in flange contact, on smooth rails"

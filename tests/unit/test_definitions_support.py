@@ -36,6 +36,7 @@ def test_ballasted_is_co_running_without_masses():
         {"preset": "p2", "ballast_lateral": [70e6, 350e3]},
         {"preset": "p2", "sleeper_mass": 200.0},
         {"preset": "ballasted", "variation": [[10.0, 1.0], [0.0, 2.0]]},
+        {"preset": "ballasted", "ballast_base": 800.0},  # mm
         {"preset": "soft"},
     ],
 )

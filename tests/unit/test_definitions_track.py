@@ -112,6 +112,12 @@ def test_contradicting_track_is_refused(plan, cant, expected):
         (
             [STRAIGHT],
             [],
+            {"irregularities": [{**RANDOM, "begin": 10.0, "end": 30.0, "fade": 50.0}]},
+            "irregularities.0.fade: 50 m at either end of 20 m",
+        ),
+        (
+            [STRAIGHT],
+            [],
             {"check_rail": [{"rail": "left", "flangeway": [[200.0, 0.05], [220.0, 0.05]]}]},
             "check_rail.0: from 200 to 220 m, beyond the track's",
         ),
@@ -239,7 +245,10 @@ def test_rules_of_alignment_are_those_of_the_instructions(
     ],
 )
 def test_rules_of_alignment_at_the_permitted_speed(cant, length, speed, expected):
-    remarks = [str(remark) for remark in track_remarks(into_curve(300.0, cant, length, speed))]
+    curve = into_curve(300.0, cant, length, speed)
+    metre = [str(remark) for remark in track_remarks(curve.replace(gauge=1.0))]
+    assert not any(str(expected) in remark for remark in metre)  # a network of 1435 mm
+    remarks = [str(remark) for remark in track_remarks(curve)]
     if expected is None:
         assert remarks == []
     else:
@@ -289,6 +298,7 @@ def test_cant_list_shorter_than_the_plan_is_usual():
         {"irregularities": [{"type": "measured", "rows": [[s, 0, 0, 0, 0] for s in (1, 2, 2, 3)]}]},
         {"irregularities": [{**RANDOM, "spectrum": "erri"}]},
         {"irregularities": [{**RANDOM, "spectrum": "own"}]},
+        {"irregularities": [{**RANDOM, "spectrum": "own", "coefficients": {"vertical": 0.0}}]},
         {"irregularities": [{**RANDOM, "coefficients": {"lateral": 1e-7}}]},
         {"irregularities": [{**RANDOM, "seed": -1}]},
         {"irregularities": [{**RANDOM, "seed": 1.5}]},

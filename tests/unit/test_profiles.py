@@ -305,6 +305,18 @@ def test_rail_given_as_wheel_and_wheel_given_as_rail_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("writer", "suffix", "words"),
+    [(simpack, ".prw", "no point.end"), (miniprof, ".whl", "the header announces")],
+)
+def test_a_file_that_was_cut_off_is_refused(tmp_path, writer, suffix, words):
+    """The field side is missing: what is left would pass for a narrow wheel."""
+    text = writer(*WHEEL, kind="wheel")
+    cut = "\n".join(text.split("\n")[:-30])
+    load_profile(written(tmp_path, "whole" + suffix, text), "wheel")
+    assert words in refused(tmp_path, cut, "wheel", "cut" + suffix).found
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "0 points"),

@@ -248,6 +248,7 @@ def test_mirror_image():
     [
         ({"bodies": ["wheelset", "frame"]}, "the body that takes the reaction"),
         ({"slip_control": [0.03, 0.01]}, "two rising slips"),
+        ({"slip_control": [1.0, 3.0]}, "up to 1, such as"),  # per cent
         ({"over": "distance", "demand_table": None}, "'over' needs 'demand_table'"),
         ({"torque_table": [[5.0, 1.0], [0.0, 1.0]]}, "must increase"),
         ({"kind": "brake", "torque_table": [[0.0, -1.0]]}, "greater than or equal to 0"),

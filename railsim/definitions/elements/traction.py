@@ -30,8 +30,8 @@ class AxleTorque(PairElement):
     def _tables_mean_something(self) -> None:
         if self.over == "distance" and self.demand_table is None:
             raise ValueError("'over' needs 'demand_table'")
-        if self.slip_control is not None and self.slip_control[0] >= self.slip_control[1]:
-            raise ValueError("'slip_control' needs two rising slips, such as [0.01, 0.02]")
+        if self.slip_control is not None and not self.slip_control[0] < self.slip_control[1] <= 1.0:
+            raise ValueError("'slip_control' needs two rising slips up to 1, such as [0.01, 0.02]")
 
     def rows(self) -> list[Drive]:
         """One drive."""

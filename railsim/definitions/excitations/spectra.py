@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.definitions.base import Definition, NonNegative, Positive
+from railsim.definitions.base import Definition, NonNegative, Positive, check
 from railsim.definitions.excitations.base import CHANNELS
 
 Density = Callable[[Floats], Floats]
@@ -43,6 +43,11 @@ class Coefficients(Definition):
     """[rad/m]"""
     b: Positive = 0.75
     """Half the distance of the rails that the cross level refers to [m]"""
+
+    @check
+    def _not_all_zero(self) -> None:
+        if not any((self.lateral, self.vertical, self.cross_level, self.gauge)):
+            raise ValueError("all are 0: give 'lateral', 'vertical', 'cross_level' or 'gauge'")
 
 
 @dataclass(frozen=True)

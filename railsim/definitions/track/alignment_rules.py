@@ -9,7 +9,7 @@ with V in km/h and cant d, deficiency I in mm over the cant base of 1.5 m:
 - change of the deficiency of 75 mm/s at most, exceptionally 90;
 - transitions of d V/180, I V/270 and 60 m at least.
 
-A track without `speed` is not judged.
+A track without `speed`, or of another gauge than 1435 mm, is not judged.
 """
 
 import math

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from railsim.constants import CANT_BASE, WIDENED
+from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.track.alignment_rules import alignment_remarks
@@ -100,7 +100,7 @@ def track_remarks(track: "Track") -> list[Remark]:
         if spring is not None and spring[0] < SOFTEST:
             text = f"a stiffness of {spring[0]:g} N/m; railways have 1e7 to 1e9 N/m"
             remarks.append(Remark(f"support.{name}", text))
-    if track.speed is not None:
+    if track.speed is not None and abs(track.gauge - NORMAL_GAUGE) <= WIDENED:
         remarks += alignment_remarks(plan, cant, track.speed)
     for section in (*plan, *cant, *vertical):
         if section.slope != 0.0 and section.length < track.rounding - SMALL:
@@ -112,6 +112,12 @@ def track_remarks(track: "Track") -> list[Remark]:
     for k, part in enumerate(track.sections):
         if text := part.unusual():
             remarks.append(Remark(f"sections.{k}", text))
+    for k, shape in enumerate(track.irregularities):
+        begin, end = shape.extent(track.length)
+        fade, span = getattr(shape, "fade", 0.0), end - begin
+        if 2.0 * fade > span > 0.0:
+            text = f"{fade:g} m at either end of {span:g} m: half of them is taken"
+            remarks.append(Remark(f"irregularities.{k}.fade", text))
     for key, begin, end, shift in _spans(track):
         if end <= 0.0 or begin >= track.length:  # the track sees nothing of it
             span = f"from {begin:g} to {end:g} m" if begin <= end else f"from {begin:g} m on"

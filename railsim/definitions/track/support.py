@@ -20,7 +20,7 @@ slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from pydantic import WithJsonSchema
+from pydantic import Field, WithJsonSchema
 
 from railsim.definitions.base import NUMBERS, Definition, NonNegative, Positive, SidedRows, check
 
@@ -107,7 +107,7 @@ class Support(Definition):
     """Vertical [stiffness N/m, damping N s/m] under each half of the sleeper"""
     ballast_lateral: SpringDamper | None = None
     """Lateral [stiffness N/m, damping N s/m] of the whole sleeper"""
-    ballast_base: Positive | None = None
+    ballast_base: Annotated[Positive, Field(le=3.0)] | None = None
     """Lateral distance of the ballast's vertical springs from the track's middle [m]"""
     variation: SidedRows[Positive] | None = None
     """Rows [s, factor] or [s, pads, ballast]: factors of stiffness and damping along the track,
