@@ -137,6 +137,7 @@ def verify(suspension: "TrailingArmSuspension") -> Answer:
     parts += [tables.case_table(result), f"{deflections}; {wanted}", ""]
     parts += [tables.loaded_table(sheets), ""]
     parts += [tables.sheet_table(sheets), "", check_table(result.checks)]
+    parts += [] if suspension.fatigue else [tables.NO_FATIGUE]
     if heights:
         data["ride_height"] = ride_height_data(heights)
         parts += ["", tables.ride_height_table(heights)]

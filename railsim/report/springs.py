@@ -156,7 +156,11 @@ def page(results: Collected, figures: Mapping[str, bytes]) -> str:
     listed = [tables.sheet_table(sheets), tables.loaded_table(sheets)]
     sections += [
         Section("Load cases", [], cases, shown("stiffness", "deflection", "arm")),
-        Section("Checks", [], [check_table(verification.checks, notes=True)]),
+        Section(
+            "Checks",
+            [] if suspension.fatigue else [tables.NO_FATIGUE],
+            [check_table(verification.checks, notes=True)],
+        ),
         Section("Data sheets of the springs", [SHEETS], listed),
     ]
     if results.fatigue is not None:

@@ -17,6 +17,7 @@ from railsim.table import Column, Table
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
 
+NO_FATIGUE = "Fatigue is not assessed: the file has no table [fatigue]."
 SHEET = [
     Column("spring"),
     Column("d", "wire diameter d", "mm", ".2f"),

@@ -244,6 +244,16 @@ def test_page_says_what_is_not_met(tmp_path):
     assert "has no physical solution" in page
 
 
+def test_fatigue_that_nothing_is_known_of_is_said_to_be_open(capsys):
+    """`All 9 checks are met` is not the whole strength of a spring."""
+    from railsim.definitions.loading import load_spring
+    from railsim.report.springs import collected, page
+
+    assert cli.main(["spring", "verify", "tare_laden_example"]) == 0
+    assert "Fatigue is not assessed" in capsys.readouterr().out
+    assert "Fatigue is not assessed" in page(collected(load_spring("tare_laden_example")), {})
+
+
 def test_existing_pages_are_kept_without_overwrite(tmp_path, capsys):
     arguments = ["verify", "turasas_axlebox", "--out", str(tmp_path)]
     (tmp_path / "report.html").write_text("mine")
