@@ -13,7 +13,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.table import TableGrid
-from railsim.kernels.state import TIME
+from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.system import DIVIDED, UNSETTLED, Support
 from railsim.kernels.vibration import (
@@ -67,6 +67,11 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         *run.remarks,
         *run.prepared.remarks,
         evaluated_whole(run.prepared.evaluation - float(run.prepared.state[TIME]), duration),
+        ended_by_the_track(
+            run.prepared.end_time - float(run.state[TIME]),
+            run.prepared.end_distance - float(run.state[ARC_LENGTH]),
+            float(run.state[SPEED]),
+        ),
         *beyond_experience(extremes, Q0, wheelsets),
         lifted_wheels(extremes, run.unloaded, wheelsets),
         stability(swings, extremes, duration) if hunts or not uneven else "",
@@ -97,6 +102,13 @@ def evaluated_whole(left_out: float, duration: float) -> str:
         f"The run ended within the {left_out:.3g} s after the start that tables of peaks leave out "
         "(settings.outputs.evaluate_after): they hold the peaks of all of it."
     )
+
+
+def ended_by_the_track(time_left: float, way_left: float, speed: float) -> str:
+    """Remark on a run shorter than the duration asked for [s], no way being left [m]."""
+    if not 0.1 < time_left < np.inf or way_left > 0.1 * speed:
+        return ""
+    return f"The track's plan, and the run, ended {time_left:.3g} s before the duration asked for."
 
 
 def beyond_experience(

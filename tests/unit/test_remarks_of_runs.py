@@ -12,6 +12,7 @@ from railsim.result.stored import lost_peak
 from railsim.simulation.remarks import (
     beyond_experience,
     creep_range,
+    ended_by_the_track,
     stability,
     unsettled_rails,
     vibration,
@@ -105,6 +106,19 @@ def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(of, cau
     assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
     assert "above" not in remark
     assert cause in remark
+
+
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        ((4.615, 0.0, 65.0), True),  # 20 s at 65 m/s on 1000 m
+        ((4.615, 300.0, 65.0), False),  # derailed, or read before its end
+        ((0.0, 0.0, 65.0), False),
+        ((np.inf, 0.0, 65.0), False),  # no duration was asked for
+    ],
+)
+def test_a_duration_that_the_track_cuts_short_is_told(left, said):
+    assert ("4.62 s before the duration" in ended_by_the_track(*left)) == said
 
 
 @pytest.mark.parametrize("moved", [2e-3, -2e-3])
