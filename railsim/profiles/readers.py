@@ -267,10 +267,10 @@ def _miniprof(file: str, lines: list[str]) -> Points:
     found = _points(file, rows, unit=1e-3)
     stated = facts.get("xypoints", "") if facts.get("columndef") else ""
     if stated.isdigit() and int(stated) != len(rows):
-        words = f"the header announces {stated} points, the file holds {len(rows)}"
+        told = f"the header announces {stated} points, the file holds {len(rows)}"
         if len(rows) < int(stated):
-            raise input_error(file, words, "a whole file, or as many XYPoints as it holds")
-        found.notes.append(words)
+            raise input_error(file, told, "a whole file, or as many XYPoints as it holds")
+        found.notes.append(told)
     return found
 
 

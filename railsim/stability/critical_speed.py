@@ -224,10 +224,7 @@ def _loss_of_hunting(
 def _linear(
     found: CriticalSpeed, prepared: LinearVehicle
 ) -> tuple[LinearLoss | None, float | None]:
-    """The linear critical speed; from which speed a mode is undamped as friction sticks [m/s].
-
-    Remarks where there is none, or where friction sticks.
-    """
+    """The linear critical speed; from which speed a mode is undamped as friction sticks [m/s]."""
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
     def words(mode: Eigenmodes) -> str:
@@ -237,7 +234,8 @@ def _linear(
         )
 
     lost, stuck = _loss_of_hunting(prepared, low, high), None
-    found.remarks += left_aside(eigenmodes(prepared.linearised(low)))
+    found.left_aside = left_aside(eigenmodes(prepared.linearised(low)))
+    found.remarks += found.left_aside
     if prepared.sticking:
         other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
         mode = other.modes[0]
@@ -460,7 +458,7 @@ def _conclude(
     Where rest is unstable at the lower end, or nothing hunts where it becomes so: type not known.
     """
     lowest, at = found.lowest, begins.parameter
-    already = begins.already or left_aside(eigenmodes(prepared.linearised(found.low)))
+    already = begins.already or found.left_aside
     if not found.nonlinear:
         return  # every method failed, as the remarks say
     if lowest is None:

@@ -114,9 +114,9 @@ def track_remarks(track: "Track") -> list[Remark]:
             remarks.append(Remark(f"sections.{k}", text))
     for k, shape in enumerate(track.irregularities):
         begin, end = shape.extent(track.length)
-        fade, span = getattr(shape, "fade", 0.0), end - begin
-        if 2.0 * fade > span > 0.0:
-            text = f"{fade:g} m at either end of {span:g} m: half of them is taken"
+        fade = getattr(shape, "fade", 0.0)
+        if 2.0 * fade > end - begin > 0.0:
+            text = f"{fade:g} m at either end of {end - begin:g} m: half of them is taken"
             remarks.append(Remark(f"irregularities.{k}.fade", text))
     for key, begin, end, shift in _spans(track):
         if end <= 0.0 or begin >= track.length:  # the track sees nothing of it
