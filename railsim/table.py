@@ -194,8 +194,7 @@ class Table:
         from rich.table import Table as Drawn
         from rich.text import Text
 
-        numbers = [bool(column.format) for column in self.columns]
-        gap, widths = _fitted(cells, numbers, width)
+        gap, widths = _fitted(cells, [bool(column.format) for column in self.columns], width)
         drawn = Drawn(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
         for column, heading, least in zip(self.columns, cells[0], widths, strict=True):
             justify: Any = "right" if column.format else "left"

@@ -145,8 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return shell_complete(railsim, {}, "railsim", COMPLETE, os.environ[COMPLETE])
     try:
         status = _status(arguments)
-        cache = sys.modules.get("railsim.kernels.cache")
-        for sentence in getattr(cache, "notices", ()):
+        for sentence in getattr(sys.modules.get("railsim.kernels.cache"), "notices", ()):
             echo(f"remark: {sentence}", err=True)
         sys.stdout.flush()
     except BrokenPipeError:

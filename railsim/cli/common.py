@@ -95,8 +95,7 @@ def as_speed(text: object) -> float:
     try:
         return float(speed_in_si(str(text)))
     except ValueError:
-        words = f"'{text}' is not a speed, such as 20 or 72km/h"
-        raise click.BadParameter(words) from None
+        raise click.BadParameter(f"'{text}' is not a speed, such as 20 or 72km/h") from None
 
 
 def in_unit(unit: str) -> Callable[[object], float]:

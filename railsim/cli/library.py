@@ -41,8 +41,7 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
         if not rows:
             parts += [f"{kind}: none", ""]
             continue
-        graded = any(entry["trust"] for entry in rows)
-        quality = [Column("trust", "source quality")] * graded
+        quality = [Column("trust", "source quality")] * any(entry["trust"] for entry in rows)
         parts += [kind, Table([Column("name"), *quality, Column("title", " ")], rows), ""]
     if any(entry["trust"] for entry in entries):
         meanings = ", ".join(f"{letter} {meaning}" for letter, meaning in MEANING.items())

@@ -80,8 +80,7 @@ def command(
             found = modes(coach, rails, settings=settings, speed=speed, **how)
     if folder is not None and isinstance(found, Modes):
         output.written += _animated(coach, found, animate, folder / page)
-    parts = [found.table(), *found.notes]
-    output.finish(FILES, found, parts, found.remarks, vehicle=given.vehicle)
+    output.finish(FILES, found, [found.table(), *found.notes], found.remarks, vehicle=given.vehicle)
 
 
 def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) -> list[Path]:

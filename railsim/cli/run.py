@@ -129,7 +129,6 @@ def _checked(spec: "RunSpec", output: cli.Output, plots: bool) -> "tuple[Case, P
             check_file(path, overwrite=output.overwrite, endings=RESULTS)
     if plots and path.name:
         with faults.caught():
-            picture = path.with_suffix(".png")
-            check_file(picture, overwrite=output.overwrite, endings=PICTURES)
+            check_file(path.with_suffix(".png"), overwrite=output.overwrite, endings=PICTURES)
     faults.check()
     return case, path

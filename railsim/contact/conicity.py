@@ -128,8 +128,7 @@ def _conicity(y: Floats, delta_r: Floats, potential: Floats, amplitude: float) -
         return float("nan")  # a hump in between: no oscillation of this amplitude
     if np.max(room) <= 1e-9 * scale:
         return 0.0
-    speeds = np.sqrt(2.0 * np.maximum(room, 0.0))
-    time = _travel_time(positions, forces, speeds)
+    time = _travel_time(positions, forces, np.sqrt(2.0 * np.maximum(room, 0.0)))
     return float(0.5 * np.pi**2 / time**2)
 
 

@@ -105,8 +105,7 @@ def _grids(ratio: float) -> tuple["RollingGrid", "RollingGrid"]:
     from railsim.contact.exact_creep import rolling_grid
 
     nx, ny = grid_size(ratio)
-    fine = rolling_grid(ratio, POISSON, nx, ny)
-    return fine, rolling_grid(ratio, POISSON, nx // 2, ny // 2)
+    return rolling_grid(ratio, POISSON, nx, ny), rolling_grid(ratio, POISSON, nx // 2, ny // 2)
 
 
 def _extrapolated(fine: Floats, coarse: Floats) -> Floats:

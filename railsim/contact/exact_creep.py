@@ -196,8 +196,7 @@ def exact_creep_force(
     Source: Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact; the discretisation
     is our own.
     """
-    positive = {"a": a, "b": b, "N": N, "mu": mu, "G": G}
-    for name, value in positive.items():
+    for name, value in {"a": a, "b": b, "N": N, "mu": mu, "G": G}.items():
         if not (np.isfinite(value) and value > 0.0):
             raise ModelError(f"exact creep force: {name} must be positive, not {value}")
     if not np.isfinite([xi_x, xi_y, phi]).all():

@@ -99,8 +99,7 @@ class _Geometry:
     ) -> None:
         cosine, sine = np.cos(roll), np.sin(roll)
         lateral = y + points.u * cosine - points.r * sine
-        depth = points.u * sine + points.r * cosine - radius
-        self.wheel = CubicSpline(lateral, depth)
+        self.wheel = CubicSpline(lateral, points.u * sine + points.r * cosine - radius)
         self.wheel_range = (lateral[0], lateral[-1])
         self.radius = CubicSpline(lateral, points.r)
         self.Y, self.z, self.slope = nodes.Y, nodes.z, nodes.slope
@@ -127,8 +126,7 @@ class _Geometry:
             excess = points[:, 1] - t * cosine - self.wheel(Y) - z
             t += np.clip(excess / (cosine - self.wheel(Y, 1) * sine), -2e-3, 2e-3)
         first, last = self.wheel_range
-        outside = (first >= Y) | (last <= Y)
-        return np.where(outside, 1.0, t), points[:, 0], angle, self.radius(Y)
+        return np.where((first >= Y) | (last <= Y), 1.0, t), points[:, 0], angle, self.radius(Y)
 
     def solve(self, z: float, first: float, E_star: float, elements: int) -> ExactContact:
         """Solution at a given height."""
@@ -164,11 +162,10 @@ class _Geometry:
             raise ModelError("the boundary-element solver did not converge")
         field = np.zeros((n_x, n_s))
         field[row, column] = p
-        patches = self._patches(field, Y, angle, dx, ds)
         return ExactContact(
             z,
             z - first,
-            patches,
+            self._patches(field, Y, angle, dx, ds),
             np.concatenate((-x[::-1], x)),
             centre,
             Y,

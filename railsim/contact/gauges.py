@@ -54,8 +54,7 @@ def wheel_gauge(wheel: Profile) -> tuple[float, float, float]:
 
 def _flank(wheel: Profile, tip: int, height: float) -> float:
     """Position on the profile where it first falls to a height on the way from tip to tread."""
-    z = wheel.z[tip:]
-    below = np.flatnonzero(z <= height)
+    below = np.flatnonzero(wheel.z[tip:] <= height)
     if not len(below) or below[0] == 0:
         return nan
     k = tip + int(below[0])
@@ -99,13 +98,10 @@ def gauge_table(
         Column(name, words, "mm", ".1f")
         for name, words in (("value", "value"), ("least", "at least"), ("most", "at most"))
     ]
-    columns = [
-        Column("name", "gauge value"),
-        Column("words", " "),
-        *lengths,
-        Column("verdict", " "),
-    ]
-    return Table(columns, [[*row, _verdict(*row[2:])] for row in rows])
+    return Table(
+        [Column("name", "gauge value"), Column("words", " "), *lengths, Column("verdict", " ")],
+        [[*row, _verdict(*row[2:])] for row in rows],
+    )
 
 
 def _verdict(value: float, least: float | None, most: float | None) -> str:

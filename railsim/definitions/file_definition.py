@@ -181,8 +181,7 @@ def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:
         raise InputError([format_fault(file, source.data.get("format"), [model.format_name()])])
     overrides = [overrides] if isinstance(overrides, str) else list(overrides)
     model.note_assigned(source.data, [text.partition("=")[0].strip() for text in overrides])
-    changed = apply_overrides(source, overrides, model.OPEN_TABLES, _defaults(model))
-    return validated(model, changed)
+    return validated(model, apply_overrides(source, overrides, model.OPEN_TABLES, _defaults(model)))
 
 
 def _defaults(model: type[FileDefinition]) -> dict[str, Any]:

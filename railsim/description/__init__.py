@@ -43,8 +43,7 @@ def describe(item: "FileDefinition | Result", speeds: Sequence[float | str] = ()
         return describe_track(item, speeds)
     if isinstance(item, Vehicle):
         return describe_vehicle(item)
-    content = item.model_dump()
-    data = {"kind": item.KIND, **content}
+    data = {"kind": item.KIND, **item.model_dump()}
     if item.KIND == "spring":
         from railsim.description.design_files import spring_parts
 

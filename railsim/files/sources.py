@@ -363,12 +363,10 @@ def _other_kind(old: dict[str, Any], new: dict[str, Any]) -> bool:
 
 def _remove(base: Source, key: str, file: str) -> list[Fault]:
     try:
-        path = key_path(key)
-        parent, last = descend(base.data, path)
+        parent, last = descend(base.data, key_path(key))
         del parent[last]
     except KeyError as missing:
-        found = f"no key {key!r} in {base.file}"
-        return [Fault(file, "remove", found, str(missing.args[0]))]
+        return [Fault(file, "remove", f"no key {key!r} in {base.file}", str(missing.args[0]))]
     return []
 
 

@@ -161,13 +161,12 @@ class Unit:
     # states
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        state = self._run.state
         return {
             "commands": dict(self._commands),
             "values": dict(self._values),
             "status": self._status,
             "time": [self._begin, self._time],
-            "state": _saved(state),
+            "state": _saved(self._run.state),
         }
 
     def _set_fmu_state(self, saved: dict[str, Any]) -> None:

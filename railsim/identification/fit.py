@@ -143,8 +143,7 @@ def _solved(problem: Problem, loss: str) -> Identified:
     x = np.zeros(problem.size)
     if problem.place:
         x[problem.count :] = _places(problem, x)
-    before = problem.series(x)
-    remarks = _suspicions(problem, x, before, clocks=False)
+    remarks = _suspicions(problem, x, problem.series(x), clocks=False)
     start = x.copy()
     bounds = np.array([one.bounds for one in problem.parameters]
                       + [(-np.inf, np.inf)] * (problem.size - problem.count)).T  # fmt: skip
@@ -346,8 +345,7 @@ def _outcome(
                 one.measured[j], before[j], after[j], _rms(weights[j] * row), *test,
             ))  # fmt: skip
     # directions of the parameters alone: the places of the runs are eliminated
-    own = _without_places(jacobian[:data], count)
-    _, values, vectors = np.linalg.svd(own, full_matrices=False)
+    _, values, vectors = np.linalg.svd(_without_places(jacobian[:data], count), full_matrices=False)
     places = [
         Place(one.run.name, float(shift), STRETCH * float(stretch))
         for one, (shift, stretch) in zip(

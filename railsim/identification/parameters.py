@@ -151,8 +151,7 @@ def _parsed(text: str) -> Parameter:
         load_profile(first)
         load_profile(second)
     else:
-        names = tuple(part.strip() for part in keys.split("+"))
-        one = Parameter(keys, names)
+        one = Parameter(keys, tuple(part.strip() for part in keys.split("+")))
     try:
         numbers = [float(part) for part in rest]
     except ValueError:

@@ -77,8 +77,7 @@ class Run:
                     if self.settings.step is None:
                         raise
                     # a stiffer variant needs a shorter step than the others
-                    freely = replace(self, settings=self.settings.replace(step=None))
-                    result = freely.result(own)
+                    result = replace(self, settings=self.settings.replace(step=None)).result(own)
         except ModelError as error:
             raise ModelError(f"{self.name}: {error}") from None
         if result.status != "complete":
@@ -144,8 +143,7 @@ class Prepared:
     def moved(self, shift: float, stretch: float) -> "Prepared":
         """Return the run with its place on the track changed."""
         s = self.run.at
-        at = s + shift + stretch * (s - s[0])
-        return replace(self, run=replace(self.run, at=at))
+        return replace(self, run=replace(self.run, at=s + shift + stretch * (s - s[0])))
 
 
 def model_of(
@@ -257,8 +255,7 @@ def _smooth_speed(measurement: Measurement) -> Floats:
 def _profile(measurement: Measurement) -> Floats:
     """Return rows [s, v] of the measured speed, one for each second."""
     step = max(1, round(measurement.rate))
-    columns = [measurement.distance, _smooth_speed(measurement)]
-    rows: Floats = np.stack(columns, axis=1)[::step]
+    rows: Floats = np.stack([measurement.distance, _smooth_speed(measurement)], axis=1)[::step]
     return rows[np.diff(rows[:, 0], prepend=-np.inf) > 0.1]
 
 

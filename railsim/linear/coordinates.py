@@ -239,7 +239,6 @@ class FreeVehicle:
     def _directions(self, states: Floats) -> Floats:
         """e_x + omega x r of whole bodies: how they move as their frames go along the track."""
         r = states[:, : 6 * self._n].reshape(len(states), -1, 6)[:, self._whole, :3] + self._nominal
-        omega = self.work.frames[self._frames, OMEGA : OMEGA + 3]
-        moved = np.cross(omega, r)
+        moved = np.cross(self.work.frames[self._frames, OMEGA : OMEGA + 3], r)
         moved[..., 0] += 1.0
         return moved

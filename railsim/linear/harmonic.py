@@ -89,8 +89,7 @@ class ContactPath:
         def tried(pose: Floats) -> tuple[Floats, Floats]:
             x = base.copy()
             x[indices] += (y, *pose)
-            rate = vehicle.rate(x)
-            return rate, np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
+            return vehicle.rate(x), np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
 
         before = np.inf
         for _ in range(MOST_ITERATIONS):

@@ -387,8 +387,7 @@ def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[f
     bad = [v for v in values if not (isinstance(v, Real) and low <= float(v) <= high)]
     if bad or not values:
         found = f"found {bad[0]!r}" if bad else "no speed"
-        allowed = f"{low:g} to {high:g} m/s, or a text such as '72 km/h'"
-        raise argument_error(name, found, allowed)
+        raise argument_error(name, found, f"{low:g} to {high:g} m/s, or a text such as '72 km/h'")
     return [float(value) for value in values]
 
 

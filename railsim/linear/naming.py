@@ -149,8 +149,7 @@ def _phase(parts: Parts, shape: Complexes, component: int) -> str:
     if len(parts.frames) < 2:
         return ""
     first, last = (parts.component(shape, parts.frames[k], component) for k in (0, -1))
-    smaller = min(abs(first), abs(last))
-    if smaller < 0.1 * max(abs(first), abs(last)):
+    if min(abs(first), abs(last)) < 0.1 * max(abs(first), abs(last)):
         moving = parts.frames[0] if abs(first) > abs(last) else parts.frames[-1]
         return f", {parts.bogie_of(moving)}"
     in_phase = (first * last.conjugate()).real > 0.0

@@ -146,7 +146,6 @@ def track_response(
     n, count = len(x) - len(c.forceless), len(offsets)  # rates without force stand last
     inputs = whole[:, n:].reshape(len(whole), count, len(QUANTITIES), ORDERS)
     C, R, names = _readings(sensors, free, n)
-    bodies = system.contact.body
     return TrackResponse(
         speed,
         (*names, *_of_wheelsets(len(offsets))),
@@ -156,7 +155,7 @@ def track_response(
         np.concatenate([C, whole[n:, :n]]),
         np.concatenate([np.zeros((len(C), *inputs.shape[1:])), inputs[n:]]),
         np.concatenate([R, np.zeros((6 * count, n))]),
-        np.array([[c.velocity_of[int(b), k] for k in COMPONENTS] for b in bodies]),
+        np.array([[c.velocity_of[int(b), k] for k in COMPONENTS] for b in system.contact.body]),
         _forces_of(system, len(C)),
         np.concatenate([np.zeros(len(C)), evaluated(x)[len(x) :]]),
     )

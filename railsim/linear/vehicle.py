@@ -83,10 +83,9 @@ class Contact:
 
     def record(self) -> dict[str, Any]:
         """Return it as plain data; an amplitude where it counts."""
-        amplitude = self.amplitude if self.linearisation == "harmonic" else None
         return {
             "linearisation": self.linearisation,
-            "amplitude": amplitude,
+            "amplitude": self.amplitude if self.linearisation == "harmonic" else None,
             "conicity": self.conicity,
         }
 

@@ -98,8 +98,7 @@ def shift_of(
         near = np.abs(shifts - at_zero) < max(10 * STEP, 0.01 * np.ptp(middles))
         stretch, at_zero = np.polyfit(middles[near], shifts[near], 1)
     share = float(np.sum(np.abs(shifts - at_zero - stretch * middles) < NEAR)) / len(begins)
-    alike = float(np.median(correlations))
-    return Shift(float(at_zero), float(stretch), alike, len(shifts), share)
+    return Shift(float(at_zero), float(stretch), float(np.median(correlations)), len(shifts), share)
 
 
 def _lag(a: Floats, b: Floats) -> tuple[float, float]:
@@ -179,5 +178,4 @@ def _ahead(measurement: Measurement, vehicle: Vehicle | None, point: str) -> flo
             allowed = "give it, or the key 'vehicle' of the measurement"
             raise argument_error("vehicle", "none", allowed)
         vehicle = load_vehicle(name)
-    sensor = all_sensors(vehicle)[point]
-    return sensor.along
+    return all_sensors(vehicle)[point].along

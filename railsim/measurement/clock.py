@@ -72,8 +72,7 @@ def clock_of(file: str, written: Floats) -> Clock:
         return Clock(line, 1.0 / float(slope), count, written)
     median = float(np.median(steps))
     ends = np.flatnonzero(steps > JUMP * median)
-    smooth = steps[steps <= JUMP * median]
-    step = float(smooth.mean())
+    step = float(steps[steps <= JUMP * median].mean())
     span = float(written[-1] - written[0])
     if span / step > MOST_LOST * len(written):
         found = f"a gap of {steps.max():g} s"

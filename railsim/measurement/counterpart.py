@@ -67,8 +67,7 @@ def outputs_for(selections: Iterable[str]) -> dict[str, Any]:
             found["sensors"] = "readings" if only else True
         else:
             found[request] = True
-    usual = sorted(bases & {*QUANTITIES})
-    found["quantities"] = usual or ["distance"]
+    found["quantities"] = sorted(bases & {*QUANTITIES}) or ["distance"]
     return found
 
 

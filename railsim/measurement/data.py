@@ -108,8 +108,7 @@ class Measurement:
         """
 
         def passed(x: Floats) -> Floats:
-            found = band_passed(_bridged(x), self.rate, low, high)
-            return np.where(np.isnan(x), np.nan, found)
+            return np.where(np.isnan(x), np.nan, band_passed(_bridged(x), self.rate, low, high))
 
         return replace(self, channels={name: passed(x) for name, x in self.channels.items()})
 

@@ -146,6 +146,5 @@ def _closest(
         return weights[:, None] * constraints(model, s, at(x), arcs)[1] / columns
 
     accuracy: Any = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    found = least_squares(residual, pose[1:].ravel() * columns, slope, method="lm", **accuracy)
-    q = at(found.x)
+    q = at(least_squares(residual, pose[1:].ravel() * columns, slope, method="lm", **accuracy).x)
     return q, constraints(model, s, q, arcs)[0]

@@ -132,8 +132,7 @@ def _boxes(result: Analysis) -> Iterator[Check]:
             for edge, sense, k in zip(edges or (), ("above", "below"), (-1.0, 1.0), strict=False):
                 value = k * max(_furthest(result, point, axis, k) for point in box.points)
                 note = f"{'xy'[axis]} of {', '.join(box.points)}"
-                limit = result.model.number(edge)
-                yield Check(f"envelope.{i}", value, limit, sense, "m", note)
+                yield Check(f"envelope.{i}", value, result.model.number(edge), sense, "m", note)
 
 
 def _furthest(result: Analysis, point: str, axis: int, sense: float) -> float:

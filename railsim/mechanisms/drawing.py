@@ -171,8 +171,7 @@ def working_box(motion: Motion) -> tuple[float, float, float, float]:
             names.append(joint.cam)
     heavy = definition.output.point.partition(".")[0] if definition.output else ""
     names = [n for n in names if n.partition(".")[0] != heavy] or list(motion.model.points)
-    xy = np.concatenate([motion.point(name)[0][:1] for name in names])
-    return box(xy, 0.12)
+    return box(np.concatenate([motion.point(name)[0][:1] for name in names]), 0.12)
 
 
 def box(xy: Floats, share: float) -> tuple[float, float, float, float]:

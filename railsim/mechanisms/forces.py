@@ -399,5 +399,4 @@ def reactions(
     motion_kernel.jacobians(model.linkage, motion.s, motion.q, motion.arcs, residual, jacobian)
     right = -applied(motion, forces, rates)
     found = np.linalg.solve(jacobian.transpose(0, 2, 1), right[..., None])[..., 0]
-    joints = {name: found[:, a:b] for name, (a, b) in model.joint_rows.items()}
-    return joints, found[:, -1]
+    return {name: found[:, a:b] for name, (a, b) in model.joint_rows.items()}, found[:, -1]

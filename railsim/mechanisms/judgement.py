@@ -282,8 +282,7 @@ class Judge:
             length = motion.length(self.pair)[0][..., grid]
             stroke = length[..., -1:] - length[..., :1]
             stroke = np.where(np.real(stroke) > 0.0, 1.0, -1.0) * stroke
-            limit = motion.model.number(self.wanted.max_stroke)
-            found.append(("max_stroke", 1.0, limit - stroke))
+            found.append(("max_stroke", 1.0, motion.model.number(self.wanted.max_stroke) - stroke))
         self.labels = [(name, scale) for name, scale, m in found for _ in range(m.shape[-1])]
         return np.concatenate([margin for _, _, margin in found], axis=-1)
 

@@ -36,8 +36,7 @@ def links(motion: Motion) -> dict[str, Course]:
             d, d1, d2 = (b - a for a, b in zip(first, second, strict=True))
             across = np.stack((-d[:, 1], d[:, 0]), axis=-1) / dot(d, d)[:, None]
             angle, rate = np.unwrap(np.arctan2(d[:, 1], d[:, 0])), dot(across, d1)
-            bend = dot(across, d2) - 2.0 * rate * dot(d, d1) / dot(d, d)
-            found[name] = Course(angle, rate, bend)
+            found[name] = Course(angle, rate, dot(across, d2) - 2.0 * rate * dot(d, d1) / dot(d, d))
     return found
 
 

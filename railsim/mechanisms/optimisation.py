@@ -89,8 +89,7 @@ def optimise(
         bounds = "bounds within which the links can be assembled over the whole travel"
         fault = Fault(definition.name, "optimise.bounds", "exclude every assembly", bounds)
         raise InputError([fault])
-    best = best_of(found)
-    return optimum_of(definition, judge, best, tuple(found), chosen_seed)
+    return optimum_of(definition, judge, best_of(found), tuple(found), chosen_seed)
 
 
 def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict[str, float]]]:

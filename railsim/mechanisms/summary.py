@@ -105,8 +105,7 @@ def published_data(result: Analysis) -> dict[str, Data]:
         return {}
     computed: Data = {"travel": result.travel, **result.min_angles, **_extremes(result)}
     printed = {n: float(result.model.number(v)) for n, v in definition.published.items()}
-    both = {n: {"published": v, "ours": computed[n]} for n, v in printed.items() if n in computed}
-    return both
+    return {n: {"published": v, "ours": computed[n]} for n, v in printed.items() if n in computed}
 
 
 def _contact_data(contact: Contact) -> Data:

@@ -161,8 +161,7 @@ def assemble(
         design = assemble(unloaded, track, settings, profiles, shared)
     wheels = uneven_wheels(flat, track, used)
     check = check_rails(flat, track, used)
-    served = (tables, contact.table)
-    rails = rail_ranges(flat, track, used, served, settings.normal_contact)
+    rails = rail_ranges(flat, track, used, (tables, contact.table), settings.normal_contact)
     if settings.transient_creep and N_PATCH * parts_of_wheel(rails.arrays) > TRACED:
         found = "sections of more than two rails side by side"
         raise input_error("track", found, "two with settings.transient_creep", key="sections")
@@ -195,14 +194,13 @@ def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tup
         controllers=NO_CONTROLLERS,
         **elements.arrays(),
     )
-    index = Index(
+    return system, Index(
         bodies=tuple(_names(flat.bodies)),
         wheelsets=tuple(body.name for body in flat.of_kind("wheelset")),
         links=tuple(row["name"] for row in elements.link_rows),
         mounts=tuple(row["name"] for row in elements.mount_rows),
         actuators=tuple(row["name"] for row in elements.act_rows),
     )
-    return system, index
 
 
 def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> None:

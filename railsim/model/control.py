@@ -152,8 +152,7 @@ class _Wiring:
             self._wires.append(self._number(actuators, output, f"{key}.outputs", "actuator"))
         for argument, signal in controller.inputs.items():
             signals = tuple(self._vehicle.signals or {})
-            where = f"{key}.inputs.{argument}"
-            self._wires.append(self._number(signals, signal, where, "signal"))
+            self._wires.append(self._number(signals, signal, f"{key}.inputs.{argument}", "signal"))
         if controller.law not in laws:
             self._number(tuple(laws), controller.law, f"{key}.law", "law")
         if self._faults:

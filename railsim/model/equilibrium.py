@@ -92,8 +92,7 @@ def equilibrium(model: Model, speed: float, inputs: str = "") -> Equilibrium:
     level = level_track(model.system)
     rough = level._replace(track=_with_friction(level, model.system))
     rolling = _Balance(model, rough, speed=speed, rolling=True)
-    state = rolling.solve(rest.state)
-    return Equilibrium(model, state, rest.Q0, rolling.residual, rest.remarks)
+    return Equilibrium(model, rolling.solve(rest.state), rest.Q0, rolling.residual, rest.remarks)
 
 
 def _at_rest(model: Model) -> AtRest:

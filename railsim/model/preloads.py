@@ -189,8 +189,7 @@ def _with_solved_preloads(
     while True:
         unknowns = list(support)
         forces[unknowns] = 0.0
-        given = _with_forces(system, forces)
-        fixed = _preload_forces(given, range(len(forces)), conditions)
+        fixed = _preload_forces(_with_forces(system, forces), range(len(forces)), conditions)
         matrix = np.array([columns[k] for k in unknowns]).T.reshape(len(conditions), len(unknowns))
         # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
         scale = np.sqrt(np.array([support[k] for k in unknowns]))
@@ -199,8 +198,7 @@ def _with_solved_preloads(
         forces[unknowns] = values
         pulling = [k for k in unknowns if presses[k] and forces[k] < 0.0]
         if not pulling:
-            filled = replace(model, system=_with_forces(system, forces))
-            return filled, matrix @ values - right_side
+            return replace(model, system=_with_forces(system, forces)), matrix @ values - right_side
         for k in pulling:
             forces[k] = 0.0
             del support[k]

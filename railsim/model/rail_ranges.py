@@ -119,8 +119,7 @@ def _range(
 ) -> Range:
     assert part.contours is not None
     contours = tuple(np.array([contour.y, contour.z]) for contour in part.contours)
-    positions = np.array([contour.s for contour in part.contours])
-    sections = SectionList(positions, contours)
+    sections = SectionList(np.array([contour.s for contour in part.contours]), contours)
     y, z = contours[0]
     try:
         face = gauge_face(y, z - z.min()) if part.gauge_face is None else part.gauge_face

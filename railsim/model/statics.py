@@ -100,11 +100,10 @@ class StaticLoads:
     @property
     def displaced(self) -> list[str]:
         """What stands far from its nominal height, one sentence a body."""
-        found = zip(self.heights["body"], self.heights["raised"], strict=True)
         return [
             f"{body} stands {1e3 * abs(raised):.0f} mm {'above' if raised > 0.0 else 'below'} its "
             "nominal height"
-            for body, raised in found
+            for body, raised in zip(self.heights["body"], self.heights["raised"], strict=True)
             if abs(raised) >= FAR
         ]
 
@@ -174,8 +173,7 @@ def static_loads(
     model = balance.model
     tensions = np.array(model.system.links.spring[:, 2:])
     preload = dict(zip(model.index.links, tensions, strict=True))
-    mounts = nominal_forces(model.system.mounts)
-    preload |= dict(zip(model.index.mounts, mounts, strict=True))
+    preload |= dict(zip(model.index.mounts, nominal_forces(model.system.mounts), strict=True))
     springs, stops = _springs_and_stops(model, balance.state)
     return StaticLoads(
         wheelsets=tuple(model.index.wheelsets),

@@ -121,8 +121,7 @@ def irregularity(
     assumed.check()
     if simulations < 0:
         raise argument_error("simulations", f"found {simulations}", "0 or more")
-    known = all_sensors(vehicle)
-    used = used_channels(measurement, known)
+    used = used_channels(measurement, all_sensors(vehicle))
     remarks = list(measurement.remarks)
     if left := [name for name in measurement.channels if name not in used]:
         remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")

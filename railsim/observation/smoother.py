@@ -56,8 +56,7 @@ class Fields:
     def gain(self, fields: int) -> Complexes:
         """P H* G^-1 of (1) for the first fields, complex128[bin, field, channel]."""
         P, H = self.power[:, :fields], self.response[:, :, :fields]
-        found = np.einsum("kp,kcp,kcd->kpd", P, H.conj(), self._inverse(), optimize=True)
-        return np.asarray(found)
+        return np.asarray(np.einsum("kp,kcp,kcd->kpd", P, H.conj(), self._inverse(), optimize=True))
 
     def mean(self, data: Floats, there: Flags | None = None, residual: float = RESIDUAL) -> Floats:
         """E[r | y] of (2), float64[field, points].

@@ -331,8 +331,7 @@ def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
     damage.set_xlabel("rail damage a pass, WLRM ($10^{-6}$)")
     for ax in (energy, damage):
         ax.grid(axis="y", visible=False)
-    runs_only = energy.get_legend_handles_labels()
-    figure.legend(*runs_only, loc="outside lower left", ncols=2)
+    figure.legend(*energy.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure
 
 

@@ -49,8 +49,7 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     measured = [p for pair in pairs for p in (pair.wheel, pair.rail) if p.measured is not None]
     unique = list(dict.fromkeys(measured))
     rows, height = (2, 5.4) if unique else (1, 3.0)
-    edges = 0.06, 0.45 / height, 0.99, 1.0 - 0.3 / height, 0.14, 0.28
-    figure = Picture(9.6, height, edges=edges)
+    figure = Picture(9.6, height, edges=(0.06, 0.45 / height, 0.99, 1.0 - 0.3 / height, 0.14, 0.28))
     grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
     for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
         axes = figure.add_subplot(grid[0, side])
@@ -118,13 +117,12 @@ def functions_figure(geometry: ContactGeometry, title: str = "") -> Figure:
     figure = Picture(9.6, 5.4, title, (0.06, 0.085, 0.99, 0.925 if title else 0.985, 0.24, 0.08))
     axes = figure.subplots(2, 3, sharex=True)
     axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
-    panels = (
+    for panel, values, label in (
         (axes[0, 1], 1e3 * geometry.rolling_radius, "rolling radius (mm)"),
         (axes[0, 2], np.degrees(geometry.contact_angle), "contact angle (deg)"),
         (axes[1, 0], 1e3 * geometry.wheel_y, "outwards on the wheel (mm)"),
         (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
-    )
-    for panel, values, label in panels:
+    ):
         for own, name in zip(values.T, SIDES, strict=True):
             panel.plot(y, own, color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name)
         panel.set_ylabel(label)
@@ -160,8 +158,7 @@ def conicity_figure(conicity: Mapping[str, tuple[Floats, Floats]]) -> Figure:
     """Equivalent conicity over the amplitude: amplitudes [m] and values [1] by their name."""
     figure, axes = single(5.6, 3.6, edges=(0.11, 0.13, 0.985, 0.975))
     for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
-        words = unformatted(name)
-        axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=words)
+        axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=unformatted(name))
     axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
     note(axes, "3 mm", (3.0, 1.0), (3, -2), "left", "top", frame=ABOVE)
     axes.set(xlabel="amplitude $\\hat y$ (mm)", ylabel="equivalent conicity $\\tan\\gamma_e$")

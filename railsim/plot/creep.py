@@ -73,8 +73,7 @@ def _components(direction: Sequence[float]) -> list[tuple[int, str]]:
 def _draw_curves(
     panel: Axes, patch: Patch, direction: Sequence[float], scale: Floats, laws: Laws, grid: Cells
 ) -> None:
-    unit = patch.unit_creepages(direction)
-    x, y, spin = unit[:, None] * scale
+    x, y, spin = patch.unit_creepages(direction)[:, None] * scale
     for law in laws:
         force = creep_force(
             patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu, law, *grid

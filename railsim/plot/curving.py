@@ -158,8 +158,7 @@ def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
-        lateral = 1e3 * found.lateral[order, 0, 0, w]
-        both = _parted(found.radius[order], lateral)
+        both = _parted(found.radius[order], 1e3 * found.lateral[order, 0, 0, w])
         axes.plot(*both, color=colours[name], marker=".", ms=4, label=name)
     axes.set_title("lateral displacement (mm), first deficiency and friction")
     axes.legend(fontsize=7.5)

@@ -62,8 +62,7 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
 def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> None:
     words = f"{locus.key} ({locus.unit})" if locus.unit else locus.key
     damping.axhline(0.0, color=LIMIT, lw=0.8)
-    title = "Damping; below zero unstable"
-    damping.set(xlabel=words, ylabel="damping ratio (%)", title=title)
+    damping.set(xlabel=words, ylabel="damping ratio (%)", title="Damping; below zero unstable")
     damping.set_ylim(max(-30.0, damping.get_ylim()[0]), min(60.0, damping.get_ylim()[1]))
     damping.plot([], [], color="0.65", lw=0.9, label="bogies, wheelsets")
     damping.legend(ncol=1, loc="upper left", bbox_to_anchor=(1.0, 1.02), fontsize=7.5)

@@ -182,8 +182,7 @@ def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure
         names_shown = [n if len(n) <= LONGEST else f"...{n[3 - LONGEST :]}" for _, n in shown]
         lengths, labels = [v for v, _ in shown], [*map(unformatted, names_shown)]
         bars = axes.barh(labels, lengths, color=DISTINCT[0], height=0.7)
-        numbers = [quantity.text(value, 4) for value, _ in shown]
-        axes.bar_label(bars, numbers, padding=3, fontsize=7)
+        axes.bar_label(bars, [quantity.text(value, 4) for value, _ in shown], padding=3, fontsize=7)
         axes.invert_yaxis()
         axes.margins(x=0.1, y=0.02)
         axes.tick_params(axis="y", labelsize=7)
@@ -280,8 +279,7 @@ def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]
     `found`: Records of `railsim.studies.sensitivity.Sensitivity`. `labels`: Quantities with their
     units.
     """
-    count = len(found[0]["low"])
-    figure = Picture(10.2, len(found) * (1.3 + 0.32 * count))
+    figure = Picture(10.2, len(found) * (1.3 + 0.32 * len(found[0]["low"])))
     grid = figure.subplots(len(found), 2, squeeze=False)
     for (left, right), one, label in zip(grid, found, labels, strict=True):
         _tornado(left, one, label)

@@ -112,8 +112,7 @@ def wheelset_colours(names: Sequence[str]) -> dict[str, Any]:
     colours: dict[str, Any] = {}
     for i, members in enumerate(bogies.values()):
         dark, light = map(to_rgb, HUES[i % len(HUES)])
-        shades = np.linspace(dark, light, len(members))
-        colours |= zip(members, map(tuple, shades), strict=True)
+        colours |= zip(members, map(tuple, np.linspace(dark, light, len(members))), strict=True)
     return colours
 
 
@@ -172,8 +171,7 @@ def note(
 ) -> Annotation:
     """Write words beside a point, shifted by points of print; `frame`: coordinates of the point."""
     look: dict[str, Any] = {"fontsize": 7, "color": "0.3", "frame": "data"} | how
-    frame = look.pop("frame")
-    return axes.annotate(words, at, shift, frame, "offset points", ha=ha, va=va, **look)
+    return axes.annotate(words, at, shift, look.pop("frame"), "offset points", ha=ha, va=va, **look)
 
 
 def key(words: str, **look: Any) -> Line2D:

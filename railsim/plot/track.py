@@ -191,8 +191,7 @@ def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Floa
     axes.invert_yaxis()
     used = {section.type for section in sections}
     known = [look for kind, look in KINDS.items() if kind in used]
-    handles = [key(words, color=colour, lw=2.2) for words, colour in known]
-    axes.legend(handles=handles, loc="best")
+    axes.legend(handles=[key(words, color=colour, lw=2.2) for words, colour in known], loc="best")
 
 
 def _name_curve(

@@ -116,8 +116,7 @@ def _draw_element(
     for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
         if name:
             _line(axes, (flat.body(name).position, point), view, color=LEVER, lw=0.5)
-    ends = (element.point1, element.point2)
-    _line(axes, ends, view, color=colour, zorder=3, **_look(element))
+    _line(axes, (element.point1, element.point2), view, color=colour, zorder=3, **_look(element))
 
 
 def _look(element: FlatElement) -> dict[str, Any]:
@@ -158,5 +157,4 @@ def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D | Re
         yield key("axlebox", **BOX)
     for kind, colour in colours.items():
         of_kind = [element for element in flat.elements if element.definition.kind == kind]
-        label = f"{kind.replace('_', ' ')} ({len(of_kind)})"
-        yield key(label, color=colour, **_look(of_kind[0]))
+        yield key(f"{kind.replace('_', ' ')} ({len(of_kind)})", color=colour, **_look(of_kind[0]))

@@ -29,11 +29,9 @@ def assessed_track_page(
     text = f"At {at} a vehicle exceeds {100.0 * share:g} % of a limit."
     texts = [f"The first {MOST_ROWS} of {number}; all are in places.csv."]
     places.rows = places.rows[:MOST_ROWS]
-    heat = pictures({"heat": as_png(strip)}, CAPTIONS)
     parts = [
         Section("Places", texts if number > MOST_ROWS else [], [places] if number else []),
-        Section("Along the track", drawings=heat),
+        Section("Along the track", drawings=pictures({"heat": as_png(strip)}, CAPTIONS)),
         Section("Vehicles and geometry limits", [*notes], [sections]),
     ]
-    verdict = {"text": text, "ok": number == 0}
-    return document(f"{track} judged by vehicles", parts, METHOD, verdict)
+    return document(f"{track} judged by vehicles", parts, METHOD, {"text": text, "ok": number == 0})

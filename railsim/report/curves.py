@@ -96,8 +96,7 @@ def _quantity(
         return None
     quantity = having[0].quantities[name]
     sides = 2 if "side" in quantity.dims else 1
-    shape = (len(results), wheelsets, sides, 2 * (len(edges) - 1))
-    values = np.full(shape, np.nan)
+    values = np.full((len(results), wheelsets, sides, 2 * (len(edges) - 1)), np.nan)
     for row, result in enumerate(results.values()):
         if name in result:
             array = result[name].reshape(len(result["time"]), -1, sides)

@@ -126,8 +126,7 @@ def pictures(
         if name in drawn:
             width = int.from_bytes(drawn[name][16:20], "big")  # the header of a PNG file
             caption = captions[name.rstrip("_0123456789")]
-            code = b64encode(drawn[name]).decode()
-            image = IMAGE.format(caption, round(width * 96 / DPI), code)
+            image = IMAGE.format(caption, round(width * 96 / DPI), b64encode(drawn[name]).decode())
             found.append(Drawing("", caption, image))
     return found
 

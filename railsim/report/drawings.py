@@ -143,11 +143,10 @@ def track_svg(track: Track) -> str:
                 f'text-anchor="middle">{radius}</text>'
             )
     shapes += names
-    rows = (
+    for words, values, unit, top in (
         ("curvature", 1e3 * alignment.curvature(s), "1/km", 0.0),
         ("cant", 1e3 * alignment.cant(s), "mm", below),
-    )
-    for words, values, unit, top in rows:
+    ):
         low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
         span = (high - low) or 1.0
         y = top + height - 8.0 - (values - low) / span * (height - 30.0)

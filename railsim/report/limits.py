@@ -107,10 +107,9 @@ def _told_apart(assessments: Sequence[Assessment], runs: Mapping[str, Result]) -
     found = list[Assessment]()
     for one in assessments:
         same = [other for other in assessments if other.vehicle == one.vehicle]
-        values = differing([runs[other.runs[0]].vehicle() for other in same])
         parts = [
             f"{' '.join(key.split('.')[-2:]).replace('_', ' ')} {words[same.index(one)]}"
-            for key, words in values.items()
+            for key, words in differing([runs[other.runs[0]].vehicle() for other in same]).items()
         ]
         apart = "; ".join(parts) if 0 < len(parts) <= MOST_TOLD else listed(one.runs)
         found.append(replace(one, vehicle=f"{one.vehicle} ({apart})") if len(same) > 1 else one)
@@ -222,8 +221,7 @@ def _influences(one: Assessment) -> Table:
 
 def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
     """Return what was tested: vehicle, measuring points, profiles."""
-    first = runs[one.runs[0]]
-    vehicle = first.vehicle()
+    vehicle = runs[one.runs[0]].vehicle()
     service = vehicle.service
     rows = [("vehicle", f"{vehicle.name}. {vehicle.source or ''}")]
     if service:

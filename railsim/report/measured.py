@@ -113,8 +113,7 @@ def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
     ]
     title = f"{found.vehicle} against {', '.join(found.runs)}"
     method = (*VALIDATION, found.edition)
-    good = found.verdict not in words
-    return Part(title, text, good, found.remarks, sections, method)
+    return Part(title, text, found.verdict not in words, found.remarks, sections, method)
 
 
 def identification_figures(found: Identified) -> dict[str, Figure]:
@@ -134,9 +133,8 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
         text = " ".join(bounded)
     elif coloured:
         text = f"The residuals of {', '.join(coloured)} are not white: the model lacks something."
-    parameters = [parameter_table(record), correlation_table(record)]
     sections = [
-        Section("Parameters", unidentified, parameters),
+        Section("Parameters", unidentified, [parameter_table(record), correlation_table(record)]),
         Section("Residuals", tables=[residual_table(record)]),
         Section("Pictures", drawings=figures),
     ]

@@ -102,8 +102,7 @@ class Result:
         arrays = {name: np.asarray(array) for name, array in self._arrays.items()}
         about = self._quantities, self._coordinates, self._attributes, self._profiles
         groups = {group: dict(arrays) for group, arrays in self._groups.items()}
-        made = partial(Result, source=self._source)
-        return made, (arrays, *map(dict, about), groups)
+        return partial(Result, source=self._source), (arrays, *map(dict, about), groups)
 
     # -- the arrays ---------------------------------------------------------------------------
 

@@ -251,8 +251,7 @@ def _mid_curve(result: Result, names: list[str], section: Section, *, smooth: bo
     largest = [_largest(result, name, array, time, middle) for name, array in values.items()]
     begin, end = _full_curve(result, section)
     first, last = np.searchsorted(distance, begin), np.searchsorted(distance, end, "right")
-    rows = slice(int(first), int(last))
-    medians, scatter, changes = _over_curve(result, rows, values)
+    medians, scatter, changes = _over_curve(result, slice(int(first), int(last)), values)
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
     found = values, tuple(largest), medians, scatter, steady, (begin, end)
     unsettled = bool(smooth and len(changes) and np.mean(changes) > 0.5)
@@ -316,5 +315,4 @@ def _largest(result: Result, name: str, array: Floats, time: float, distance: fl
 
 def _labels(result: Result, name: str, indices: tuple[Any, ...]) -> dict[str, str]:
     dims = result.quantities[name].dims[1:]
-    names = zip(dims, indices, strict=True)
-    return {dim: result.coordinates[dim][index] for dim, index in names}
+    return {dim: result.coordinates[dim][index] for dim, index in zip(dims, indices, strict=True)}

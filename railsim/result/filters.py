@@ -86,8 +86,7 @@ def filtered(x: Floats, rate: float, response: Response, margin: float) -> Float
     inner = size - 2 * edge
     for begin in range(0, n, inner):
         end = min(begin + inner, n)
-        block = _continued(x, begin - edge, begin - edge + size)
-        spectrum = fft.rfft(block, axis=0)
+        spectrum = fft.rfft(_continued(x, begin - edge, begin - edge + size), axis=0)
         spectrum *= factor
         out[begin:end] = fft.irfft(spectrum, size, axis=0)[edge : edge + end - begin]
     return out

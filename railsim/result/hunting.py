@@ -129,8 +129,7 @@ def hunting(record: Result, rails: Rails | None = None) -> Hunting | None:
         if rails is not None and np.any(hunts):
             y_left, z_left, y_right, z_right = rails(seen("wheelset_distance")[:, w])[0]
             for wave in (0.5 * (y_left + y_right), 0.5 * (z_right - z_left)):
-                forced = cycles.amplitudes(band(wave))
-                hunts &= ~_same_waves(forced, swing)
+                hunts &= ~_same_waves(cycles.amplitudes(band(wave)), swing)
         windows = np.flatnonzero(hunts)
         if len(windows):
             most = windows[np.argmax(_mean(swing)[windows])]

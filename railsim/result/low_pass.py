@@ -201,8 +201,7 @@ class _Causal:
                     self._sections, array, axis=0, zi=self._states[name]
                 )
             found[name] = passed[self._skip :: self._every]
-        rows = len(chunk["time"])
-        self._skip = (self._skip - rows) % self._every
+        self._skip = (self._skip - len(chunk["time"])) % self._every
         return found
 
     def end(self) -> dict[str, Floats]:

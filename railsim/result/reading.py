@@ -196,8 +196,7 @@ def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None
     Raises InputError: it is another.
     """
     if _stamp(os.fstat(file.id.get_vfd_handle())) != stamp:
-        found = "was replaced or changed after it was opened"
-        raise input_error(str(path), found, "open it again")
+        raise input_error(str(path), "was replaced or changed after it was opened", "open it again")
 
 
 @contextmanager
@@ -343,8 +342,7 @@ class _Reader:
             if isinstance(value, bytes):  # a text of fixed length
                 value = value.decode("utf-8", errors="replace")
             if not isinstance(value, str | int | float):
-                words = f"found {str(value)[:60]}"
-                raise self.fault(location, words, "a text or a number")
+                raise self.fault(location, f"found {str(value)[:60]}", "a text or a number")
             facts[key] = value
         return facts
 

@@ -63,8 +63,7 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
             found[f"floor_{name}"] = (reference.name, (float(x), 0.0, height))
     for number, wheelset in enumerate(wheelsets, start=1):
         if (frame := frame_above(flat, wheelset)) is not None:
-            above = (wheelset.position[0], 0.0, frame.position[2])
-            found[f"frame_{number}"] = (frame.name, above)
+            found[f"frame_{number}"] = (frame.name, (wheelset.position[0], 0.0, frame.position[2]))
     for name, point in (vehicle.service.points if vehicle.service else {}).items():
         found[name] = (point.body, point.position)
     origin = reference.position[0]
@@ -155,8 +154,7 @@ def _of_bodies(
     """
     b = [bodies.index(sensor.body) for sensor in sensors]
     position, rates, absolute = (motion[f"body_{name}"][:, b] for name in MOTIONS)
-    offset = np.array([sensor.offset for sensor in sensors])
-    s = motion["distance"][:, None] + offset
+    s = motion["distance"][:, None] + np.array([sensor.offset for sensor in sensors])
     cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
     cant_rate, grade_rate = alignment.cant_angle_rate(s), alignment.grade_angle_rate(s)
     kappa, climb, level = alignment.curvature(s), np.sin(grade), np.cos(grade)
@@ -165,8 +163,7 @@ def _of_bodies(
     roll_rate = cant_rate - kappa * climb
     pitch_rate = grade_rate * c + kappa * level * sine
     yaw_rate = kappa * level * c - grade_rate * sine
-    turned = np.stack([roll_rate, pitch_rate, yaw_rate], axis=-1)
-    turning = speed[:, None, None] * turned
+    turning = speed[:, None, None] * np.stack([roll_rate, pitch_rate, yaw_rate], axis=-1)
     attitude, own, angular = _of_axes(sensors, position, rates, absolute)
     linear = absolute[..., :3] - GRAVITY * _into_body(down, *attitude)
     linear[..., 2] += GRAVITY

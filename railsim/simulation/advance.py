@@ -343,8 +343,7 @@ class Convoy:
         """Call the time loop; its status, where, number of steps, of records with those before."""
         begin = time.thread_time()  # a library's idle threads may still be spinning
         most = max(1, STEPS // len(self._runs))
-        longest = longest_part(self.system, self.state[SPEED])
-        divide_strikes(self.work, self.scheme, step, longest)
+        divide_strikes(self.work, self.scheme, step, longest_part(self.system, self.state[SPEED]))
         at, end = first, first + n_steps
         while True:
             # more than one call only within one output interval, which records at its begin:

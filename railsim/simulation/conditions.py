@@ -107,8 +107,7 @@ def check_range(
     if duration is not None:
         right = 0.0 < duration < math.inf
         faults.require(right, "duration", f"found {float(duration):g} s", "a positive number")
-        found = "given together with `until`"
-        faults.require(until is None, "duration", found, "one of the two")
+        faults.require(until is None, "duration", "given together with `until`", "one of the two")
     if until is not None:
         allowed = f"more than the start, {start:g} m, and at most {end}, the track's plan"
         right = start < until <= track.length

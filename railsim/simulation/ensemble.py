@@ -302,8 +302,7 @@ def _starts(lengths: Iterable[int]) -> Integers:
 
 
 def _slices(lengths: Iterable[int]) -> list[slice]:
-    ends = np.cumsum([0, *lengths]).tolist()
-    return [slice(start, end) for start, end in pairwise(ends)]
+    return [slice(start, end) for start, end in pairwise(np.cumsum([0, *lengths]).tolist())]
 
 
 def _indices(

@@ -262,8 +262,7 @@ class OutputPlan:
         if self._sensors:
             track = self._alignment, recorder.state[:rows, -1]
             of_bodies = values, self._model.index.bodies
-            read = readings(self._sensors, *of_bodies, *track)
-            values |= zip(READINGS, read, strict=True)
+            values |= zip(READINGS, readings(self._sensors, *of_bodies, *track), strict=True)
             if not self._readings_only:
                 values |= motions(self._sensors, *of_bodies, *track)
         if self._asked.contact_patches:

@@ -143,8 +143,7 @@ def evaluate(task: Task, x: Dimensions, n: Floats | None = None) -> Evaluation:
     phi = trailing_arm.rotation(arm, task.loads)
     weaker = np.min(K_V, axis=0)
     slack = _space_slack(task, x, weaker * wanted.mounting_deflection / wanted.mounting_load)
-    lost = np.isfinite(weaker) & np.any(np.isnan(phi), axis=-1)
-    slack["equilibrium"] = np.where(lost, -1.0, 1.0)
+    slack["equilibrium"] = np.where(np.isfinite(weaker) & np.any(np.isnan(phi), axis=-1), -1.0, 1.0)
     n_t = checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils)
     mass = np.sum(checks.mass(x.d, D, n_t, suspension.material.density), axis=0)
     states = [vars(trailing_arm.coil_state(arm, coil, phi)) for coil in arm.coils]

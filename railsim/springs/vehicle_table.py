@@ -128,8 +128,7 @@ def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) ->
 def _nest(
     suspension: TrailingArmSuspension, table: VehicleTable, case: Case
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    outer = case.springs["outer"]
-    height = float(outer.height)
+    height = float(case.springs["outer"].height)
     seat = -table.wheel_radius - suspension.arm.seat_height
     touching = [state for state in case.springs.values() if state.deflection > 0.0]
     K_V = sum(float(state.force / state.deflection) for state in touching)

@@ -181,8 +181,7 @@ def checked(
         faults.require(inside, name, f"found {value!r}", f"{least:g} to {most:g} m/s", option)
     if not faults:
         words = f"less than the highest, {fastest:g} m/s"
-        slower = slowest < fastest
-        faults.require(slower, "low", f"found {slowest:g} m/s", words, "--from")
+        faults.require(slowest < fastest, "low", f"found {slowest:g} m/s", words, "--from")
     faults.require(2 <= points <= 200, "points", f"found {points}", "2 to 200")
     wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
     words = f"found {wrong[0]:g} m" if wrong else "no size"
@@ -424,8 +423,7 @@ def _by_diagram(
 def _by_continuation(
     found: CriticalSpeed, motion: VehicleMotion, begins: LossOfStability, progress: Progress
 ) -> None:
-    limits = found.low, found.high
-    followed = followed_branches(motion, begins, found.branches, limits, progress)
+    followed = followed_branches(motion, begins, found.branches, (found.low, found.high), progress)
     found.branches += followed.branches
     found.remarks += followed.remarks
     ends = list(followed.folds)
@@ -445,8 +443,7 @@ def _unstable_force(vehicle: Vehicle, Q0: Floats) -> float:
     laws = load_running_limits("en14363").limits
     service = vehicle.service or Service(admissible_speed=1.0, cant_deficiency=0.1)
     lightest = int(np.argmin(Q0.sum(axis=1)))
-    load = float(Q0[lightest].mean())
-    at = Situation(vehicle, service, "1", math.inf, lightest, load, laws)
+    at = Situation(vehicle, service, "1", math.inf, lightest, float(Q0[lightest].mean()), laws)
     return float(laws["instability"].at(at))
 
 

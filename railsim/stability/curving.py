@@ -355,8 +355,7 @@ class _Search:
     def _judged(self, solver: SteadyRolling, found: Floats, goal: Floats) -> Point:
         """A steady state of Newton's method; where it is unstable, what a run comes to instead."""
         free = FreeVehicle(self.model, solver.system, found)
-        modes = eigenmodes(free.linearisation(free.tangent()))
-        if modes.eigenvalues.real.max() < GROWS:
+        if eigenmodes(free.linearisation(free.tangent())).eigenvalues.real.max() < GROWS:
             return solver, [found], NEWTON
         timed = self._in_time(goal, float(found[SPEED]))
         at = free.coordinates.indices[free.coordinates.positions]

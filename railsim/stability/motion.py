@@ -151,8 +151,7 @@ class VehicleMotion:
     def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
         """Move a state by a chunk of steps; number of records; LeftRange: it leaves the model."""
         arrays = self._work, state, self._derivative, self._stages, self._recorder
-        scheme = SCHEMES[self._scheme]
-        status, where, _, rows = time_loop(system, *arrays, scheme, step, chunk)
+        status, where, _, rows = time_loop(system, *arrays, SCHEMES[self._scheme], step, chunk)
         if status != RUNNING:
             raise LeftRange(self.model.index.sentence(status, where))
         if not np.isfinite(state).all():

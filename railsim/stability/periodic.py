@@ -214,8 +214,7 @@ class Shooting:
         """x(T) of several scaled u, one a row, scaled."""
         n = rows.shape[1] - 2
         trials = rows * self._scale
-        states = np.ascontiguousarray(trials[:, :n])
-        ends = self._flow.after(states, trials[:, n], trials[:, n + 1])
+        ends = self._flow.after(np.ascontiguousarray(trials[:, :n]), trials[:, n], trials[:, n + 1])
         return np.asarray(ends / self._scale[:n])
 
     def _periodicity(self, u: Floats) -> tuple[Floats, Floats]:

@@ -97,8 +97,7 @@ def ramp(
         except LeftRange:  # excited, or while it brakes
             if speed <= low:
                 raise
-            reached = hard[-1].speed if hard else speed
-            speed = max(low, min(STEP_DOWN * speed, reached))
+            speed = max(low, min(STEP_DOWN * speed, hard[-1].speed if hard else speed))
     begin = min(hard[0].speed, hard[-1].speed + LEAD)
     points = [point for point in hard if point.speed >= begin]
     _brake(motion, points, low, DECELERATION, lambda share: tell(0.3 + 0.4 * share))

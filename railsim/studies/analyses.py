@@ -162,8 +162,7 @@ def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result 
 
 
 def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
-    names = ("linearisation", "amplitude", "conicity")
-    return {name: getattr(analysis, name) for name in names}
+    return {name: getattr(analysis, name) for name in ("linearisation", "amplitude", "conicity")}
 
 
 def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Outcome:

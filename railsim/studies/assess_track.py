@@ -253,8 +253,7 @@ def recorded(recording: str | Path) -> Track:
         data: dict[str, Any] = {"irregularities": irregular}
         Faults(embed_measured(data)).check()
         length = float(data["irregularities"][0]["rows"][-1][0])
-        straight = load_track("straight")
-        return straight.replace(
+        return load_track("straight").replace(
             name=Path(recording).stem,
             plan=[{"type": "STR", "length": length}],
             cant=[{"type": "CST", "length": length, "cant": 0.0}],

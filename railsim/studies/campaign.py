@@ -211,8 +211,7 @@ def check_parts(scenario: Scenario, file: str, assignments: Sequence[str] = ()) 
                 load_profile(new, "wheel")
             except InputError as error:
                 key, (one, *_) = f"conditions.{name}.wheels.{old}", error.faults
-                found = f"profile '{new}': {one.found}"
-                loader.faults.append(Fault(file, key, found, one.allowed))
+                loader.faults.append(Fault(file, key, f"profile '{new}': {one.found}", one.allowed))
     loader.check()
 
 
@@ -325,8 +324,7 @@ def repeated(case: Case, limits: RunningLimits, service: Service, condition: int
         sections = counting_sections(track, case, limits, service)
         label = f"{case.name}_seed{seed}"
         scaled = to_target(track, part, sections, limits, service)
-        labels = {**case.labels, "seed": seed}
-        found.append(replace(case, name=label, track=scaled, labels=labels))
+        found.append(replace(case, name=label, track=scaled, labels={**case.labels, "seed": seed}))
         counted += len(sections)
         if not sections or counted >= limits.zones[sections[0].zone].sections:
             break
@@ -345,8 +343,7 @@ def counting_sections(
     end = (case.until or track.length) + behind - 1.0
     sections = track_sections(track, limits, service, (begin, end), lambda _: case.speed)
     counting = [section for section in sections if section.zone and not section.reason]
-    by_zone = [[s for s in counting if s.zone == zone] for zone in limits.zones]
-    return max(by_zone, key=len)
+    return max([[s for s in counting if s.zone == zone] for zone in limits.zones], key=len)
 
 
 def to_target(

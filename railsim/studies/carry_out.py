@@ -374,8 +374,7 @@ def _moved_aside(path: Path) -> Path:
     """Give a damaged file another name that is free, and return it."""
     endings = chain([""], (f"-{number}" for number in count(2)))
     names = (path.with_name(f"{path.name}.damaged{ending}") for ending in endings)
-    free = next(name for name in names if not os.path.lexists(name))
-    return path.rename(free)
+    return path.rename(next(name for name in names if not os.path.lexists(name)))
 
 
 def _files(folder: Path) -> dict[str, os.stat_result]:

@@ -70,8 +70,7 @@ class Case:
                 for name in sorted({name for _, name, _ in used})
             },
         }
-        text = json.dumps(inputs, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 AS_IN_TABLES = 1e-4  # m, between the points of a wheel

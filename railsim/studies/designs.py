@@ -87,8 +87,7 @@ class Evaluation:
             self.asked.append(known[row])
         before, number = len(self.designs), self.wanted.evaluations
         self._study(lambda share: self._progress(min(1.0, (before + share * len(points)) / number)))
-        objectives = np.array([design.objectives for design in self.designs])
-        values = signs_of(self.wanted) * objectives
+        values = signs_of(self.wanted) * np.array([design.objectives for design in self.designs])
         return Values(values[self.asked], self._margins[self.asked])
 
     def _study(self, progress: Progress) -> None:

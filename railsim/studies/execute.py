@@ -154,8 +154,7 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
             from railsim.plot.style import save
 
             save(histories(outcome), job.picture, overwrite=True)
-        record = finished_record(job.case, outcome, job.function)
-        return {**record, "file": _reduced(job, outcome)}
+        return {**finished_record(job.case, outcome, job.function), "file": _reduced(job, outcome)}
     except Exception as error:
         return failed_record(job.case, error)
 
@@ -371,8 +370,7 @@ def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, byte
         for job in batch:
             picture = job.picture and there / job.picture.name
             here.append(replace(job, path=there / job.path.name, picture=picture))
-        records = perform(tuple(here))
-        return records, {path.name: path.read_bytes() for path in there.iterdir()}
+        return perform(tuple(here)), {path.name: path.read_bytes() for path in there.iterdir()}
 
 
 def _taken(future: Any, batch: Batch) -> list[Record]:

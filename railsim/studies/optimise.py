@@ -194,8 +194,7 @@ def optimise(
     evaluation = Evaluation(definition, wanted, folder, execution)
     sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)
     number = wanted.evaluations
-    batch = min(wanted.batch, number)
-    search(wanted.method, Task(evaluation, *sizes, number, batch, wanted.seed))
+    search(wanted.method, Task(evaluation, *sizes, number, min(wanted.batch, number), wanted.seed))
     return _concluded(evaluation, choose)
 
 
@@ -333,11 +332,10 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     base = sources.read_source(sources.find_file(vehicle, "vehicle"), "vehicle")
     defaults = Vehicle.model_construct().model_dump(mode="json")
     changed = apply_overrides(base, overrides, Vehicle.OPEN_TABLES, defaults).data
-    named = os.path.relpath(vehicle, folder) if is_file(vehicle) else str(vehicle)
     head = {
         "format": base.data["format"],
         "name": f"{base.data.get('name', vehicle)}, optimised",
-        "extends": named,
+        "extends": os.path.relpath(vehicle, folder) if is_file(vehicle) else str(vehicle),
     }
     return str(tomli_w.dumps({**head, **_difference(base.data, changed)}))
 

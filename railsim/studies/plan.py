@@ -109,8 +109,7 @@ class Plan:
         inputs = (*parts, run.speed, run.start, run.duration, run.until, *self._further)
         key = "" if "" in parts else _hashed([__version__, *map(repr, inputs)])
         labels = {**run_labels(run), **row.values}
-        has_run = needs_run(self._spec.analyses)
-        return Point(run_name(run) + row.suffix, run, labels, key, has_run)
+        return Point(run_name(run) + row.suffix, run, labels, key, needs_run(self._spec.analyses))
 
     def cases(self, points: Sequence[Point] | None = None) -> list[Case]:
         """Load the inputs of some points, by default all; raises InputError: all their faults."""
@@ -136,8 +135,7 @@ class Plan:
             return None  # already reported
         allowed, missing = f"needed for the speed '{PERMITTED}'", Faults()
         if vehicle.service is None:
-            key = "service.admissible_speed"
-            missing.append(Fault(str(run.vehicle), key, "missing", allowed))
+            missing.append(Fault(str(run.vehicle), "service.admissible_speed", "missing", allowed))
         if track.speed is None:
             missing.append(Fault(str(run.track), "speed", "missing", allowed))
         self._loader.faults += missing

@@ -52,8 +52,7 @@ def rail_wear(
         }
 
     needed: dict[str, Any] = {"outputs": ("contact_patches", "track"), "unit": "Mt", "scale": 1e-9}
-    wearing = Wearing(runs, new, sides, depths, given="traffic", **needed)
-    return carry_out(wearing, Loop(**how))
+    return carry_out(Wearing(runs, new, sides, depths, given="traffic", **needed), Loop(**how))
 
 
 def rail_rows(found: Sequence[WearStep]) -> dict[str, list[dict[str, float | None]]]:

@@ -68,13 +68,12 @@ def sampled(sample: Sample) -> list[dict[str, str]]:
 
     count = len(sample.parameters)
     engine = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
-    shares = engine(d=count, seed=sample.seed).random(sample.number)
     return [
         {
             name: f"{quantile(spread, float(share)):.10g}"
             for (name, spread), share in zip(sample.parameters.items(), row, strict=True)
         }
-        for row in shares
+        for row in engine(d=count, seed=sample.seed).random(sample.number)
     ]
 
 

@@ -36,8 +36,7 @@ class Values:
     def feasible(self) -> Flags:
         """Whether each design has values and meets all constraints."""
         known = np.isfinite(self.objectives).all(axis=1)
-        within = (self.constraints <= 0.0).all(axis=1)
-        return np.logical_and(known, within)
+        return np.logical_and(known, (self.constraints <= 0.0).all(axis=1))
 
 
 Evaluate = Callable[[Floats], Values]
@@ -101,8 +100,7 @@ def _promising(designs: Floats, values: Values, size: int, rng: np.random.Genera
             candidates.append(np.clip(moved + rng.normal(0.0, width, moved.shape), 0.0, 1.0))
         candidates.append(_at_bounds(candidates[-1], rng))
     points = np.vstack(candidates)
-    model = Surrogate(designs, np.hstack([values.objectives, values.constraints]))
-    predicted = model(points)
+    predicted = Surrogate(designs, np.hstack([values.objectives, values.constraints]))(points)
     m = values.objectives.shape[1]
     objectives, constraints = predicted[:, :m], predicted[:, m:]
     # if no design is feasible, the smallest violation comes first

@@ -194,10 +194,9 @@ def checked(model: type[M], data: Any, file: str) -> M:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        details = error.errors(include_url=False)[:MOST_FAULTS]
         raise InputError(
             Fault(file, ".".join(map(str, detail["loc"])), *_found_and_allowed(detail))
-            for detail in details
+            for detail in error.errors(include_url=False)[:MOST_FAULTS]
         ) from None
 
 

@@ -171,8 +171,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
     if spec.quantities and not needs_run(spec.analyses):
         raise argument_error("quantities", "no analysis computes a run", 'add one of kind = "run"')
     plan = Plan(spec, execution.workers or available_cores())
-    base = os.path.relpath(Path.cwd(), folder)
-    spec = spec.changed(railsim_version=__version__, folder=base)
+    spec = spec.changed(railsim_version=__version__, folder=os.path.relpath(Path.cwd(), folder))
     outcome = carry_out(plan.points, plan.cases, spec, folder, execution)
     if execution.plots:
         _draw(outcome)

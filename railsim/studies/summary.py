@@ -211,8 +211,7 @@ def _checked_row(record: Record) -> dict[str, Any]:
         return summary_row(record)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         found = f"the record of '{record['name']}' cannot be used ({error!r})"
-        allowed = "remove the journal: existing results are kept"
-        raise input_error(JOURNAL, found, allowed) from None
+        raise input_error(JOURNAL, found, "remove the journal: existing results are kept") from None
 
 
 def unit_of(column: str) -> str:

@@ -183,8 +183,7 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
     _check(wearing, how)
     law, settings = wear_law(how.law), how.settings or Settings()
     needed = {**dict.fromkeys(wearing.outputs, True), "quantities": ()}  # all of the usual ones
-    outputs = settings.outputs.model_copy(update=needed)
-    settings = settings.model_copy(update={"outputs": outputs})
+    settings = settings.model_copy(update={"outputs": settings.outputs.model_copy(update=needed)})
     tell, remark = how.progress or (lambda _: None), how.on_remark or _LOG.warning
     profiles, whole = dict(wearing.new), how.steps * how.step
     found: list[WearStep] = []

@@ -81,8 +81,7 @@ class Alignment:
 
     def cant_angle_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the cant angle along the track [rad/m]."""
-        sine = self._cant(s) / CANT_BASE
-        return self._cant.rate(s) / (CANT_BASE * np.sqrt(1.0 - sine**2))
+        return self._cant.rate(s) / (CANT_BASE * np.sqrt(1.0 - (self._cant(s) / CANT_BASE) ** 2))
 
     def gradient(self, s: ArrayLike) -> Floats:
         """Gradient of the vertical profile, rise over horizontal distance [1]."""

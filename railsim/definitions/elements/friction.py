@@ -214,8 +214,7 @@ class CentrePlate(SlidingFriction, PairElement):
     def parts(self) -> list[tuple[str, Vector, Element]]:
         """Pads that carry the plate: suffix of the name, offset from the centre [m], pad."""
         found: list[tuple[str, Vector, Element]] = []
-        rule = _gauss_on_ring(self.inner_radius, self.radius)
-        for ring, (radius, share) in enumerate(rule):
+        for ring, (radius, share) in enumerate(_gauss_on_ring(self.inner_radius, self.radius)):
             for quarter in range(4):
                 angle = 0.5 * pi * quarter + 0.25 * pi * ring
                 pad = SideBearer(

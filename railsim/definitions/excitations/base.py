@@ -97,8 +97,7 @@ def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displac
         inside = ((s >= begin) & (s < end)).astype(float)
         if length == 0.0:
             return inside, np.zeros_like(s)
-        depth = np.minimum(s - begin, end - s)
-        angle = np.pi * np.clip(depth / length, 0.0, 1.0)
+        angle = np.pi * np.clip(np.minimum(s - begin, end - s) / length, 0.0, 1.0)
         side = np.where(s - begin < end - s, 1.0, -1.0)
         rate = side * 0.5 * np.pi / length * np.sin(angle)
         return inside * 0.5 * (1.0 - np.cos(angle)), inside * rate

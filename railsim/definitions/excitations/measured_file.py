@@ -142,8 +142,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
             faults.append((number, *problem.args))
     values = np.array(table).reshape(len(table), len(named))
     rows = _rows(named, values, how)
-    found = _row_faults(rows, named, values)
-    faults += [(numbers[k], what, allowed) for k, what, allowed in found]
+    faults += [(numbers[k], what, allowed) for k, what, allowed in _row_faults(rows, named, values)]
     faults.sort(key=lambda fault: fault[0])
     Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
@@ -256,8 +255,7 @@ def _mapped(path: Path, head: list[str], named: dict[str, str]) -> list[Column |
     faults = Faults()
     for name, theirs in named.items():
         if name not in SHARES:
-            allowed = nearest(name, SHARES)
-            faults.append(Fault("", f"columns.{name}", "unknown quantity", allowed))
+            faults.append(Fault("", f"columns.{name}", "unknown quantity", nearest(name, SHARES)))
         elif theirs not in head:
             found = f"no column '{theirs}'"
             faults.append(Fault(str(path), "header", found, nearest(theirs, head)))

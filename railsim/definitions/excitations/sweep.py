@@ -36,8 +36,7 @@ class Sweep(base.Stretch):
 
     def mirrored(self) -> Self:
         """Return the mirror image: what goes to the right or rises on the left is turned round."""
-        sign = base.MIRROR[self.channel]
-        return self.model_copy(update={"amplitude": sign * self.amplitude})
+        return self.model_copy(update={"amplitude": base.MIRROR[self.channel] * self.amplitude})
 
     def resolution(self) -> float:
         """Return a sixteenth of the shorter wavelength [m]."""

@@ -135,8 +135,7 @@ class _Compilable(ast.NodeTransformer):
 
 def _compiled(tree: ast.expr) -> CodeType:
     body = _Compilable().visit(deepcopy(tree))
-    checked = ast.fix_missing_locations(ast.Expression(body))
-    return compile(checked, "<expression>", "eval")
+    return compile(ast.fix_missing_locations(ast.Expression(body)), "<expression>", "eval")
 
 
 def evaluate(expression: Expression, values: Mapping[str, Any]) -> Any:

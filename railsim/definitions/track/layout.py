@@ -201,8 +201,7 @@ def _written(word: str, value: float) -> str:
 
 
 def _steps(sections: Sequence[Section]) -> list[tuple[Section, Section]]:
-    pairs = pairwise(sections)
-    return [(a, b) for a, b in pairs if not _same(a.end_value, b.start_value)]
+    return [(a, b) for a, b in pairwise(sections) if not _same(a.end_value, b.start_value)]
 
 
 def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:
