@@ -23,7 +23,7 @@ from railsim.cli import interrupts
 from railsim.cli.common import DONE, ENDED_EARLY, FAILED, LIMIT_EXCEEDED, WRONG_INPUT
 from railsim.cli.interrupts import Interrupted
 from railsim.cli.terminal import echo, print_json
-from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
+from railsim.errors import InputError, ModelError, RailsimError, fault_lines, nearest, words_of
 from railsim.files.access import remove_partial_files
 from railsim.threads import use_one_thread
 from railsim.version import __version__
@@ -91,8 +91,6 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that the arguments begin with; a wrong name gets the nearest one."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            from railsim.errors import nearest
-
             ctx.fail(f"no command '{args[0]}'; {nearest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 

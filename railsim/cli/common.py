@@ -10,12 +10,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 from click.core import ParameterSource
+from click.shell_completion import CompletionItem
 
 from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, print_json, show
 from railsim.errors import Fault, Faults, InputError, changed_faults, input_error
-from railsim.files.access import check_file, check_folder, make_folder, whole_file, write_folder
-from railsim.files.sources import OVERRIDE
+from railsim.files.access import (
+    DEFINITION_BYTES,
+    check_file,
+    check_folder,
+    make_folder,
+    read_text,
+    whole_file,
+    write_folder,
+)
+from railsim.files.sources import OVERRIDE, find_file, library_files, read_source, shipped_names
 from railsim.text import plain
 
 if TYPE_CHECKING:
@@ -115,10 +124,6 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
     """Return what completes an argument in a shell: names of shipped files, or a file."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
-        from click.shell_completion import CompletionItem
-
-        from railsim.files.sources import shipped_names
-
         names = [name for name in shipped_names(kind) if name.startswith(incomplete)]
         return [*map(CompletionItem, names)] or [CompletionItem(incomplete, type="file")]
 
@@ -174,8 +179,6 @@ extent_options = together(
 def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
     """Permit laws of one's own: all that the files name, or those of some files."""
     if files:
-        from railsim.files.access import DEFINITION_BYTES, read_text
-        from railsim.files.sources import library_files
         from railsim.laws.permission import allow
 
         known = {} if files is True else library_files("law")
@@ -231,8 +234,6 @@ def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
     holds: spring, mechanism; `name`: the definition's own name, which faults found by computing
     bear.
     """
-    from railsim.files.sources import find_file, read_source
-
     try:
         yield
     except InputError as error:

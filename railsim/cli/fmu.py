@@ -5,6 +5,7 @@ from typing import Any
 import click
 
 from railsim.cli import common as cli
+from railsim.errors import argument_error
 
 
 @click.command()
@@ -36,7 +37,6 @@ def command(
       railsim fmu coach_manchester curve_r250 --speed 20 --out coach.fmu
       railsim fmu active.toml straight --speed 50 --inputs push --outputs Q,sum_Y:1 --out a.fmu
     """
-    from railsim.errors import argument_error
     from railsim.fmi import fmu
     from railsim.studies.case import load_case
 

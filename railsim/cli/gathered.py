@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from railsim.errors import Fault, Faults
+
 if TYPE_CHECKING:
     from railsim.description import Description
     from railsim.result import Result
@@ -36,7 +38,6 @@ def opened(paths: Sequence[Path]) -> "dict[str, Result]":
 
     Raises InputError: everything that cannot be read, or is given twice.
     """
-    from railsim.errors import Fault, Faults
     from railsim.result import open_run
 
     faults, results = Faults(), dict[str, Any]()
@@ -61,8 +62,6 @@ def gather(files: Sequence[str]) -> Gathered:
 
     Raises InputError: everything that cannot be read.
     """
-    from railsim.errors import Fault, Faults
-
     found, faults = Gathered(), Faults()
     batches: list[tuple[Path, list[Record]]] = []
     for file in files:

@@ -9,6 +9,7 @@ import click
 from railsim.cli import common as cli
 from railsim.cli.gathered import STUDY_FILES, described_runs
 from railsim.files.access import PICTURES, RESULTS, check_file
+from railsim.plottable import Plottable
 
 if TYPE_CHECKING:
     from railsim.definitions.base import Remark
@@ -63,7 +64,6 @@ def command(
         from railsim.definitions import Track, Vehicle
         from railsim.definitions.loading import load_any, load_track
         from railsim.description import describe
-        from railsim.plottable import Plottable
 
         definition = load_any(file, [*assignments, *([f"load={load}"] if load else [])])
         cli.goes_with("vehicles", isinstance(definition, Vehicle), "static")

@@ -6,6 +6,8 @@ from typing import Any
 import click
 
 from railsim.cli import common as cli
+from railsim.errors import Fault, Faults, nearest
+from railsim.files.access import check_folder, make_folder
 
 
 @click.command()
@@ -23,7 +25,6 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
       railsim list vehicles
     """
     from railsim.description.library import KINDS, LAWS, MEANING, PROFILES, library_entries
-    from railsim.errors import Fault, Faults, nearest
     from railsim.table import Column, Table
 
     known = [*KINDS, PROFILES, LAWS]
@@ -51,7 +52,6 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
 
 def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:
     from railsim.definitions.loading import load_any
-    from railsim.files.access import check_folder, make_folder
 
     drawn = [entry for entry in entries if entry["kind"] in ("vehicles", "tracks")]
     check_folder(folder, [f"{entry['name']}.png" for entry in drawn], overwrite=overwrite)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
+from railsim.errors import changed_faults, input_error
 
 if TYPE_CHECKING:
     from railsim.definitions.mechanism.definition import Mechanism
@@ -102,7 +103,6 @@ def command(
 
 def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
     """Results of a case that was not asked for; what is wrong with it names it."""
-    from railsim.errors import changed_faults
     from railsim.mechanisms.analysis import analyse
 
     with changed_faults(lambda fault: replace(fault, found=f"case '{case}': {fault.found}")):
@@ -111,8 +111,6 @@ def _of_case(mechanism: "Mechanism", case: str) -> "Analysis":
 
 def _wanted(at: Sequence[str]) -> list[Wanted]:
     """Words of --at, with the name of the result and its value."""
-    from railsim.errors import input_error
-
     found = list[Wanted]()
     for assignment in at:
         name, equals, written = assignment.partition("=")

@@ -10,6 +10,7 @@ import click
 
 from railsim.cli import common as cli
 from railsim.errors import InputError, input_error
+from railsim.files.access import make_folder
 
 if TYPE_CHECKING:
     from railsim.definitions import Vehicle
@@ -87,7 +88,6 @@ def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) 
     """Write the oscillations as a page that shows one of them; nothing where there is none."""
     from railsim.animation import mode_scene, write_page
     from railsim.animation.scene import chosen_mode
-    from railsim.files.access import make_folder
     from railsim.linear.modes import SHOWN
 
     records = [m.record() for m in found.oscillations if m.natural_frequency <= SHOWN]

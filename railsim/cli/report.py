@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import listed
+from railsim.errors import RailsimError, listed
 from railsim.files.access import write_text
 
 if TYPE_CHECKING:
@@ -82,7 +82,6 @@ def used_inputs(folder: Path) -> "list[Used]":
 
     From the files as they are now; nothing where they are gone or no longer what they were.
     """
-    from railsim.errors import RailsimError
     from railsim.report.inputs import Used
     from railsim.studies.plan import Plan
     from railsim.studies.study import stored_spec

@@ -8,6 +8,7 @@ import click
 from railsim.cli import common as cli
 from railsim.cli.terminal import show
 from railsim.errors import Fault, Faults, changed_faults
+from railsim.files.access import PICTURES, RESULTS, check_file
 from railsim.threads import keep_freed_memory
 
 if TYPE_CHECKING:
@@ -116,7 +117,6 @@ def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
 
 def _checked(spec: "RunSpec", output: cli.Output, plots: bool) -> "tuple[Case, Path]":
     """Load the case and settle its file; everything that is wrong with either at once."""
-    from railsim.files.access import PICTURES, RESULTS, check_file
     from railsim.studies.case import load_case
 
     faults, name = Faults(), output.out

@@ -11,7 +11,10 @@ import click
 
 from railsim.cli import common as cli
 from railsim.cli.terminal import echo
+from railsim.errors import RailsimError, input_error, nearest
 from railsim.files.access import TABLES, is_file, write_text
+from railsim.files.key_paths import key_path
+from railsim.files.sources import find_file, read_source
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
@@ -188,7 +191,6 @@ def vehicle(
       railsim run my_coach.toml curve_r250 --speed 20 --overwrite
     """
     from railsim.definitions.loading import load_spring
-    from railsim.errors import input_error, nearest
     from railsim.springs.vehicle_table import vehicle_part, vehicle_text
 
     suspension = load_spring(file, assignments)
@@ -217,7 +219,6 @@ def _load_remarks(
     """Remark on springs that are taken at a load unlike that which the vehicle puts on them."""
     from railsim.definitions.loading import load_vehicle
     from railsim.definitions.vehicle.flatten import flatten
-    from railsim.errors import RailsimError
     from railsim.springs.vehicle_table import LIKELY, axlebox_load
 
     name = extends or (suspension.vehicle.extends if suspension.vehicle else None)
@@ -243,9 +244,6 @@ def _base(
     table = suspension.vehicle
     if extends is None or table is None:
         return None, None, []
-    from railsim.files.key_paths import key_path
-    from railsim.files.sources import find_file, read_source
-
     base = find_file(extends, "vehicle")
     data = read_source(base, "vehicle").data
     removed = [key for key in table.remove if _holds(data, key_path(key))]

@@ -12,6 +12,7 @@ import click
 from railsim.cli import common as cli
 from railsim.cli.progress import RunLines
 from railsim.cli.terminal import echo, show
+from railsim.errors import Fault, Faults
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
@@ -181,7 +182,6 @@ def command(
 
 def _grid(texts: Sequence[str]) -> dict[str, list[str]]:
     """Values by the keys of ``--grid``."""
-    from railsim.errors import Faults
     from railsim.studies.plan import parse_grid
 
     faults, grid = Faults(), dict[str, list[str]]()
@@ -210,7 +210,6 @@ def _campaign(
     """
     from railsim.assessment.tables import assessment_lines
     from railsim.cli.assess import FILES, write_assessments
-    from railsim.errors import Fault, Faults
     from railsim.studies.campaign import campaign
 
     options = [name if name.isupper() else f"--{name}" for name in taken]
@@ -249,7 +248,6 @@ def _spec(
 ) -> "StudySpec":
     """Return the study of the options, or of a file with the assignments of the options."""
     from railsim.definitions.loading import load_study
-    from railsim.errors import Fault, Faults
     from railsim.studies.spec import StudySpec, checked
     from railsim.studies.user_function import full_name
 

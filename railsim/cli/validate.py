@@ -9,6 +9,7 @@ import click
 
 from railsim.cli import common as cli
 from railsim.cli.terminal import echo, print_json
+from railsim.errors import Fault, Faults, InputError, fault_lines
 from railsim.files.access import RESULTS, is_file
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
@@ -42,8 +43,6 @@ def command(files: tuple[str, ...], output: cli.Output) -> int:
 
 
 def _report(file: str) -> dict[str, Any]:
-    from railsim.errors import Fault, InputError
-
     faults, kind, remarks = list[Fault](), None, list[dict[str, str]]()
     try:
         kind, remarks = checked(file)
@@ -53,8 +52,6 @@ def _report(file: str) -> dict[str, Any]:
 
 
 def _print(report: dict[str, Any], quiet: bool) -> None:
-    from railsim.errors import fault_lines
-
     for line in fault_lines(report["faults"]):
         echo(line, err=True)
     if quiet or report["faults"]:
@@ -90,7 +87,6 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         return f"study of {len(index.runs)} runs, {index.status}", []
 
     from railsim.definitions.loading import load_any, load_scenario, load_study
-    from railsim.errors import Faults
     from railsim.profiles.used import profile_faults
 
     definition = load_any(file)

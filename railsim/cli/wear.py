@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from railsim.cli import common as cli
+from railsim.errors import Fault, Faults, RailsimError, input_error
 from railsim.notation import SIDES
 
 if TYPE_CHECKING:
@@ -164,7 +165,6 @@ def _carry_out(
     record; `rows_of`: makes rows of each profile from the steps.
     """
     from railsim.assessment.wear import wear_law
-    from railsim.errors import RailsimError
     from railsim.profiles import save_profile
 
     steps = _number_of_steps(of, distance, step)
@@ -221,8 +221,6 @@ def _file_name(of: Worn, amount: float, side: str) -> str:
 
 
 def _number_of_steps(of: Worn, distance: float, step: float) -> int:
-    from railsim.errors import Fault, Faults, input_error
-
     Faults(
         Fault(option, "", f"found {value:g}", "above 0")
         for option, value in ((f"--{of.amount}", distance), ("--step", step))

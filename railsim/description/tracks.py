@@ -6,7 +6,7 @@ from typing import Any
 
 from railsim.definitions import Track
 from railsim.definitions.excitations import Irregularity
-from railsim.definitions.excitations.measured import READING, Measured
+from railsim.definitions.excitations.measured import READING, Measured, largest_between_rows
 from railsim.definitions.track.alignment_rules import cant_at
 from railsim.definitions.track.layout import cant_sections, curvature_sections, gradient_sections
 from railsim.definitions.track.section import Section
@@ -93,8 +93,6 @@ def _irregularity(part: Irregularity) -> dict[str, Any]:
     """Return an irregularity; of a measured one what its rows hold instead of the rows."""
     data = part.model_dump(exclude_none=True, exclude={"rows"})
     if isinstance(part, Measured) and part.rows is not None:
-        from railsim.definitions.excitations.measured import largest_between_rows
-
         found = largest_between_rows(part)
         data = {key: value for key, value in data.items() if key not in READING}
         data |= {

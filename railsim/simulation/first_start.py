@@ -23,6 +23,7 @@ from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.model.assembly import SharedTables, assemble
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
+from railsim.processes import WorkerPool, available_cores
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -65,8 +66,6 @@ def _begun(stack: ExitStack) -> "Future[None] | None":
         return None
     # no part of other starts
     from multiprocessing import parent_process
-
-    from railsim.processes import WorkerPool, available_cores
 
     if available_cores() < 2 or parent_process() is not None:
         return None

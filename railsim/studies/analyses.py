@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from railsim.cant import cant_deficiency
 from railsim.definitions.study.analyses import (
     Analysis,
     AssessAnalysis,
@@ -169,7 +170,6 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Ou
     """Largest magnitudes over the wheels or wheelsets, and the sum of the wear numbers."""
     import numpy as np
 
-    from railsim.cant import cant_deficiency
     from railsim.stability.curving import FAILED, curving
 
     deficiency = analysis.cant_deficiency

@@ -9,6 +9,7 @@ from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run, needs_speed
@@ -220,8 +221,6 @@ def _misfits(
     wheel: str, radius: float, back_to_back: float, rail: str, gauge: float, inclination: float
 ) -> list[Fault]:
     """Return why a wheelset cannot run in a track; nothing where a profile cannot be used."""
-    from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
-
     try:
         there = rail_curve(load_profile(rail, "rail"), gauge, inclination)
         place = tape_circle_position(back_to_back)

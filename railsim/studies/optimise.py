@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from railsim.definitions import Vehicle
 from railsim.definitions.loading import load_study
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
@@ -327,8 +328,6 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     `overrides`: ``key.path=value`` with the file's own keys; `folder`: of the new file, from which
     the path to the original counts.
     """
-    from railsim.definitions import Vehicle
-
     base = sources.read_source(sources.find_file(vehicle, "vehicle"), "vehicle")
     defaults = Vehicle.model_construct().model_dump(mode="json")
     changed = apply_overrides(base, overrides, Vehicle.OPEN_TABLES, defaults).data
