@@ -155,7 +155,8 @@ def _cut(points: Floats) -> list[Floats]:
     """Cut a contour where a groove lies between two rails."""
     z = points[1]
     left = np.minimum.accumulate(z)
-    depth = z - np.maximum(left, np.minimum.accumulate(z[::-1])[::-1])
+    right = np.minimum.accumulate(z[::-1])[::-1]
+    depth = z - np.maximum(left, right)
     deepest = int(np.argmax(depth))
     if depth[deepest] <= DEEP:
         return [points]
@@ -195,7 +196,8 @@ def _rolled(heights: Floats, radius: float) -> tuple[Floats, Floats]:
     bend = a - 2.0 * b + c
     offset = np.where(bend > 0.0, 0.5 * (a - c) / np.where(bend > 0.0, bend, 1.0), 0.0)
     offset = np.clip(offset, -0.5, 0.5)
-    return heights[best, columns] - 0.25 * (a - c) * offset, AHEAD[best] + STEP * offset
+    z = heights[best, columns] - 0.25 * (a - c) * offset
+    return z, AHEAD[best] + STEP * offset
 
 
 def rolled_curve(part: RailPart, s: float, radius: float, zero: float = 0.75) -> curves.RailCurve:

@@ -195,13 +195,14 @@ def _kept_zones(
         for k in found:
             place[table, k] = count
             count += 1
-    return kept, [
+    described = [
         [
             [round(s - begin, 9), *(place[table, k] if mask[k] else -1 for k in range(3))]
             for (s, table, _), mask in zip(along, near, strict=True)
         ]
         for along, near in zip(rows, masks, strict=True)
     ]
+    return kept, described
 
 
 def _height(generator: Generator, rail: RailCurve) -> float:

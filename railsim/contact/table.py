@@ -256,7 +256,8 @@ def build_contact_table(
         wheel, radius, curves.tape_circle_position(back_to_back), min(grid.spacing, grid.ds)
     )
     rail_nodes = curves.rail_curve(rail, gauge, inclination)
-    Faults(curves.misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}")).check()
+    pair = f"{wheel.name} on {rail.name}"
+    Faults(curves.misfits(wheel_points, rail_nodes, gauge, pair)).check()
     usual = table_range(wheel_points, rail_nodes, widening)
     s_min = usual[0] if grid.s_min is None else grid.s_min
     s_max = usual[1] if grid.s_max is None else grid.s_max

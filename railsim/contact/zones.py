@@ -77,7 +77,8 @@ def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Floats:
 
     def beyond(begin: float, end: float) -> Floats:
         """0 on the tread side of `begin`, 1 on the flange side of `end`."""
-        x = np.clip((begin - wheel.y) / max(begin - end, 1e-4), 0.0, 1.0)
+        width = max(begin - end, 1e-4)
+        x = np.clip((begin - wheel.y) / width, 0.0, 1.0)
         share: Floats = x * x * (3.0 - 2.0 * x)
         return share
 
