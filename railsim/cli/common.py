@@ -15,15 +15,7 @@ from click.shell_completion import CompletionItem
 from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, print_json, show
 from railsim.errors import Fault, Faults, InputError, changed_faults, input_error
-from railsim.files.access import (
-    DEFINITION_BYTES,
-    check_file,
-    check_folder,
-    make_folder,
-    read_text,
-    whole_file,
-    write_folder,
-)
+from railsim.files import access
 from railsim.files.sources import OVERRIDE, find_file, library_files, read_source, shipped_names
 from railsim.text import plain
 
@@ -183,7 +175,7 @@ def _allow(ctx: click.Context, param: click.Parameter, files: Any) -> None:
 
         known = {} if files is True else library_files("law")
         paths = [] if files is True else [known.get(file, Path(file)) for file in files]
-        allow(*(read_text(path, DEFINITION_BYTES) for path in paths))
+        allow(*(access.read_text(path, access.DEFINITION_BYTES) for path in paths))
 
 
 _allowed: dict[str, Any] = {"expose_value": False, "callback": _allow}
@@ -364,7 +356,7 @@ class Output:
     def reserve(self, *names: str) -> Path | None:
         """Refuse the folder before anything is computed, if these files cannot be written."""
         if self.folder is not None:
-            check_folder(self.folder, names, overwrite=self.overwrite)
+            access.check_folder(self.folder, names, overwrite=self.overwrite)
         return self.folder
 
     def file(self, default: str | Path, endings: Sequence[str] = (), suffix: str = "") -> Path:
@@ -372,7 +364,7 @@ class Output:
         path = Path(self.out or default)
         if not self.out and path.name and suffix:
             path = path.with_suffix(suffix)
-        check_file(path, overwrite=self.overwrite, endings=endings)
+        access.check_file(path, overwrite=self.overwrite, endings=endings)
         return path
 
     def write(self, name: str, content: Any) -> None:
@@ -383,7 +375,7 @@ class Output:
         """
         if self.folder is None:
             return
-        make_folder(self.folder)
+        access.make_folder(self.folder)
         path = self.folder / name
         content = content() if callable(content) else content
         if hasattr(content, "savefig"):
@@ -391,7 +383,7 @@ class Output:
 
             save(content, path, overwrite=True)
         else:
-            with whole_file(path) as partial:
+            with access.whole_file(path) as partial:
                 partial.write_bytes(_bytes(content))
         self.written.append(path)
 
@@ -399,7 +391,7 @@ class Output:
         """Write files into the folder, all of them or none; contents as of `write`."""
         if self.folder is not None:
             data = {name: _bytes(one) for name, one in content.items()}
-            self.written += write_folder(self.folder, data, overwrite=self.overwrite)
+            self.written += access.write_folder(self.folder, data, overwrite=self.overwrite)
 
     def answer(
         self, record: Any, parts: "Iterable[str | Table]" = (), remarks: Iterable[object] = ()

@@ -13,24 +13,16 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    Count,
-    Definition,
-    Finite,
-    Flag,
-    NonNegative,
-    Positive,
-    Text,
-    check,
-    rises,
-)
+from railsim.definitions import base
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.vehicle.bogies import bogie_mass
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 
-Rows = Annotated[tuple[tuple[Positive, Positive], ...], Field(min_length=1), rises("first column")]
+Rows = Annotated[
+    tuple[tuple[base.Positive, base.Positive], ...], Field(min_length=1), base.rises("first column")
+]
 Probability = Annotated[float, Field(strict=True, ge=0.5, lt=1.0)]
 ZoneName = Annotated[str, Field(pattern="^[1-4]$")]
 
@@ -46,21 +38,21 @@ def up_to(rows: Sequence[tuple[float, float]], speed: float, above: float) -> fl
     return next((value for most, value in rows if speed <= most * (1.0 + 1e-3)), above)
 
 
-class Sourced(Definition):
+class Sourced(base.Definition):
     """A value of a standard with where it comes from."""
 
-    source: Text
+    source: base.Text
     """Where the value was found"""
-    edition: Text | None = None
+    edition: base.Text | None = None
     """Edition of the standard, where it is not that of the file"""
-    checked: Flag = False
+    checked: base.Flag = False
     """Whether somebody has compared it with the printed standard"""
 
 
 class Value(Sourced):
     """One number."""
 
-    value: Positive
+    value: base.Positive
     """Limit [SI]"""
 
 
@@ -93,7 +85,7 @@ class ByZone(Sourced):
 
     law: Literal["by_zone"]
     """One number for each zone"""
-    values: tuple[Positive, Positive, Positive, Positive]
+    values: tuple[base.Positive, base.Positive, base.Positive, base.Positive]
     """Limits in the zones 1 to 4 [SI]"""
 
     def at(self, place: Situation) -> float:
@@ -106,11 +98,11 @@ class ByAxleLoad(Sourced):
 
     law: Literal["by_axle_load"]
     """k1 (constant + factor Q0)"""
-    constant: NonNegative
+    constant: base.NonNegative
     """[N]"""
-    factor: Positive
+    factor: base.Positive
     """Of the static wheel load Q0 [1]"""
-    k1: dict[Text, Positive] = Field(min_length=1)
+    k1: dict[base.Text, base.Positive] = Field(min_length=1)
     """Factor by category of the vehicle [1]"""
 
     def at(self, place: Situation) -> float:
@@ -123,11 +115,11 @@ class ByWheelLoad(Sourced):
 
     law: Literal["by_wheel_load"]
     """Constant + Q0, at most a value by speed"""
-    constant: NonNegative
+    constant: base.NonNegative
     """[N]"""
     by_speed: Rows
     """Rows [admissible speed up to m/s, N]"""
-    above: Positive
+    above: base.Positive
     """Beyond the last row [N]"""
 
     def at(self, place: Situation) -> float:
@@ -141,9 +133,9 @@ class ByRadius(Sourced):
 
     law: Literal["by_radius"]
     """Constant + numerator / mean radius"""
-    constant: NonNegative
+    constant: base.NonNegative
     """[N]"""
-    numerator: NonNegative
+    numerator: base.NonNegative
     """[N m]"""
 
     def at(self, place: Situation) -> float:
@@ -156,9 +148,9 @@ class ByBogieMass(Sourced):
 
     law: Literal["by_bogie_mass"]
     """Constant - slope m"""
-    constant: Positive
+    constant: base.Positive
     """[m/s2]"""
-    slope: NonNegative
+    slope: base.NonNegative
     """Per mass of the bogie [m/s2/kg]"""
 
     def at(self, place: Situation) -> float:
@@ -173,9 +165,9 @@ class Share(Sourced):
 
     law: Literal["share"]
     """A share of another limit"""
-    value: Positive
+    value: base.Positive
     """[1]"""
-    of: Text
+    of: base.Text
     """Name of the other limit"""
 
     def at(self, place: Situation) -> float:
@@ -192,31 +184,31 @@ LimitLaw = Annotated[
 class HighFriction(Sourced):
     """Correction of the quasi-static guiding force for high friction, slope (Y/Q - threshold)."""
 
-    threshold: Positive
+    threshold: base.Positive
     """Y/Q of the inner wheel [1]"""
-    slope: Positive
+    slope: base.Positive
     """[N]"""
 
 
 class Zone(Sourced):
     """A test zone."""
 
-    radius: tuple[Positive, Annotated[float, Field(strict=True, gt=0)]] | None = None
+    radius: tuple[base.Positive, Annotated[float, Field(strict=True, gt=0)]] | None = None
     """Smallest and largest radius [m]; without it straight track"""
-    mean_radius: tuple[Positive, Positive] | None = None
+    mean_radius: tuple[base.Positive, base.Positive] | None = None
     """Range of the mean radius of all sections [m]"""
-    cant_deficiency: tuple[NonNegative, Positive]
+    cant_deficiency: tuple[base.NonNegative, base.Positive]
     """Range, of the admissible one [1]; on straight track [m]"""
-    speed: tuple[Positive, Positive] | None = None
+    speed: tuple[base.Positive, base.Positive] | None = None
     """Range, of the admissible speed [1]"""
     section: Rows
     """Rows [speed up to m/s, length of a section m]"""
-    section_above: Positive
+    section_above: base.Positive
     """Length of a section beyond the last row [m]"""
-    sections: Count
+    sections: base.Count
     """Least number of sections"""
 
-    @check
+    @base.check
     def _ordered(self) -> None:
         for name in ("radius", "mean_radius", "cant_deficiency", "speed"):
             ends = getattr(self, name)
@@ -224,20 +216,20 @@ class Zone(Sourced):
                 raise ValueError(f"'{name}' is [smallest, largest]")
 
 
-class Factors(Definition):
+class Factors(base.Definition):
     """A factor of the statistics for each class of quantities."""
 
-    safety: NonNegative
+    safety: base.NonNegative
     """Running safety"""
-    loading: NonNegative
+    loading: base.NonNegative
     """Track loading"""
-    ride: NonNegative
+    ride: base.NonNegative
     """Ride characteristics"""
-    quasi_static: NonNegative
+    quasi_static: base.NonNegative
     """Quasi-static values"""
 
 
-class Probabilities(Definition):
+class Probabilities(base.Definition):
     """A probability for each class of quantities."""
 
     safety: Probability
@@ -262,11 +254,11 @@ class Statistics(Sourced):
 class ConicityClasses(Sourced):
     """Equivalent conicity of the wheelsets on the test track, amplitude 3 mm."""
 
-    low: Positive
+    low: base.Positive
     """Some sections of zone 1 have this one at most [1]"""
     high: Rows
     """Rows [admissible speed up to m/s, some sections have this one at least]"""
-    high_above: Positive
+    high_above: base.Positive
     """Beyond the last row [1]"""
 
 
@@ -274,9 +266,11 @@ class TrackTarget(Sourced):
     """Target of the track's quality: 90 % values of the standard deviations in D1."""
 
     rows: Annotated[
-        tuple[tuple[Positive, Positive, Positive, Positive, Positive], ...],
+        tuple[
+            tuple[base.Positive, base.Positive, base.Positive, base.Positive, base.Positive], ...
+        ],
         Field(min_length=1),
-        rises("first column"),
+        base.rises("first column"),
     ]
     """Rows [speed up to m/s, smallest and largest of alignment m, smallest and largest of level
     m]"""
@@ -303,7 +297,7 @@ class RunningLimits(FileDefinition):
     format: Literal["railsim-limits/1"]
     standard: Literal["en14363", "uic518"]
     """Which evaluation it belongs to"""
-    edition: Text
+    edition: base.Text
     """Edition of the standard"""
     deciding: tuple[Criteria, ...] = ("safety", "loading")
     """Verdicts that decide; the others are for information"""
@@ -321,10 +315,10 @@ class RunningLimits(FileDefinition):
     """Factors of the statistics"""
     high_friction: HighFriction | None = None
     """Correction of the quasi-static guiding force"""
-    limits: dict[Text, LimitLaw] = Field(min_length=1)
+    limits: dict[base.Text, LimitLaw] = Field(min_length=1)
     """Limits by the names of the assessed quantities"""
 
-    @check
+    @base.check
     def _shares_of_others(self) -> None:
         for name, limit in self.limits.items():
             other = self.limits.get(limit.of) if isinstance(limit, Share) else None
@@ -335,9 +329,9 @@ class RunningLimits(FileDefinition):
 class Classes(Sourced):
     """Upper ends of classes."""
 
-    values: tuple[tuple[Finite, Text], ...] = Field(min_length=1)
+    values: tuple[tuple[base.Finite, base.Text], ...] = Field(min_length=1)
     """Rows [below, what it is called]; beyond the last: `above`"""
-    above: Text
+    above: base.Text
     """Name of the last class"""
 
 
@@ -347,7 +341,7 @@ class ComfortLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-comfort-limits/1"]
-    edition: Text
+    edition: base.Text
     """Edition of the standard"""
     mean_comfort: Classes
     """N_MV, N_VA, N_VD"""
@@ -358,11 +352,11 @@ class ComfortLimits(FileDefinition):
 class Twist(Sourced):
     """Twist of the track over a length: constant + numerator / length, at most `greatest`."""
 
-    constant: NonNegative
+    constant: base.NonNegative
     """[1]"""
-    numerator: Finite
+    numerator: base.Finite
     """[m]"""
-    greatest: Positive
+    greatest: base.Positive
     """[1]"""
 
     def over(self, length: float) -> float:
@@ -373,7 +367,7 @@ class Twist(Sourced):
 class Guiding(Value):
     """Guiding force in a tight level curve over the smallest wheel load on twisted track."""
 
-    radius: Positive
+    radius: base.Positive
     """Radius of the curve [m]"""
 
 
@@ -383,7 +377,7 @@ class StationaryLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-stationary-limits/1"]
-    edition: Text
+    edition: base.Text
     """Edition of the standards"""
     unloading: Value
     """(Q0 - Q)/Q0 of the least loaded wheel on twisted track"""
@@ -405,9 +399,9 @@ class StationaryLimits(FileDefinition):
 class Difference(Sourced):
     """Limit of the standard deviation of simulated less measured values: constant + factor Q0."""
 
-    constant: Positive
+    constant: base.Positive
     """[SI]"""
-    factor: NonNegative = 0.0
+    factor: base.NonNegative = 0.0
     """Of the static wheel load [1]"""
 
     def at(self, Q0: float) -> float:
@@ -421,13 +415,13 @@ class ValidationLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-validation-limits/1"]
-    edition: Text
+    edition: base.Text
     """Edition of the standard"""
-    sections: Count
+    sections: base.Count
     """Least number of sections"""
-    mean: Annotated[Finite, Field(gt=0, le=1)]
+    mean: Annotated[base.Finite, Field(gt=0, le=1)]
     """Limit of the mean difference over that of the standard deviation"""
-    limits: dict[Text, Difference] = Field(min_length=1)
+    limits: dict[base.Text, Difference] = Field(min_length=1)
     """Limits of the standard deviation by the names of the compared quantities"""
 
 
@@ -437,7 +431,7 @@ class WheelLimits(FileDefinition):
     KIND: ClassVar = "limits"
 
     format: Literal["railsim-wheel-limits/1"]
-    edition: Text
+    edition: base.Text
     """Edition of the standard"""
     flange_thickness: Value
     """Sd, smallest [m]"""

@@ -4,74 +4,67 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Definition,
-    Finite,
-    Flag,
-    Name,
-    NonNegative,
-    Positive,
-    Speed,
-    Text,
-    check,
-    holds,
-    rises,
-)
+from railsim.definitions import base
 from railsim.definitions.creep_law import CreepLawName
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.vehicle.laws import Law, LawUse, OwnOutput, with_sources
 from railsim.errors import Fault
 
-SpeedRows = Annotated[tuple[tuple[Finite, Speed], ...], Field(min_length=1), rises("first column")]
-Step = Annotated[Finite, Field(ge=1e-6, le=0.1)]
-Rate = Annotated[Finite, Field(ge=1e-3, le=1e5)]
-Spacing = Annotated[Finite, Field(ge=1e-3, le=1e5)]
+SpeedRows = Annotated[
+    tuple[tuple[base.Finite, base.Speed], ...], Field(min_length=1), base.rises("first column")
+]
+Step = Annotated[base.Finite, Field(ge=1e-6, le=0.1)]
+Rate = Annotated[base.Finite, Field(ge=1e-3, le=1e5)]
+Spacing = Annotated[base.Finite, Field(ge=1e-3, le=1e5)]
 Cells = Annotated[int, Field(strict=True, ge=1, le=500)]
-Share = Annotated[Finite, Field(ge=0.0, le=1.0)]
+Share = Annotated[base.Finite, Field(ge=0.0, le=1.0)]
 
 
 AdhesionRows = Annotated[
-    tuple[tuple[NonNegative, Share], ...],
+    tuple[tuple[base.NonNegative, Share], ...],
     Field(min_length=2),
-    holds(lambda r: r[0] == (0.0, 0.0), "the first row must be [0.0, 0.0]: no creepage, no force"),
-    rises("first column"),
+    base.holds(
+        lambda r: r[0] == (0.0, 0.0), "the first row must be [0.0, 0.0]: no creepage, no force"
+    ),
+    base.rises("first column"),
 ]
 TractionRows = Annotated[
-    tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), rises("first column")
+    tuple[tuple[base.NonNegative, base.Finite], ...],
+    Field(min_length=1),
+    base.rises("first column"),
 ]
 
 
-class InitialState(Definition):
+class InitialState(base.Definition):
     """Disturbance of a body at the start, added to the equilibrium."""
 
-    x: Finite = 0.0
+    x: base.Finite = 0.0
     """Displacement along the track [m]"""
-    y: Finite = 0.0
+    y: base.Finite = 0.0
     """Displacement to the right [m]"""
-    z: Finite = 0.0
+    z: base.Finite = 0.0
     """Displacement downwards [m]"""
-    roll: Finite = 0.0
+    roll: base.Finite = 0.0
     """Angle about x [rad]"""
-    pitch: Finite = 0.0
+    pitch: base.Finite = 0.0
     """Angle about y [rad]"""
-    yaw: Finite = 0.0
+    yaw: base.Finite = 0.0
     """Angle about z [rad]"""
-    vx: Finite = 0.0
+    vx: base.Finite = 0.0
     """Velocity along the track, beside the vehicle's speed [m/s]"""
-    vy: Finite = 0.0
+    vy: base.Finite = 0.0
     """Velocity to the right [m/s]"""
-    vz: Finite = 0.0
+    vz: base.Finite = 0.0
     """Velocity downwards [m/s]"""
-    vroll: Finite = 0.0
+    vroll: base.Finite = 0.0
     """Angular velocity about x [rad/s]"""
-    vpitch: Finite = 0.0
+    vpitch: base.Finite = 0.0
     """Angular velocity about y [rad/s]"""
-    vyaw: Finite = 0.0
+    vyaw: base.Finite = 0.0
     """Angular velocity about z [rad/s]"""
 
 
-class Drive(Definition):
+class Drive(base.Definition):
     """Speed profile along the track."""
 
     mode: Literal["constant", "table", "free"] = "constant"
@@ -81,10 +74,10 @@ class Drive(Definition):
     """Rows [arc length m, speed m/s], linear in between, constant beyond"""
     traction_table: TractionRows | None = None
     """Rows [speed m/s, force N] on the reference body, braking negative, constant beyond"""
-    resistance: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    resistance: tuple[base.NonNegative, base.NonNegative, base.NonNegative] = (0.0, 0.0, 0.0)
     """Running resistance a + b V + c V^2 on the reference body [N, N s/m, N s2/m2]"""
 
-    @check
+    @base.check
     def _what_the_mode_needs(self) -> None:
         if (self.mode == "table") != (self.speed_table is not None):
             raise ValueError("'speed_table' belongs to mode = \"table\" and only to it")
@@ -97,41 +90,41 @@ class Drive(Definition):
 LEAST_RATE = {"zero": 2.5, "causal": 6.7}
 
 
-class LowPass(Definition):
+class LowPass(base.Definition):
     """Filter between the time loop and the result, so that slow sampling folds nothing back."""
 
-    frequency: Positive
+    frequency: base.Positive
     """End of the pass band (`zero`), -3 dB (`causal`) [Hz]"""
     phase: Literal["zero", "causal"] = "zero"
     """`zero`: without phase, flat to `frequency` and nothing above `output_rate` - `frequency`;
     `causal`: Butterworth of order 4, as a measuring amplifier"""
 
 
-class Outputs(Definition):
+class Outputs(base.Definition):
     """What a run outputs."""
 
-    quantities: tuple[Text, ...] = ()
+    quantities: tuple[base.Text, ...] = ()
     """Which of the usual quantities to keep, `*` standing for any letters; by default all"""
-    evaluate_after: NonNegative | None = None
+    evaluate_after: base.NonNegative | None = None
     """Time after the start that tables of peaks leave out [s]; by default 1 s, and no more than a
     tenth of the run; 0: none"""
     low_pass: LowPass | None = None
     """Low pass of all quantities before they are stored at `output_rate`"""
-    sensors: Flag | Literal["readings"] = False
+    sensors: base.Flag | Literal["readings"] = False
     """Motion of points: floor, bogie frames, axleboxes and the vehicle's `sensors`; accelerations
     also as accelerometers read them; `readings`: these and roll velocities alone"""
 
-    elements: tuple[Text, ...] = ()
+    elements: tuple[base.Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""
-    contact_patches: Flag = False
+    contact_patches: base.Flag = False
     """Position, size, load, creep forces and pressure of every contact patch"""
-    frictional_power: Flag = False
+    frictional_power: base.Flag = False
     """Power that each wheel's contact turns into heat"""
-    drives: Flag = False
+    drives: base.Flag = False
     """Torque of drives, brakes and actuators on each wheelset"""
-    track: Flag = False
+    track: base.Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
-    own: dict[Name, OwnOutput] | None = None
+    own: dict[base.Name, OwnOutput] | None = None
     """Quantities by laws of one's own, by name"""
 
 
@@ -154,7 +147,7 @@ class Settings(FileDefinition):
     """Cells of a contact patch along and across"""
     creep_law: CreepLawName = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""
-    laws: dict[Name, Law] | None = None
+    laws: dict[base.Name, Law] | None = None
     """Laws of one's own by name: Python functions, executed by permission alone"""
     own_creep_law: LawUse | None = None
     """Creep law of one's own, instead of `creep_law`"""
@@ -164,15 +157,15 @@ class Settings(FileDefinition):
     adhesion_curve: AdhesionRows | None = None
     """Measured curve of the law `adhesion_curve`: rows [creepage, T/(mu N)] from [0, 0] on, linear
     in between, constant beyond [1]"""
-    transient_creep: Flag = False
+    transient_creep: base.Flag = False
     """Creep forces follow the creepages over the length of the patch, instead of steady rolling"""
     normal_contact: Literal["hertz", "kik-piotrowski"] = "hertz"
     """Normal contact: the Hertz ellipse of averaged curvatures, or non-elliptic patches"""
-    contact_damping: NonNegative = 2e5
+    contact_damping: base.NonNegative = 2e5
     """Damping of the wheel-rail contact, normal to the patch [N s/m]"""
-    shear_modulus: Positive = 82e9
+    shear_modulus: base.Positive = 82e9
     """Shear modulus of wheels and rails [Pa]"""
-    poisson: NonNegative = 0.28
+    poisson: base.NonNegative = 0.28
     """Poisson's ratio of wheels and rails [1]"""
     drive: Drive = Drive.model_construct()
     """Speed profile along the track"""
@@ -181,7 +174,7 @@ class Settings(FileDefinition):
     state by Newton's method"""
     outputs: Outputs = Outputs.model_construct()
     """Further quantities in the result"""
-    initial: dict[str, InitialState] = EMPTY_TABLE
+    initial: dict[str, InitialState] = base.EMPTY_TABLE
     """Disturbance at the start by the body's full name"""
 
     def output_interval(self, speed: float) -> float:
@@ -197,7 +190,7 @@ class Settings(FileDefinition):
         """Put the sources of laws into the tables."""
         return with_sources(tables)
 
-    @check
+    @base.check
     def _physical(self) -> None:
         if self.poisson >= 0.5:
             raise ValueError("'poisson' must be below 0.5")

@@ -10,23 +10,11 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Definition,
-    Finite,
-    NonNegative,
-    NonNegativeVector,
-    Positive,
-    Remark,
-    Text,
-    check,
-    holds,
-    rises,
-)
+from railsim.definitions import base
 from railsim.definitions.file_definition import FileDefinition
 from railsim.errors import Fault, nearest
 
-Row = tuple[NonNegative, Positive]
+Row = tuple[base.NonNegative, base.Positive]
 
 
 _NUMBER = {"type": "number", "exclusiveMinimum": 0}
@@ -36,50 +24,52 @@ NumberOrTable = Annotated[
     tuple[Row, ...],
     BeforeValidator(lambda v: v if isinstance(v, list | tuple) else ((0.0, v),)),
     Field(min_length=1),
-    rises("first column"),
+    base.rises("first column"),
     WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _ROW, "minItems": 1}]}),
 ]
 Polyline = Annotated[
     tuple[Row, ...],
     Field(min_length=2),
-    rises("first column"),
-    holds(
+    base.rises("first column"),
+    base.holds(
         lambda rows: all(lower <= upper for lower, upper in rows),
         "rows [tau_min, tau_max]: the upper stress must not be below the lower",
     ),
 ]
 Bounds = Annotated[
-    tuple[Positive, Positive],
-    holds(lambda b: b[0] <= b[1], "[smallest, largest]: the second must not be below the first"),
+    tuple[base.Positive, base.Positive],
+    base.holds(
+        lambda b: b[0] <= b[1], "[smallest, largest]: the second must not be below the first"
+    ),
 ]
 
 
-class TrailingArm(Definition):
+class TrailingArm(base.Definition):
     """The axlebox arm, horizontal under the mounting load."""
 
-    length: Positive
+    length: base.Positive
     """Hinge on the bogie frame to axle centre [m]"""
-    seat_height: NonNegative
+    seat_height: base.NonNegative
     """Height of the outer spring's lower seat above the axle centre [m]"""
-    bush_torsional_stiffness: NonNegative
+    bush_torsional_stiffness: base.NonNegative
     """Torsional stiffness of the hinge's bush, unloaded at the mounting load [N m/rad]"""
     equilibrium: Literal["grossi", "energy"] = "grossi"
     """Form of the nest's moment: the reference's, or the derivative of the stored energy"""
 
 
-class Material(Definition):
+class Material(base.Definition):
     """Material of the springs."""
 
-    G: Positive
+    G: base.Positive
     """Shear modulus [Pa]"""
-    E: Positive
+    E: base.Positive
     """Young's modulus [Pa]"""
-    density: Positive = 7850.0
+    density: base.Positive = 7850.0
     """Density [kg/m3]"""
     tau_allowable: NumberOrTable | None = None
     """Allowable shear stress of the solid spring [Pa], or rows [wire diameter m, stress Pa]"""
 
-    @check
+    @base.check
     def _isotropic(self) -> None:
         nu = self.E / (2.0 * self.G) - 1.0
         if not 0.0 <= nu < 0.5:
@@ -89,19 +79,19 @@ class Material(Definition):
             )
 
 
-class HelicalSpring(Definition):
+class HelicalSpring(base.Definition):
     """A helical spring of round wire."""
 
-    mean_diameter: Positive
+    mean_diameter: base.Positive
     """Mean coil diameter D [m]"""
-    free_height: Positive
+    free_height: base.Positive
     """Height without load H0 [m]"""
-    wire_diameter: Positive | None = None
+    wire_diameter: base.Positive | None = None
     """Wire diameter d [m]; design can do without"""
-    active_coils: Positive | None = None
+    active_coils: base.Positive | None = None
     """Number of active coils n; design finds it"""
 
-    @check
+    @base.check
     def _winds(self) -> None:
         if self.wire_diameter is not None and self.wire_diameter >= self.mean_diameter:
             raise ValueError("'wire_diameter' must be below 'mean_diameter'")
@@ -110,148 +100,148 @@ class HelicalSpring(Definition):
 class InnerSpring(HelicalSpring):
     """The spring within the outer one."""
 
-    engagement: NonNegative | None = None
+    engagement: base.NonNegative | None = None
     """Deflection of the outer spring at which this one starts to work [m]; by default 0, its
     seat raised by the difference of the free heights"""
-    seat_height: NonNegative | None = None
+    seat_height: base.NonNegative | None = None
     """Height of its lower seat above the axle centre [m] instead of `engagement`"""
 
-    @check
+    @base.check
     def _one_way_of_standing(self) -> None:
         if self.engagement is not None and self.seat_height is not None:
             raise ValueError("either 'engagement' or 'seat_height', not both")
 
 
-class Point(Definition):
+class Point(base.Definition):
     """A load with its wanted deflection."""
 
-    load: Positive
+    load: base.Positive
     """Load of one primary suspension [N]"""
-    deflection: Positive
+    deflection: base.Positive
     """Deflection of the outer spring under it [m]"""
 
 
-class Fatigue(Definition):
+class Fatigue(base.Definition):
     """Dynamic loads and the material's Goodman-Smith line."""
 
-    max_load: Positive | None = None
+    max_load: base.Positive | None = None
     """Highest dynamic load [N]; by default the tare load + 20 %"""
-    min_load: Positive | None = None
+    min_load: base.Positive | None = None
     """Lowest dynamic load [N]; by default the tare load - 35 %"""
-    tare: Text = "ODM"
+    tare: base.Text = "ODM"
     """Name of the tare load among `loads`"""
     goodman: Polyline
     """Rows [tau_min, tau_max] of the Goodman-Smith line [Pa]"""
 
 
-class Checks(Definition):
+class Checks(base.Definition):
     """Constants and limits of the checks."""
 
-    dead_coils: NonNegative = 0.2
+    dead_coils: base.NonNegative = 0.2
     """Dead coils n_m beyond the end coils"""
-    end_coils: NonNegative = 1.5
+    end_coils: base.NonNegative = 1.5
     """End coils n_e, closed and ground"""
-    clearance_factor: NonNegative = 0.002
+    clearance_factor: base.NonNegative = 0.002
     """Reserve above the solid height over n (D + d), as in the reference study"""
-    standard_clearance_factor: NonNegative = 0.02
+    standard_clearance_factor: base.NonNegative = 0.02
     """The same for the check after EN 13906-1 (hot coiled, static)"""
-    solid_load: Text | None = None
+    solid_load: base.Text | None = None
     """Name of the load for the solid height; by default the highest"""
-    seating: Annotated[Finite, Field(ge=0.5, le=2.0)] = 1.0
+    seating: Annotated[base.Finite, Field(ge=0.5, le=2.0)] = 1.0
     """Seating coefficient of EN 13906-1 for buckling; 1: seats parallel, free to move sideways"""
-    radial_clearance: NonNegative = 0.0
+    radial_clearance: base.NonNegative = 0.0
     """Least clearance between inner and outer spring [m]"""
-    fatigue_margin: Positive = 1.0
+    fatigue_margin: base.Positive = 1.0
     """Least margin against the Goodman-Smith line"""
 
 
-class Search(Definition):
+class Search(base.Definition):
     """Space, limits and aim of the search for nests."""
 
     objective: Literal["mass", "fatigue"] = "mass"
     """Ranked by least mass or by largest fatigue margin"""
-    wire_diameters: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None
+    wire_diameters: Annotated[tuple[base.Positive, ...], Field(min_length=1)] | None = None
     """Wire diameters to choose from [m]; by default the bars of EN 10060 from 10 to 60 mm"""
-    outer_diameter_max: Positive
+    outer_diameter_max: base.Positive
     """Largest outside diameter of the outer spring [m]"""
-    inner_diameter_min: NonNegative = 0.0
+    inner_diameter_min: base.NonNegative = 0.0
     """Smallest inside diameter of the inner spring [m]"""
-    clearance_min: NonNegative = 0.005
+    clearance_min: base.NonNegative = 0.005
     """Smallest radial clearance between the springs [m]"""
     free_height: Bounds
     """Smallest and largest free height [m]"""
     spring_index: Bounds = (3.0, 12.0)
     """Smallest and largest D/d; EN 13906-1 for hot coiled springs by default"""
-    active_coils_min: Positive = 3.0
+    active_coils_min: base.Positive = 3.0
     """Smallest number of active coils; EN 13906-1 for hot coiled springs by default"""
-    fatigue_margin_min: Positive = 1.0
+    fatigue_margin_min: base.Positive = 1.0
     """Smallest margin against the Goodman-Smith line"""
-    stress_ratio_max: Positive = 1.0
+    stress_ratio_max: base.Positive = 1.0
     """Largest stress of the solid spring over the allowable one"""
-    buckling_ratio_max: Positive = 0.9
+    buckling_ratio_max: base.Positive = 0.9
     """Largest deflection over the buckling deflection"""
     candidates: Annotated[int, Field(strict=True, ge=64, le=1_000_000)] = 10_000
     """Number of nests that are tried before the best are refined"""
     results: Annotated[int, Field(strict=True, ge=1, le=100)] = 10
     """Number of nests that are returned"""
-    diameter_step: Positive = 0.001
+    diameter_step: base.Positive = 0.001
     """Step to which mean diameters and free height are rounded [m]"""
-    coil_step: Positive = 0.05
+    coil_step: base.Positive = 0.05
     """Step to which the number of active coils is rounded"""
-    height_error_max: Positive = 0.003
+    height_error_max: base.Positive = 0.003
     """Largest error of a deflection that the rounding may cause [m]"""
 
 
-class Tolerances(Definition):
+class Tolerances(base.Definition):
     """Scatter of springs, plus and minus; the same for both springs."""
 
-    wire_diameter: NonNegative = 0.0
+    wire_diameter: base.NonNegative = 0.0
     """Wire diameter [m]"""
-    mean_diameter: NonNegative = 0.0
+    mean_diameter: base.NonNegative = 0.0
     """Mean coil diameter [m]"""
-    active_coils: NonNegative = 0.0
+    active_coils: base.NonNegative = 0.0
     """Number of active coils"""
-    free_height: NonNegative = 0.0
+    free_height: base.NonNegative = 0.0
     """Free height [m]"""
-    G: Annotated[NonNegative, Field(lt=0.5)] = 0.0
+    G: Annotated[base.NonNegative, Field(lt=0.5)] = 0.0
     """Shear modulus, relative"""
-    bush: Annotated[NonNegative, Field(lt=1.0)] = 0.0
+    bush: Annotated[base.NonNegative, Field(lt=1.0)] = 0.0
     """Torsional stiffness of the bush, relative"""
 
 
-class Bush(Definition):
+class Bush(base.Definition):
     """The rubber bush in the arm's hinge, as the vehicle model needs it."""
 
-    stiffness: NonNegativeVector
+    stiffness: base.NonNegativeVector
     """Stiffness along x, y, z [N/m]"""
-    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    damping: base.NonNegativeVector = (0.0, 0.0, 0.0)
     """Damping along x, y, z [N s/m]"""
-    rotational_stiffness: NonNegativeVector
+    rotational_stiffness: base.NonNegativeVector
     """Stiffness about x, y, z [N m/rad]"""
-    rotational_damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    rotational_damping: base.NonNegativeVector = (0.0, 0.0, 0.0)
     """Damping about x, y, z [N m s/rad]"""
 
 
-class VehicleTable(Definition):
+class VehicleTable(base.Definition):
     """Where and how the suspension goes into a vehicle file."""
 
-    load: Text
+    load: base.Text
     """Name of the load at which the vehicle's springs are taken, normally tare"""
-    extends: Text
+    extends: base.Text
     """Vehicle file that the written file extends"""
-    remove: tuple[Text, ...] = ()
+    remove: tuple[base.Text, ...] = ()
     """Parts of that vehicle that this suspension replaces"""
-    assembly: Text = "assemblies.bogie.assemblies.axle"
+    assembly: base.Text = "assemblies.bogie.assemblies.axle"
     """Assembly with the wheelset; its origin is above the axle, the bogie's centre at x < 0"""
-    frame: Text = "frame"
+    frame: base.Text = "frame"
     """Name of the bogie frame"""
-    wheelset: Text = "wheelset"
+    wheelset: base.Text = "wheelset"
     """Name of the wheelset within the assembly"""
-    wheel_radius: Positive
+    wheel_radius: base.Positive
     """Height of the axle above the rail tops [m]"""
-    lateral_position: Positive
+    lateral_position: base.Positive
     """Lateral distance of arm and springs from the vehicle's middle [m]"""
-    pitch_inertia: Positive = 10.0
+    pitch_inertia: base.Positive = 10.0
     """Moment of inertia of axlebox and arm about the axle [kg m2]"""
     bush: Bush
     """The bush in the hinge"""
@@ -264,9 +254,9 @@ class TrailingArmSuspension(FileDefinition):
     OPEN_TABLES: ClassVar = ("loads",)
 
     format: Literal["railsim-spring/1"]
-    name: Text = "trailing-arm primary suspension"
+    name: base.Text = "trailing-arm primary suspension"
     """What the suspension is called in tables and plots"""
-    source: Text | None = None
+    source: base.Text | None = None
     """Where the numbers come from"""
     arm: TrailingArm
     """The axlebox arm"""
@@ -280,9 +270,9 @@ class TrailingArmSuspension(FileDefinition):
     """Load under which the arm is horizontal, and the deflection wanted there"""
     target: Point | None = None
     """One further load with its wanted deflection, for the design"""
-    loads: dict[Text, Positive] = Field(min_length=1)
+    loads: dict[base.Text, base.Positive] = Field(min_length=1)
     """Loads of one primary suspension by name [N]"""
-    load_notes: dict[Text, Text] = EMPTY_TABLE
+    load_notes: dict[base.Text, base.Text] = base.EMPTY_TABLE
     """What each load is, by its name"""
     fatigue: Fatigue | None = None
     """Dynamic loads and Goodman-Smith line"""
@@ -315,7 +305,7 @@ class TrailingArmSuspension(FileDefinition):
         """Return what is wrong between the parts."""
         return [*_load_faults(self), *_inner_faults(self), *_tolerance_faults(self)]
 
-    def unusual(self) -> list[Remark]:
+    def unusual(self) -> list[base.Remark]:
         """Return what is allowed but unusual."""
         return spring_remarks(self)
 
@@ -380,23 +370,25 @@ def _tolerance_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
                 yield Fault("", f"tolerances.{key}", found, "less than what deviates")
 
 
-def spring_remarks(suspension: TrailingArmSuspension) -> list[Remark]:
+def spring_remarks(suspension: TrailingArmSuspension) -> list[base.Remark]:
     """What is allowed in a spring file but unusual."""
     remarks = []
     if suspension.search is not None:
         unlimited = "missing: the search does not limit the stress"
         if suspension.material.tau_allowable is None:
-            remarks.append(Remark("material.tau_allowable", f"{unlimited} of the solid springs"))
+            remarks.append(
+                base.Remark("material.tau_allowable", f"{unlimited} of the solid springs")
+            )
         if suspension.fatigue is None:
-            remarks.append(Remark("fatigue", f"{unlimited} in service"))
+            remarks.append(base.Remark("fatigue", f"{unlimited} in service"))
     for name, spring in suspension.springs.items():
         wire = spring.wire_diameter
         if wire is not None and not 3.0 <= (index := spring.mean_diameter / wire) <= 12.0:
             text = f"spring index D/d is {index:.2f}; EN 13906-1 covers 3 to 12, hot coiled"
-            remarks.append(Remark(f"{name}.mean_diameter", text))
+            remarks.append(base.Remark(f"{name}.mean_diameter", text))
         if spring.active_coils is not None and spring.active_coils < 3.0:
             text = "EN 13906-1 covers hot coiled springs from 3 on"
-            remarks.append(Remark(f"{name}.active_coils", text))
+            remarks.append(base.Remark(f"{name}.active_coils", text))
     return remarks
 
 

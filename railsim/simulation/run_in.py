@@ -48,13 +48,7 @@ from railsim.model.assembly import Model
 from railsim.model.check_rails import CheckRails, standing_at
 from railsim.model.equilibrium import Equilibrium, initial_state
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
-from railsim.simulation.auxiliary_track import (
-    DOING,
-    NEGLIGIBLE,
-    Progress,
-    advance,
-    curve_to_settle_in,
-)
+from railsim.simulation import auxiliary_track
 from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.tables import track_tables
 
@@ -72,7 +66,7 @@ def start_state(
     start: float,
     step: float,
     scheme: int,
-    progress: Progress | None = None,
+    progress: auxiliary_track.Progress | None = None,
     remark: Callable[[str], None] | None = None,
 ) -> Floats:
     """State of the undisturbed vehicle at time 0 and exactly at `start`, float64[n_state].
@@ -247,11 +241,11 @@ def _run(
     scheme: int,
     start: float,
     where: str,
-    progress: Progress | None = None,
+    progress: auxiliary_track.Progress | None = None,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
-    DOING.info("on the way to the start")
-    if advance(model, system, state, step, steps, scheme, progress) != RUNNING:
+    auxiliary_track.DOING.info("on the way to the start")
+    if auxiliary_track.advance(model, system, state, step, steps, scheme, progress) != RUNNING:
         words = f"the vehicle does not stay on the track at s = {start:g} m, "
         found = f"{words}{where}, at {state[SPEED]:g} m/s"
         raise argument_error("start", found, "a start on straight track or a lower speed")
@@ -262,8 +256,8 @@ def _curve(track: Track, s: float) -> tuple[float, float]:
     alignment = alignment_of(track)
     curvature, cant = float(alignment.curvature(s)), float(alignment.cant(s))
     return (
-        curvature if abs(curvature) >= NEGLIGIBLE else 0.0,
-        cant if abs(cant) >= NEGLIGIBLE else 0.0,
+        curvature if abs(curvature) >= auxiliary_track.NEGLIGIBLE else 0.0,
+        cant if abs(cant) >= auxiliary_track.NEGLIGIBLE else 0.0,
     )
 
 
@@ -304,7 +298,7 @@ def settled(
     track: Track,
     start: float,
     step: float,
-    progress: Progress | None = None,
+    progress: auxiliary_track.Progress | None = None,
 ) -> Floats | None:
     """State of a vehicle that has settled into the curve at `start`, None on straight track.
 
@@ -316,7 +310,7 @@ def settled(
     if not (curvature or cant):
         return None
     speed = float(balance.state[SPEED])
-    auxiliary = curve_to_settle_in(
+    auxiliary = auxiliary_track.curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
     there = without_loads(model.system)

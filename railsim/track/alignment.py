@@ -20,12 +20,7 @@ from railsim.arrays import Floats
 from railsim.constants import CANT_BASE
 from railsim.definitions import Track
 from railsim.definitions.base import kept
-from railsim.definitions.track.layout import (
-    cant_sections,
-    curvature_sections,
-    gradient_sections,
-    track_faults,
-)
+from railsim.definitions.track import layout
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 from railsim.errors import Fault, InputError
@@ -48,14 +43,14 @@ class Alignment:
     """
 
     def __init__(self, track: Track) -> None:
-        if faults := track_faults(track):
+        if faults := layout.track_faults(track):
             file = f"track '{track.name}'"
             raise InputError(Fault(file, f.key, f.found, f.allowed) for f in faults)
         self.length = track.length
-        self._curvature = RoundedProfile(curvature_sections(track), track.rounding)
-        cant = cant_sections(track)
+        self._curvature = RoundedProfile(layout.curvature_sections(track), track.rounding)
+        cant = layout.cant_sections(track)
         self._cant = RoundedProfile(cant, track.rounding)
-        self._gradient = RoundedProfile(gradient_sections(track), track.rounding)
+        self._gradient = RoundedProfile(layout.gradient_sections(track), track.rounding)
         rising = _magnitudes(cant) if track.cant_rotation == "inner_rail" else []
         self._lifting_cant = RoundedProfile(rising, track.rounding)
 

@@ -7,21 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field
 
-from railsim.definitions.base import (
-    Definition,
-    Finite,
-    NonNegativeVector,
-    Positive,
-    Text,
-    Vector,
-    check,
-    rises,
-)
+from railsim.definitions import base
 from railsim.definitions.elements.rows import NOTHING, Mount, Row, Rows, Triple
 
 Signs = Triple
 Compression = Annotated[
-    Literal["auto"] | Annotated[Finite, Field(ge=0)], Field(union_mode="left_to_right")
+    Literal["auto"] | Annotated[base.Finite, Field(ge=0)], Field(union_mode="left_to_right")
 ]
 
 
@@ -41,7 +32,9 @@ def _characteristic(rows: Rows) -> Rows:
 
 
 Characteristic = Annotated[
-    tuple[tuple[Finite, Finite], ...], rises("first column"), AfterValidator(_characteristic)
+    tuple[tuple[base.Finite, base.Finite], ...],
+    base.rises("first column"),
+    AfterValidator(_characteristic),
 ]
 
 
@@ -61,7 +54,7 @@ def times(vector: Triple, signs: Signs) -> Triple:
     return (vector[0] * signs[0], vector[1] * signs[1], vector[2] * signs[2])
 
 
-class Element(Definition):
+class Element(base.Definition):
     """What all force elements have in common; those that carry weight say how."""
 
     SUPPORTS: ClassVar[str] = "no"
@@ -72,14 +65,14 @@ class Element(Definition):
     if TYPE_CHECKING:  # the field of every kind
         kind: str
 
-    bodies: tuple[Text, ...]
+    bodies: tuple[base.Text, ...]
     """Names of the bodies, found from the innermost assembly outwards"""
 
     @abstractmethod
     def rows(self) -> Sequence[Row]:
         """Return what it becomes in the arrays of the model."""
 
-    def end_points(self) -> tuple[Vector, Vector] | None:
+    def end_points(self) -> tuple[base.Vector, base.Vector] | None:
         """Points on body 1 and body 2 as written [m]; None where the element has none."""
         point, points = getattr(self, "point", None), getattr(self, "points", None)
         return points if point is None else (point, point)
@@ -88,11 +81,11 @@ class Element(Definition):
         """Return the element in a mirrored placement; `signs` holds -1 for each reversed axis."""
         return self
 
-    def parts(self) -> list[tuple[str, Vector, "Element"]]:
+    def parts(self) -> list[tuple[str, base.Vector, "Element"]]:
         """Elements of which this one consists: suffix of the name, offset from its point [m]."""
         return []
 
-    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+    def with_known_preload(self, point1: base.Vector, point2: base.Vector) -> Self:
         """Return the element with the preload that follows from its free length, if it has one.
 
         `point1` and `point2`: its ends in the nominal position, vehicle axes [m].
@@ -133,7 +126,7 @@ class Element(Definition):
 class PairElement(Element):
     """An element between two bodies."""
 
-    bodies: tuple[Text, Text]
+    bodies: tuple[base.Text, base.Text]
     """Names of body 1 and body 2, found from the innermost assembly outwards"""
 
 
@@ -147,12 +140,12 @@ class SidedElement(PairElement):
 class PointElement(SidedElement):
     """An element between two points, or at one point that belongs to both bodies."""
 
-    point: Vector | None = None
+    point: base.Vector | None = None
     """The common point of both bodies [m]; either this or `points`"""
-    points: tuple[Vector, Vector] | None = None
+    points: tuple[base.Vector, base.Vector] | None = None
     """Point on body 1 and point on body 2 [m]"""
 
-    @check
+    @base.check
     def _one_way_of_giving_points(self) -> None:
         if (self.point is None) == (self.points is None) and self.has_points:
             raise ValueError("either 'point' or 'points' is needed")
@@ -168,9 +161,9 @@ class PointElement(SidedElement):
 class FreeLength(PairElement):
     """A spring whose preload follows from its length."""
 
-    free_length: Positive | None = None
+    free_length: base.Positive | None = None
     """Length without load [m]; the preload follows from it and from the nominal length"""
-    load_at_length: tuple[Positive, Positive] | None = None
+    load_at_length: tuple[base.Positive, base.Positive] | None = None
     """Load and length at which it was measured [N, m], instead of `free_length`; compression"""
 
     @property
@@ -186,7 +179,7 @@ class FreeLength(PairElement):
         load, at = self.load_at_length
         return load + stiffness * (at - length)
 
-    @check
+    @base.check
     def _one_origin_of_the_preload(self) -> None:
         if self.free_length is not None and self.load_at_length is not None:
             raise ValueError("either 'free_length' or 'load_at_length', not both")
@@ -199,7 +192,7 @@ class PreloadAlongAxes(PairElement):
     """An element with a preload along the axes of body 1."""
 
     if TYPE_CHECKING:  # the field of its kinds
-        preload: Literal["auto"] | Vector
+        preload: Literal["auto"] | base.Vector
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored placement: the preload turns with the axes."""
@@ -217,9 +210,9 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
     """A spring along z between two seats."""
 
     if TYPE_CHECKING:  # the fields of its kinds
-        stiffness: NonNegativeVector
-        damping: NonNegativeVector
-        points: tuple[Vector, Vector] | None
+        stiffness: base.NonNegativeVector
+        damping: base.NonNegativeVector
+        points: tuple[base.Vector, base.Vector] | None
 
     @property
     def vertical_stiffness(self) -> float:
@@ -231,12 +224,12 @@ class VerticalSpring(PreloadAlongAxes, FreeLength):
         """Damping along z [N s/m]."""
         return self.damping[2]
 
-    @check
+    @base.check
     def _length_needs_seats(self) -> None:
         if self.has_free_length and (self.points is None or self.stiffness[2] == 0.0):
             raise ValueError("a free length needs 'points' at two heights and a stiffness along z")
 
-    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+    def with_known_preload(self, point1: base.Vector, point2: base.Vector) -> Self:
         """Return the spring with the preload of its length: compression pushes the seats apart."""
         if not self.has_free_length:
             return self

@@ -5,17 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    AutoOrVector,
-    Definition,
-    Finite,
-    NonNegative,
-    NonNegativeVector,
-    Positive,
-    Share,
-    Vector,
-    check,
-)
+from railsim.definitions import base
 from railsim.definitions.elements.base import (
     Compression,
     Element,
@@ -26,19 +16,19 @@ from railsim.definitions.elements.base import (
 from railsim.definitions.elements.rows import NOTHING, FrictionLimit, Mount, Rows, pads
 
 
-class SlidingFriction(Definition):
+class SlidingFriction(base.Definition):
     """Dry friction that may fall with the speed: r + (1 - r) exp(-|v|/v_s) times that at rest.
 
     Source: Bo, Pavelescu (1982), The friction-speed relation and its influence on the critical
     velocity of stick-slip motion, Wear 82, 277-289.
     """
 
-    sliding_ratio: Share = 1.0
+    sliding_ratio: base.Share = 1.0
     """Friction at high sliding speed over that at rest [1]; 1: it does not fall"""
-    stribeck_speed: Positive | None = None
+    stribeck_speed: base.Positive | None = None
     """Sliding speed at which the difference has fallen to 1/e of itself [m/s]"""
 
-    @check
+    @base.check
     def _ratio_with_speed(self) -> None:
         if (self.sliding_ratio < 1.0) != (self.stribeck_speed is not None):
             raise ValueError("a 'sliding_ratio' below 1 and 'stribeck_speed' belong together")
@@ -59,23 +49,23 @@ class Friction(SlidingFriction, VerticalSpring, PointElement):
 
     SUPPORTS: ClassVar = "on axles"
     kind: Literal["friction"]
-    friction_force: NonNegativeVector = NOTHING
+    friction_force: base.NonNegativeVector = NOTHING
     """Constant part of the largest friction force along x, y, z [N]"""
-    friction_coefficient: NonNegativeVector = NOTHING
+    friction_coefficient: base.NonNegativeVector = NOTHING
     """Part that grows with the vertical spring force, along x, y, z [1]"""
-    stick_stiffness: NonNegativeVector = NOTHING
+    stick_stiffness: base.NonNegativeVector = NOTHING
     """Stiffness of the sticking pad along x, y, z, needed where there is friction [N/m]"""
     friction_limit: Literal["circle", "axes"] = "circle"
     """`circle`: one contact slides in any direction, its force within a circle (an ellipse where
     the limits differ); `axes`: contacts of their own along each axis"""
-    stiffness: NonNegativeVector = NOTHING
+    stiffness: base.NonNegativeVector = NOTHING
     """Stiffness of the parallel spring along x, y, z [N/m]"""
-    damping: NonNegativeVector = NOTHING
+    damping: base.NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
-    preload: AutoOrVector = "auto"
+    preload: base.AutoOrVector = "auto"
     """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
 
-    @check
+    @base.check
     def _friction_needs_a_sticking_stiffness(self) -> None:
         limits = zip(self.friction_force, self.friction_coefficient, strict=True)
         slides = [force > 0.0 or coefficient > 0.0 for force, coefficient in limits]
@@ -109,24 +99,24 @@ class SideBearer(SlidingFriction, PointElement):
 
     SUPPORTS: ClassVar = "always"
     kind: Literal["side_bearer"]
-    stiffness: Positive
+    stiffness: base.Positive
     """Vertical stiffness [N/m]"""
-    damping: NonNegative = 0.0
+    damping: base.NonNegative = 0.0
     """Vertical damping while it carries [N s/m]"""
     preload: Compression = 0.0
     """Compression in the nominal position [N], or `auto`: from the equilibrium"""
-    clearance: NonNegative = 0.0
+    clearance: base.NonNegative = 0.0
     """Vertical clearance in the nominal position [m]"""
-    friction_coefficient: NonNegative
+    friction_coefficient: base.NonNegative
     """Coefficient of friction [1]"""
-    stick_stiffness: Positive
+    stick_stiffness: base.Positive
     """Horizontal stiffness of the sticking pad [N/m]"""
-    stop_travel: Positive | None = None
+    stop_travel: base.Positive | None = None
     """Further compression after which a solid stop carries [m]"""
-    stop_stiffness: Positive | None = None
+    stop_stiffness: base.Positive | None = None
     """Stiffness of the solid stop beside that of the pad [N/m]"""
 
-    @check
+    @base.check
     def _one_nominal_state(self) -> None:
         if self.clearance > 0.0 and self.preload != 0.0:
             raise ValueError("either 'preload' or 'clearance', not both")
@@ -179,24 +169,24 @@ class CentrePlate(SlidingFriction, PairElement):
 
     SUPPORTS: ClassVar = "always"
     kind: Literal["centre_plate"]
-    point: Vector
+    point: base.Vector
     """Centre of the contact surface [m]"""
-    radius: Positive
+    radius: base.Positive
     """Outer radius R of the contact surface [m]"""
-    inner_radius: NonNegative = 0.0
+    inner_radius: base.NonNegative = 0.0
     """Inner radius r of the contact surface, 0 for a disc [m]"""
-    stiffness: Positive
+    stiffness: base.Positive
     """Vertical stiffness of the whole plate [N/m]"""
-    damping: NonNegative = 0.0
+    damping: base.NonNegative = 0.0
     """Vertical damping of the whole plate while it carries [N s/m]"""
     preload: Compression = "auto"
     """Compression in the nominal position [N], or `auto`: from the equilibrium"""
-    friction_coefficient: NonNegative
+    friction_coefficient: base.NonNegative
     """Coefficient of friction [1]"""
-    stick_stiffness: Positive
+    stick_stiffness: base.Positive
     """Horizontal stiffness of the whole sticking plate [N/m]"""
 
-    @check
+    @base.check
     def _a_ring(self) -> None:
         if self.inner_radius >= self.radius:
             raise ValueError("'inner_radius' must be smaller than 'radius'")
@@ -211,9 +201,9 @@ class CentrePlate(SlidingFriction, PairElement):
         """Damping while it carries [N s/m]."""
         return self.damping
 
-    def parts(self) -> list[tuple[str, Vector, Element]]:
+    def parts(self) -> list[tuple[str, base.Vector, Element]]:
         """Pads that carry the plate: suffix of the name, offset from the centre [m], pad."""
-        found: list[tuple[str, Vector, Element]] = []
+        found: list[tuple[str, base.Vector, Element]] = []
         for ring, (radius, share) in enumerate(_gauss_on_ring(self.inner_radius, self.radius)):
             for quarter in range(4):
                 angle = 0.5 * pi * quarter + 0.25 * pi * ring
@@ -271,20 +261,20 @@ class Wedge(VerticalSpring, PointElement):
     SUPPORTS: ClassVar = "always"
     MUST_PRESS: ClassVar = True
     kind: Literal["wedge"]
-    stiffness: NonNegativeVector
+    stiffness: base.NonNegativeVector
     """Stiffness of the wedge springs of one side along x, y, z [N/m]"""
-    damping: NonNegativeVector = NOTHING
+    damping: base.NonNegativeVector = NOTHING
     """Damping along x, y, z [N s/m]"""
-    preload: AutoOrVector = "auto"
+    preload: base.AutoOrVector = "auto"
     """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
-    angle: Annotated[Finite, Field(gt=0.0, lt=1.5)]
+    angle: Annotated[base.Finite, Field(gt=0.0, lt=1.5)]
     """Angle between the inclined face and the column's face [rad]"""
-    friction_coefficient: NonNegative
+    friction_coefficient: base.NonNegative
     """Coefficient of friction on the column [1]"""
-    stick_stiffness: tuple[Positive, Positive]
+    stick_stiffness: tuple[base.Positive, base.Positive]
     """Stiffness of the sticking wedges along y and z [N/m]"""
 
-    @check
+    @base.check
     def _wedge_slides(self) -> None:
         if self.friction_coefficient >= tan(self.angle):
             raise ValueError(
@@ -294,7 +284,7 @@ class Wedge(VerticalSpring, PointElement):
         if self.stiffness[2] == 0.0:
             raise ValueError("the wedges need springs: 'stiffness' along z")
 
-    @check
+    @base.check
     def _wedge_presses(self) -> None:
         if self.preload != "auto" and self.preload[2] < 0.0:
             raise ValueError(

@@ -12,66 +12,39 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Count,
-    Definition,
-    Name,
-    Remark,
-    Text,
-    Whole,
-    check,
-)
+from railsim.definitions import base
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.mechanism.parts import (
-    AUTO,
-    Actuator,
-    ActuatorName,
-    Angle,
-    Body,
-    BodyName,
-    CatalogueName,
-    Element,
-    GasSpringName,
-    Ground,
-    Joint,
-    Pair,
-    PointName,
-    Positive,
-    Quantity,
-    QuantityOrAuto,
-    Start,
-)
+from railsim.definitions.mechanism import parts
 from railsim.errors import Fault, argument_error, nearest
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
 
 
-class Driver(Definition):
+class Driver(base.Definition):
     """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
 
-    angle: BodyName | None = None
+    angle: parts.BodyName | None = None
     """Body whose angle it is"""
-    length: Pair | None = None
+    length: parts.Pair | None = None
     """Points whose distance it is"""
-    coordinate: PointName | None = None
+    coordinate: parts.PointName | None = None
     """Point whose coordinate it is"""
     axis: Literal["x", "y"] = "y"
     """Which coordinate"""
-    zero: Quantity = 0.0
+    zero: parts.Quantity = 0.0
     """What the angle, length or coordinate is where the driver is 0 [rad or m]"""
-    start: Quantity = 0.0
+    start: parts.Quantity = 0.0
     """Value of the driver at the start of the motion [rad or m]"""
-    end: Quantity
+    end: parts.Quantity
     """Value of the driver at its end [rad or m]"""
 
-    @check
+    @base.check
     def _one(self) -> None:
         if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
             raise ValueError("one of 'angle', 'length' and 'coordinate'")
 
 
-class Sampling(Definition):
+class Sampling(base.Definition):
     """Positions at which results are written."""
 
     points: Annotated[int, Field(strict=True, ge=3, le=100_000)] = 1000
@@ -80,65 +53,65 @@ class Sampling(Definition):
     """Quantity in equal steps: the driver, the actuator's length, or time at its motion law"""
 
 
-class Output(Definition):
+class Output(base.Definition):
     """The point that the mechanism is there to move."""
 
-    point: PointName
+    point: parts.PointName
     """The point; its height is its y less that at the start"""
     axis: Literal["x", "y"] = "y"
     """Direction in which it is to move: ratio, zone and contact force are taken along it"""
 
 
-class Zone(Definition):
+class Zone(base.Definition):
     """Working range of the output."""
 
-    low: Quantity
+    low: parts.Quantity
     """Lowest height over that at the start [m]"""
-    work: Quantity
+    work: parts.Quantity
     """Height at work [m]"""
-    high: Quantity
+    high: parts.Quantity
     """Highest height [m]"""
 
 
-class Solve(Definition):
+class Solve(base.Definition):
     """What is unknown."""
 
-    unknown: ActuatorName
+    unknown: parts.ActuatorName
     """Actuator whose force (or torque) holds the mechanism"""
-    actuator: ActuatorName | None = None
+    actuator: parts.ActuatorName | None = None
     """Actuator whose length the ratios are taken over; by default the unknown one"""
 
 
-class Contact(Definition):
+class Contact(base.Definition):
     """Static contact force of the output at a pressure held in the actuator."""
 
-    force: Quantity = 100.0
+    force: parts.Quantity = 100.0
     """Contact force wanted at work height [N]"""
-    pressure: QuantityOrAuto = AUTO
+    pressure: parts.QuantityOrAuto = parts.AUTO
     """Pressure held [Pa]; by default what gives that force at work height"""
 
 
-class Motion(Definition):
+class Motion(base.Definition):
     """Motion law of an actuator's length or a body's angle, for inverse dynamics."""
 
-    actuator: ActuatorName | None = None
+    actuator: parts.ActuatorName | None = None
     """Actuator whose length follows the law"""
-    angle: BodyName | None = None
+    angle: parts.BodyName | None = None
     """Body whose angle follows it, instead, such as a crank"""
-    unknown: ActuatorName | None = None
+    unknown: parts.ActuatorName | None = None
     """Actuator whose force drives the motion; by default the same, of an angle that of `[solve]`"""
     law: Literal["constant_speed", "polynomial_345", "table"] = "constant_speed"
     """Constant speed, the 3-4-5 polynomial from rest to rest, or a table"""
-    speed: Positive | None = None
+    speed: parts.Positive | None = None
     """Speed of the length [m/s] or angle [rad/s], for a constant speed"""
-    duration: Positive | None = None
+    duration: parts.Positive | None = None
     """Time for the whole range [s]"""
-    table: tuple[tuple[Quantity, Quantity], ...] | None = None
+    table: tuple[tuple[parts.Quantity, parts.Quantity], ...] | None = None
     """Rows [time s, change of length m or angle rad since the start], a cubic spline"""
     points: Annotated[int, Field(strict=True, ge=3, le=100_000)] = 401
     """Number of points in time"""
 
-    @check
+    @base.check
     def _complete(self) -> None:
         if (self.actuator is None) == (self.angle is None):
             raise ValueError("either 'actuator' (its length) or 'angle' (of a body)")
@@ -152,85 +125,85 @@ class Motion(Definition):
             raise ValueError("law = 'constant_speed' needs 'speed' or 'duration'")
 
 
-class Release(Definition):
+class Release(base.Definition):
     """Free motion: let go at rest, under the elements' forces alone."""
 
-    start: Quantity
+    start: parts.Quantity
     """Value of the driver where it is let go [rad or m]"""
-    until: Quantity
+    until: parts.Quantity
     """Value of the driver at which the motion ends [rad or m]"""
-    duration: Positive = 10.0
+    duration: parts.Positive = 10.0
     """Time after which it ends in any case [s]"""
 
 
-class CatalogueRow(Definition):
+class CatalogueRow(base.Definition):
     """A series of gas springs in a catalogue."""
 
-    name: Text
+    name: base.Text
     """Name of the series"""
-    body: Quantity | None = None
+    body: parts.Quantity | None = None
     """Diameter of the body [m]"""
-    rod: Quantity | None = None
+    rod: parts.Quantity | None = None
     """Diameter of the rod [m]"""
-    stroke: tuple[Quantity, Quantity] | None = None
+    stroke: tuple[parts.Quantity, parts.Quantity] | None = None
     """Smallest and largest stroke [m]"""
-    strokes: tuple[Quantity, ...] | None = None
+    strokes: tuple[parts.Quantity, ...] | None = None
     """Strokes that are made [m], instead"""
-    F1: tuple[Quantity, Quantity]
+    F1: tuple[parts.Quantity, parts.Quantity]
     """Smallest and largest force F1 [N]"""
-    progression: Quantity | None = None
+    progression: parts.Quantity | None = None
     """Progression"""
-    extended: tuple[Quantity, Quantity] | None = None
+    extended: tuple[parts.Quantity, parts.Quantity] | None = None
     """Extended length as factor times stroke plus constant [1, m]"""
-    F1_tolerance: tuple[tuple[Quantity, Quantity, Quantity], ...] | None = None
+    F1_tolerance: tuple[tuple[parts.Quantity, parts.Quantity, parts.Quantity], ...] | None = None
     """Rows [up to F1, minus, plus] of the maker's tolerance [N]"""
-    unlock: Quantity = 0.0
+    unlock: parts.Quantity = 0.0
     """Travel beyond the range of use that unlocks it [m]"""
-    lock_extension: Quantity | None = None
+    lock_extension: parts.Quantity | None = None
     """Force that it holds locked against extension [N]"""
-    lock_compression: Quantity | None = None
+    lock_compression: parts.Quantity | None = None
     """Force that it holds locked against compression, over F1"""
 
-    @check
+    @base.check
     def _one(self) -> None:
         if (self.stroke is None) == (self.strokes is None):
             raise ValueError("either 'stroke' or 'strokes'")
 
 
-class Selection(Definition):
+class Selection(base.Definition):
     """A gas spring to be found in a catalogue."""
 
-    element: GasSpringName
+    element: parts.GasSpringName
     """The gas spring"""
-    catalogue: CatalogueName
+    catalogue: parts.CatalogueName
     """The catalogue"""
 
 
-class Lid(Definition):
+class Lid(base.Definition):
     """Quick check of a lid's gas springs by the makers' formula F1 = G D/(b n) 9.8 alpha."""
 
-    element: GasSpringName
+    element: parts.GasSpringName
     """Gas spring whose `F1` is checked"""
-    mass: Positive
+    mass: parts.Positive
     """Mass of the lid G [kg]"""
-    centre: Positive
+    centre: parts.Positive
     """Lever of its centre of gravity about the hinge, lid open D [m]"""
-    lever: Positive
+    lever: parts.Positive
     """Lever of the springs about the hinge, lid open b [m]"""
-    springs: Positive = 2.0
+    springs: parts.Positive = 2.0
     """Number of springs n"""
-    factor: Positive = 1.1
+    factor: parts.Positive = 1.1
     """Factor of safety alpha"""
 
 
-class Envelope(Definition):
+class Envelope(base.Definition):
     """A box that points may not leave."""
 
-    points: tuple[PointName, ...] = Field(min_length=1)
+    points: tuple[parts.PointName, ...] = Field(min_length=1)
     """The points"""
-    x: tuple[Quantity, Quantity] | None = None
+    x: tuple[parts.Quantity, parts.Quantity] | None = None
     """Smallest and largest x [m]"""
-    y: tuple[Quantity, Quantity] | None = None
+    y: tuple[parts.Quantity, parts.Quantity] | None = None
     """Smallest and largest y [m]"""
 
 
@@ -241,7 +214,7 @@ RESULTS = ("travel", "stroke", "length_start", "length_end", "max_force", "min_f
 Objective = Literal["follow", "constant", "linear", "constant_force", "peak_force"]
 
 
-class Optimise(Definition):
+class Optimise(base.Definition):
     """Search for parameters."""
 
     objective: Annotated[
@@ -250,9 +223,9 @@ class Optimise(Definition):
         Discriminator(lambda value: "table" if isinstance(value, dict) else "word"),
     ] = "follow"
     """What to make small, or a table of objectives with their weights"""
-    reference: Text | None = None
+    reference: base.Text | None = None
     """Mechanism whose ratio is followed at equal height of the output"""
-    share: tuple[Text, ...] = ("upper_*", "m_*", "travel", "zone_*")
+    share: tuple[base.Text, ...] = ("upper_*", "m_*", "travel", "zone_*")
     """Parameters (patterns) that the reference takes from this file"""
     points: Annotated[int, Field(strict=True, ge=3, le=10_000)] = 215
     """Number of positions in the zone"""
@@ -260,27 +233,27 @@ class Optimise(Definition):
     """Positions in equal steps of the (reference's) actuator length or of the travel"""
     range: Literal["zone", "travel"] = "zone"
     """Whether the positions cover the zone or the whole travel"""
-    target: Quantity | None = None
+    target: parts.Quantity | None = None
     """Ratio wanted (constant), or wanted at height 0 (linear)"""
-    slope: Quantity = 0.0
+    slope: parts.Quantity = 0.0
     """Change of the wanted ratio over the height [1/m], for linear"""
-    min_transmission_angle: Quantity | None = None
+    min_transmission_angle: parts.Quantity | None = None
     """Smallest transmission angle [rad]"""
-    min_length: Quantity | None = None
+    min_length: parts.Quantity | None = None
     """Smallest length of the actuator [m]"""
-    max_stroke: Quantity | None = None
+    max_stroke: parts.Quantity | None = None
     """Largest stroke of the actuator [m]"""
-    available_force: Quantity | None = None
+    available_force: parts.Quantity | None = None
     """Largest force of the actuator [N]"""
     envelope: tuple[Envelope, ...] = ()
     """Boxes that points may not leave"""
-    starts: Count = 20
+    starts: base.Count = 20
     """Number of starts of the search; the first is the file's own"""
-    seed: Whole = 1
+    seed: base.Whole = 1
     """Seed of the other starts"""
-    assemblies: dict[Name, tuple[Quantity, ...]] = EMPTY_TABLE
+    assemblies: dict[base.Name, tuple[parts.Quantity, ...]] = base.EMPTY_TABLE
     """Parameters that choose an assembly, with the values that starts may take"""
-    bounds: dict[Name, tuple[Quantity, Quantity]] = Field(min_length=1)
+    bounds: dict[base.Name, tuple[parts.Quantity, parts.Quantity]] = Field(min_length=1)
     """Smallest and largest value of each parameter that may change"""
 
 
@@ -290,35 +263,35 @@ class Mechanism(FileDefinition):
     KIND: ClassVar = "mechanism"
 
     format: Literal["railsim-mechanism/1"]
-    name: Text = "mechanism"
+    name: base.Text = "mechanism"
     """What it is called in tables and plots"""
-    source: Text | None = None
+    source: base.Text | None = None
     """Where it comes from"""
-    remarks: tuple[Text, ...] = ()
+    remarks: tuple[base.Text, ...] = ()
     """Remarks on its numbers"""
-    parameters: dict[Name, QuantityOrAuto] = EMPTY_TABLE
+    parameters: dict[base.Name, parts.QuantityOrAuto] = base.EMPTY_TABLE
     """Numbers that may be varied, in SI and rad, or expressions of others"""
-    derived: dict[Name, Quantity] = EMPTY_TABLE
+    derived: dict[base.Name, parts.Quantity] = base.EMPTY_TABLE
     """Intermediate results by name, for use in other expressions"""
-    provenance: dict[Name, tuple[Name, ...]] = EMPTY_TABLE
+    provenance: dict[base.Name, tuple[base.Name, ...]] = base.EMPTY_TABLE
     """Parameters by where they are from: printed, derived, reconstructed, new, ..."""
-    units: dict[Text, tuple[Name, ...]] = EMPTY_TABLE
+    units: dict[base.Text, tuple[base.Name, ...]] = base.EMPTY_TABLE
     """Parameters by their unit; those not listed are lengths"""
-    ground: Ground = Ground()
+    ground: parts.Ground = parts.Ground()
     """What does not move"""
-    bodies: dict[Name, Body] = Field(min_length=1)
+    bodies: dict[base.Name, parts.Body] = Field(min_length=1)
     """Bodies by name"""
-    start: dict[Name, Start] = EMPTY_TABLE
+    start: dict[base.Name, parts.Start] = base.EMPTY_TABLE
     """Pose of the bodies at the driver's start, roughly"""
-    joints: dict[Name, Joint] = Field(min_length=1)
+    joints: dict[base.Name, parts.Joint] = Field(min_length=1)
     """Joints by name"""
     driver: Driver
     """The coordinate that moves the mechanism"""
-    actuators: dict[Name, Actuator] = EMPTY_TABLE
+    actuators: dict[base.Name, parts.Actuator] = base.EMPTY_TABLE
     """Actuators and other unknown forces by name"""
-    elements: dict[Name, Element] = EMPTY_TABLE
+    elements: dict[base.Name, parts.Element] = base.EMPTY_TABLE
     """Masses, springs, dampers, given forces by name"""
-    angles: dict[Name, Angle] = EMPTY_TABLE
+    angles: dict[base.Name, parts.Angle] = base.EMPTY_TABLE
     """Transmission angles by name"""
     sampling: Sampling = Sampling()
     """Positions at which results are written"""
@@ -334,7 +307,7 @@ class Mechanism(FileDefinition):
     """Motion law for inverse dynamics"""
     release: Release | None = None
     """Free motion"""
-    catalogues: dict[Name, tuple[CatalogueRow, ...]] = EMPTY_TABLE
+    catalogues: dict[base.Name, tuple[CatalogueRow, ...]] = base.EMPTY_TABLE
     """Catalogues of gas springs by name"""
     selection: tuple[Selection, ...] = ()
     """Gas springs to be found in a catalogue"""
@@ -342,11 +315,11 @@ class Mechanism(FileDefinition):
     """Quick check of a lid's gas springs"""
     optimise: Optimise | None = None
     """Search for parameters"""
-    published: dict[Name, Quantity] = EMPTY_TABLE
+    published: dict[base.Name, parts.Quantity] = base.EMPTY_TABLE
     """Results that the source prints, by their names, shown beside ours [SI]"""
-    tolerances: dict[Name, Quantity] = EMPTY_TABLE
+    tolerances: dict[base.Name, parts.Quantity] = base.EMPTY_TABLE
     """Tolerances of parameters, plus and minus"""
-    cases: dict[Name, dict[Name, QuantityOrAuto]] = EMPTY_TABLE
+    cases: dict[base.Name, dict[base.Name, parts.QuantityOrAuto]] = base.EMPTY_TABLE
     """Other values of parameters by the name of a case"""
 
     @classmethod
@@ -367,7 +340,7 @@ class Mechanism(FileDefinition):
 
         return mechanism_faults(self)
 
-    def unusual(self) -> list[Remark]:
+    def unusual(self) -> list[base.Remark]:
         """Return remarks on the mechanism."""
         from railsim.definitions.mechanism.faults import mechanism_remarks
 
@@ -388,7 +361,7 @@ class Mechanism(FileDefinition):
     @property
     def automatic(self) -> set[str]:
         """Parameters that are left to the program."""
-        return {name for name, value in self.parameters.items() if value == AUTO}
+        return {name for name, value in self.parameters.items() if value == parts.AUTO}
 
     def with_parameters(self, changes: Mapping[str, float | str]) -> "Mechanism":
         """Return the mechanism with some parameters changed."""

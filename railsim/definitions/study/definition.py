@@ -5,26 +5,20 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    EMPTY_TABLE,
-    Count,
-    Definition,
-    Finite,
-    Flag,
-    Name,
-    NonNegative,
-    Positive,
-    Text,
-    Whole,
-    check,
-)
+from railsim.definitions import base
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.study.analyses import Analysis, needs_speed
 from railsim.definitions.study.design import Optimise
 from railsim.units import range_values
 
-Value = Flag | Annotated[int, Field(strict=True)] | Finite | Text | tuple[Finite | Text, ...]
-Values = Text | Annotated[tuple[Value, ...], Field(min_length=1)]
+Value = (
+    base.Flag
+    | Annotated[int, Field(strict=True)]
+    | base.Finite
+    | base.Text
+    | tuple[base.Finite | base.Text, ...]
+)
+Values = base.Text | Annotated[tuple[Value, ...], Field(min_length=1)]
 
 
 def value_texts(values: Values) -> list[str]:
@@ -50,25 +44,25 @@ def _text(value: object) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
-class Spread(Definition):
+class Spread(base.Definition):
     """How a sampled parameter is spread: between two ends, by a tolerance, or normally."""
 
-    low: Finite | None = None
+    low: base.Finite | None = None
     """Smallest value [SI]"""
-    high: Finite | None = None
+    high: base.Finite | None = None
     """Largest value [SI]"""
     scale: Literal["linear", "log"] = "linear"
     """Equal probability of equal differences, or of equal ratios, between `low` and `high`"""
-    nominal: Finite | None = None
+    nominal: base.Finite | None = None
     """Value that has the `tolerance` [SI]"""
-    tolerance: Positive | None = None
+    tolerance: base.Positive | None = None
     """Half the range over the nominal value: all values within it are equally probable [1]"""
-    mean: Finite | None = None
+    mean: base.Finite | None = None
     """Mean of a normal distribution [SI]"""
-    deviation: Positive | None = None
+    deviation: base.Positive | None = None
     """Its standard deviation [SI]"""
 
-    @check
+    @base.check
     def _one_way(self) -> None:
         pairs = ((self.low, self.high), (self.nominal, self.tolerance), (self.mean, self.deviation))
         whole = [None not in pair for pair in pairs]
@@ -85,19 +79,19 @@ class Spread(Definition):
                 raise ValueError('scale = "log" needs two ends of the same sign, neither zero')
 
 
-class Sample(Definition):
+class Sample(base.Definition):
     """Random values of several parameters at once."""
 
     method: Literal["latin_hypercube", "sobol"] = "latin_hypercube"
     """Latin hypercube, or the scrambled sequence of Sobol"""
-    number: Count
+    number: base.Count
     """How many values of each parameter; a power of two for `sobol`"""
-    seed: Whole = 0
+    seed: base.Whole = 0
     """Where the random numbers begin: the same seed gives the same sample"""
-    parameters: Annotated[dict[Text, Spread], Field(min_length=1)]
+    parameters: Annotated[dict[base.Text, Spread], Field(min_length=1)]
     """Parameters by their paths, or `speed`"""
 
-    @check
+    @base.check
     def _balanced(self) -> None:
         if self.method == "sobol" and self.number & (self.number - 1):
             raise ValueError("'number' must be a power of two for method = \"sobol\"")
@@ -110,33 +104,33 @@ class Study(FileDefinition):
     OPEN_TABLES: ClassVar = ("grid",)
 
     format: Literal["railsim-study/1"]
-    name: Text
+    name: base.Text
     """What the study is called"""
-    purpose: Text | None = None
+    purpose: base.Text | None = None
     """What it is for"""
-    vehicles: Annotated[tuple[Text, ...], Field(min_length=1)]
+    vehicles: Annotated[tuple[base.Text, ...], Field(min_length=1)]
     """Vehicles: files or names of shipped ones"""
-    tracks: Annotated[tuple[Text, ...], Field(min_length=1)]
+    tracks: Annotated[tuple[base.Text, ...], Field(min_length=1)]
     """Tracks: files or names of shipped ones"""
     speeds: Values | None = None
     """Speeds: a list or a range [m/s, or with a unit]; not where `speed` is linked or sampled"""
-    settings: Text | None = None
+    settings: base.Text | None = None
     """Settings file for all runs"""
-    start: Finite = 0.0
+    start: base.Finite = 0.0
     """Start of all runs along the track [m]"""
-    duration: Positive | None = None
+    duration: base.Positive | None = None
     """End of all runs: time [s]"""
-    until: NonNegative | None = None
+    until: base.NonNegative | None = None
     """End of all runs: distance [m]"""
-    assignments: tuple[Text, ...] = ()
+    assignments: tuple[base.Text, ...] = ()
     """`key.path=value` for all runs, the paths beginning with `vehicle.`, `track.`, `settings.`"""
-    grid: dict[Text, Values] = EMPTY_TABLE
+    grid: dict[base.Text, Values] = base.EMPTY_TABLE
     """Values of further keys: all combinations"""
-    linked: tuple[dict[Text, Values], ...] = ()
+    linked: tuple[dict[base.Text, Values], ...] = ()
     """Keys whose values go together: the first of one with the first of the others"""
     sample: Sample | None = None
     """Random values of further keys"""
-    analyses: dict[Name, Analysis] = EMPTY_TABLE
+    analyses: dict[base.Name, Analysis] = base.EMPTY_TABLE
     """What is done at each point, by a name of one's own; by default a run"""
     optimise: Optimise | None = None
     """Variables, objectives and constraints of `railsim optimise`"""
@@ -150,7 +144,7 @@ class Study(FileDefinition):
         lists += [self.sample.number] if self.sample else []
         return math.prod([len(self.vehicles), len(self.tracks), *lists])
 
-    @check
+    @base.check
     def _consistent(self) -> None:
         for name, values in [*self.grid.items(), *(p for t in self.linked for p in t.items())]:
             try:

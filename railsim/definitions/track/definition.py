@@ -12,24 +12,7 @@ from pydantic import BeforeValidator, Field
 
 from railsim.arrays import Floats
 from railsim.constants import CANT_BASE, NORMAL_GAUGE
-from railsim.definitions.base import (
-    Definition,
-    Finite,
-    Flag,
-    Name,
-    NonNegative,
-    NonNegativePair,
-    Remark,
-    Share,
-    SidedRows,
-    Speed,
-    Text,
-    TextPair,
-    both_sides,
-    holds,
-    one_or_two,
-    pair,
-)
+from railsim.definitions import base
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.file_definition import FileDefinition
@@ -48,25 +31,25 @@ MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
 
 SOFTER = "the factor of the slip area is at most that of the adhesion area"
-Widening = Annotated[Finite, Field(ge=-0.05, le=0.1)]
+Widening = Annotated[base.Finite, Field(ge=-0.05, le=0.1)]
 
 ThirdBody = Annotated[
-    tuple[Share, Share],
-    holds(lambda factors: factors[1] <= factors[0], SOFTER),
-    BeforeValidator(pair),
-    one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
+    tuple[base.Share, base.Share],
+    base.holds(lambda factors: factors[1] <= factors[0], SOFTER),
+    BeforeValidator(base.pair),
+    base.one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
 ]
 
 
-class FallingFriction(Definition):
+class FallingFriction(base.Definition):
     """Friction that falls with the slip velocity w of a contact patch (Polach 2005).
 
     mu(w) = mu ((1 - rest) exp(-decay w) + rest)
     """
 
-    rest: Share
+    rest: base.Share
     """Friction at very large slip over that without slip [1]"""
-    decay: NonNegative
+    decay: base.NonNegative
     """How fast it falls with the slip velocity [s/m]"""
 
 
@@ -77,36 +60,36 @@ class Track(FileDefinition, Plottable):
     OPEN_TABLES: ClassVar = ("friction_falling",)
 
     format: Literal["railsim-track/1"]
-    name: Text
+    name: base.Text
     """What the track is called in tables and plots"""
-    source: Text | None = None
+    source: base.Text | None = None
     """Where the numbers come from"""
-    speed: Speed | None = None
+    speed: base.Speed | None = None
     """Highest speed permitted on the track [m/s]: remarks on the alignment refer to it, and the
     speed `permitted` of a study"""
-    mileage: Finite = 0.0
+    mileage: base.Finite = 0.0
     """Mileage of s = 0 [m]; results hold the mileage of the reference body"""
-    falling_mileage: Flag = False
+    falling_mileage: base.Flag = False
     """The mileage falls in the direction of travel"""
-    gauge: Annotated[Finite, Field(ge=0.3, le=2.5)] = 1.435
+    gauge: Annotated[base.Finite, Field(ge=0.3, le=2.5)] = 1.435
     """Distance between the gauge faces, 14 mm below the rail tops [m]"""
-    rail: TextPair = ("60E1", "60E1")
+    rail: base.TextPair = ("60E1", "60E1")
     """Rail profile, a built-in name or a file, or [left, right]"""
-    inclination: Annotated[Finite, Field(ge=0, le=0.2)] = 0.025
+    inclination: Annotated[base.Finite, Field(ge=0, le=0.2)] = 0.025
     """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
-    friction: NonNegativePair = (0.4, 0.4)
+    friction: base.NonNegativePair = (0.4, 0.4)
     """Coefficient of friction, one number, or left and right [1]"""
-    friction_table: SidedRows[NonNegative] | None = None
+    friction_table: base.SidedRows[base.NonNegative] | None = None
     """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
     friction_falling: FallingFriction | None = None
     """How friction falls with the slip velocity; by default it does not"""
     third_body: ThirdBody = (1.0, 1.0)
     """Factor of Kalker's coefficients by a layer of dirt or water, one number or [adhesion, slip]:
     the second, for the slip area, is for the creep law `polach` only [1]"""
-    gauge_widening: Annotated[SidedRows[Widening], both_sides(0.5)] | None = None
+    gauge_widening: Annotated[base.SidedRows[Widening], base.both_sides(0.5)] | None = None
     """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
     much each rail stands further out than the gauge says, one number being shared by both rails"""
-    rounding: Annotated[Finite, Field(ge=0.1, le=200)] = 10.0
+    rounding: Annotated[base.Finite, Field(ge=0.1, le=200)] = 10.0
     """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
     cant_rotation: Literal["centre", "inner_rail"] = "centre"
     """Cant turns the track about its centre line, or about the inner (lower) rail"""
@@ -119,7 +102,7 @@ class Track(FileDefinition, Plottable):
 
     irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
     """Displacements of the rails from their ideal positions; they add up"""
-    laws: dict[Name, Law] | None = None
+    laws: dict[base.Name, Law] | None = None
     """Laws of one's own by name: Python functions, executed by permission alone"""
     sections: tuple[RailSections, ...] = Field(default=(), max_length=MOST_RANGES)
     """Ranges in which the section of a rail changes, such as crossings"""
@@ -170,7 +153,7 @@ class Track(FileDefinition, Plottable):
         """Return where the elements do not fit together."""
         return track_faults(self)
 
-    def unusual(self) -> list[Remark]:
+    def unusual(self) -> list[base.Remark]:
         """Return what an engineer would object to."""
         return track_remarks(self)
 
