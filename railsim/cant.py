@@ -13,8 +13,6 @@ def cant_deficiency(speed: float, curvature: float, cant: float) -> float:
     rail; with the magnitude of the curvature and the cant of its outer rail it is positive towards
     the outer rail.
 
-    Examples
-    --------
     >>> round(cant_deficiency(20.0, 1.0 / 250.0, 0.15), 4)
     0.0946
     """
@@ -27,8 +25,6 @@ def curve_speed(radius: float, height: float) -> float:
     `radius`: Of either sign [m]. `height`: Cant of the outer rail plus cant deficiency, 2 b_0
     V^2/(g R) [m]. Returns: [m/s]; nan for a negative height.
 
-    Examples
-    --------
     >>> round(curve_speed(250.0, 0.15), 2)
     15.66
     """

@@ -63,8 +63,6 @@ def argument_fault(
     `parameter`: Its name in Python. `key`, `found`, `allowed`: As in `Fault`. `option`: The
     command line's option, where it is not called as the parameter.
 
-    Examples
-    --------
     >>> fault = argument_fault("cant_deficiency", "", "found 2 m", "0.3 m at most")
     >>> print(fault)
     cant_deficiency: found 2 m; 0.3 m at most
@@ -84,8 +82,6 @@ EQUAL = 5  # more faults than these that differ in their keys alone are one line
 def fault_lines(faults: Iterable[Fault]) -> list[str]:
     """Return a line for each fault; many that differ in their keys alone as one with a count.
 
-    Examples
-    --------
     >>> fault_lines(Fault("a.toml", f"bodies.b{k}.mass", "found 0", "> 0") for k in range(20))
     ['a.toml: bodies.b0.mass: found 0; > 0 (and 19 more: bodies.b1.mass ... bodies.b19.mass)']
     """
@@ -105,8 +101,6 @@ def fault_lines(faults: Iterable[Fault]) -> list[str]:
 def words_of(error: OSError | MemoryError) -> str:
     """Return what the system refused, in a line: no space on the device, no memory.
 
-    Examples
-    --------
     >>> words_of(OSError(28, "no space left on device", "run.h5"))
     'No space left on device: run.h5'
     """
@@ -123,8 +117,6 @@ def counted(faults: Iterable[Fault]) -> list[Fault]:
 
     Faults are of one kind where file and remedy agree.
 
-    Examples
-    --------
     >>> rows = [Fault("a.csv", f"line {n}", "not a number", "numbers only") for n in range(2, 22)]
     >>> print(*counted(rows))
     a.csv: line 2: not a number, and 19 more like it up to line 21; numbers only
@@ -171,8 +163,6 @@ def argument_error(
 class Faults(list[Fault]):
     """Faults that are collected, to be raised together.
 
-    Examples
-    --------
     >>> faults = Faults()
     >>> with faults.caught():
     ...     raise InputError([Fault("a.toml", "mass", "-1", "above 0")])

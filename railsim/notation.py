@@ -55,8 +55,6 @@ class Quantity:
     def text(self, value: float) -> str:
         """Return a stored value as text in the shown unit, without the unit.
 
-        Examples
-        --------
         >>> QUANTITIES["Q"].text(89123.4), QUANTITIES["Y_over_Q"].text(0.39012)
         ('89.12', '0.390')
         >>> QUANTITIES["sum_Y"].text(-1e-9)
@@ -90,8 +88,6 @@ class Quantity:
     def component(self, name: str) -> "Quantity":
         """Return this quantity for one of `COMPONENTS`, with that component's unit.
 
-        Examples
-        --------
         >>> QUANTITIES["body_position"].component("yaw").shown_unit
         'mrad'
         >>> REQUESTED["element_force"].component("pitch").symbol
@@ -138,8 +134,6 @@ GREEK = {"Delta": "Δ", "Sigma": "Σ", "varphi": "φ", "phi": "φ", "psi": "ψ",
 def plain_symbol(symbol: str) -> str:
     r"""A symbol in mathtext as plain characters, for pages.
 
-    Examples
-    --------
     >>> plain_symbol(r"\Delta Q/Q_0"), plain_symbol(r"\Sigma Y"), plain_symbol(r"T\gamma")
     ('ΔQ/Q₀', 'ΣY', 'Tγ')
     """

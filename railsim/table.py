@@ -57,8 +57,6 @@ class Column:
     def of(cls, quantity: Quantity, words: str = "") -> "Column":
         """Return the column of a quantity of `railsim.notation`.
 
-        Examples
-        --------
         >>> from railsim.notation import QUANTITIES
         >>> Column.of(QUANTITIES["sum_Y"], "sum Y").heading
         'sum Y (kN)'
@@ -88,8 +86,6 @@ class Column:
     def text(self, value: Any) -> str:
         """Return a value as shown; nothing for None, ``-`` for a number that is undefined.
 
-        Examples
-        --------
         >>> Column("speed", unit="km/h", format=".0f").text(20.0)
         '72'
         """
@@ -250,8 +246,6 @@ class Table:
 def beside(value: float, limit: float, digits: int = 0, kind: str = "f") -> str:
     """A value beside its limit: with more digits where it would read like the limit, but is not.
 
-    Examples
-    --------
     >>> beside(98.7, 100.0), beside(100.2, 100.0), beside(2.005, 2.0, 3, "g")
     ('99', '100.2', '2.005')
     """

@@ -14,8 +14,6 @@ LONGEST_VALUE, LONGEST_FILE = 60, 300  # characters of a value, of a file's name
 def shortened(text: str, longest: int = LONGEST_VALUE) -> str:
     """Return a text for a message; of a longer one the beginning.
 
-    Examples
-    --------
     >>> shortened("0123456789", 8)
     '01234...'
     """
@@ -25,8 +23,6 @@ def shortened(text: str, longest: int = LONGEST_VALUE) -> str:
 def printable(text: str) -> str:
     r"""Return text without characters that steer a terminal; ends of lines stay.
 
-    Examples
-    --------
     >>> printable("coach \x1b[31m\u202e é")
     'coach \\x1b[31m\\u202e é'
     """
@@ -41,8 +37,6 @@ def printable(text: str) -> str:
 def unformatted(text: str) -> str:
     r"""Return text for matplotlib, which takes what stands between dollars as a formula.
 
-    Examples
-    --------
     >>> print(unformatted("$x^$"))
     \$x^\$
     """
@@ -53,8 +47,6 @@ def unformatted(text: str) -> str:
 def spreadsheet_cell(value: object) -> object:
     """Return a cell of a table that no spreadsheet takes as a formula: with an apostrophe before.
 
-    Examples
-    --------
     >>> spreadsheet_cell("=1+1"), spreadsheet_cell("-0.3"), spreadsheet_cell(-0.3)
     ("'=1+1", '-0.3', -0.3)
     """
@@ -75,8 +67,6 @@ def counted_remarks(remarks: Iterable[tuple[str, str]]) -> list[str]:
 
     `remarks`: Name of the run, or nothing; remark.
 
-    Examples
-    --------
     >>> counted_remarks([("a", "hunts at 5 Hz"), ("b", "hunts at 6 Hz"), ("c", "is too long")])
     ['a: hunts at 5 Hz (and 1 similar, in 2 runs altogether)', 'c: is too long']
     >>> counted_remarks([("a", "is too long"), ("b", "is too long")])

@@ -20,8 +20,6 @@ ALLOWED = "first:last:number, with log: before it for equal ratios, such as 10:6
 def number_with_unit(text: str) -> float | None:
     """Return a number with a unit in SI; None where it is nothing of the kind.
 
-    Examples
-    --------
     >>> number_with_unit("72km/h"), number_with_unit("-2.5 mm"), number_with_unit("60E1")
     (20.0, -0.0025, None)
     """
@@ -32,8 +30,6 @@ def number_with_unit(text: str) -> float | None:
 def speed_in_si(value: Any) -> Any:
     """Return the speed of a text such as ``72 km/h`` or ``20`` [m/s]; anything else as it is.
 
-    Examples
-    --------
     >>> speed_in_si("72 km/h"), speed_in_si("20"), speed_in_si(20.0), speed_in_si("20 kN")
     (20.0, 20.0, 20.0, '20 kN')
     """
@@ -47,8 +43,6 @@ def range_values(text: str) -> list[float] | None:
     The unit stands behind both ends, or once for all of it.  Raises ValueError: fewer than one
     value or too many of them, or no ratio leads from end to end.
 
-    Examples
-    --------
     >>> range_values("10:20:3"), range_values("log:1e4:1e6:3"), range_values("36:72:2 km/h")
     ([10.0, 15.0, 20.0], [10000.0, 100000.0, 1000000.0], [10.0, 20.0])
     >>> range_values("36km/h:72km/h:2"), range_values("36:72km/h:2")
@@ -77,8 +71,6 @@ def rounded(value: float) -> float:
 def duration_in_words(seconds: float) -> str:
     """Return an estimated duration in words.
 
-    Examples
-    --------
     >>> duration_in_words(300.0), duration_in_words(3e5), duration_in_words(1e9)
     ('5 minutes', '3 days', '32 years')
     """

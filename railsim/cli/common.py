@@ -311,8 +311,6 @@ def given_options(settings: str = "", *, load: bool = True) -> Callable[[F], F]:
 def values_of(text: str, option: str) -> list[float]:
     """Return the values of ``A:B:N`` (N values from A to B) or ``A,B,C``; units may stand behind.
 
-    Examples
-    --------
     >>> values_of("10:20:3", "--speeds"), values_of("0.2,0.4", "--friction")
     ([10.0, 15.0, 20.0], [0.2, 0.4])
     >>> values_of("36:72:2 km/h", "--speeds"), values_of("36km/h,20", "--speeds")

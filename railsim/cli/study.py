@@ -33,8 +33,6 @@ class ManyValues(click.Command):
 def spread(args: list[str]) -> list[str]:
     """Return arguments with every option of `MANY` repeated before each of its values.
 
-    Examples
-    --------
     >>> spread(["--speeds", "10", "-5", "--out", "d"])
     ['--speeds', '10', '--speeds', '-5', '--out', 'd']
     """

@@ -70,8 +70,6 @@ def mean_inverse_distance(distance: float, semi_axis: float) -> float:
 
     `distance`, `semi_axis`: D > 0 across the rail, a along it [m].
 
-    Examples
-    --------
     >>> round(mean_inverse_distance(1.0, 1e-3), 6)
     1.0
     """

@@ -37,8 +37,6 @@ LEAST_QR = 0.0065
 def wheel_gauge(wheel: Profile) -> tuple[float, float, float]:
     """Return Sh, Sd and qR of a wheel profile [m], NaN where its flange does not reach so far.
 
-    Examples
-    --------
     >>> from railsim.profiles import load_profile
     >>> [round(1e3 * value, 1) for value in wheel_gauge(load_profile("S1002"))]
     [28.0, 32.5, 10.8]

@@ -84,8 +84,6 @@ def kalker_coefficients(
     closer to the full theory.
     Source: Kalker (1990), table E.3 and its asymptotes.
 
-    Examples
-    --------
     >>> [round(float(c), 2) for c in kalker_coefficients(1.0, nu=0.25)]
     [4.12, 3.67, 1.47, 1.19]
     """

@@ -16,8 +16,6 @@ def unit_of_key(definition: Definition, key: str) -> str:
 
     `key`: Whole or short, as `--set` takes it behind ``vehicle.``, ``track.`` or ``settings.``.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_vehicle
     >>> coach = load_vehicle("coach_manchester")
     >>> [unit_of_key(coach, key) for key in ("primary.stiffness.x", "bodies.carbody.mass", "name")]

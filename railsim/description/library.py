@@ -71,8 +71,6 @@ def _text_and_data(path: Path) -> tuple[str, dict[str, Any]]:
 def trust(text: str) -> str:
     r"""Return the letters of source quality of a file's numbers, the most frequent first.
 
-    Examples
-    --------
     >>> trust("mass = 3.0  # [R]\nx = 1.0  # [A]\ny = 2.0  # [R]; z [A]\n radius = 4  # [R]")
     'RA'
     """

@@ -298,8 +298,6 @@ class PartialFile:
 def whole_file(path: Path) -> Iterator[Path]:
     """Give the hidden name to write to; the file has its own name when the block has ended.
 
-    Examples
-    --------
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     with whole_file(Path(folder) / "a.txt") as partial:
     ...         _ = partial.write_text("whole")

@@ -23,8 +23,6 @@ def key_path(key: str) -> list[str]:
 
     Raises KeyError: it is no key.
 
-    Examples
-    --------
     >>> key_path('initial."front.frame".y')
     ['initial', 'front.frame', 'y']
     """
@@ -98,8 +96,6 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     the whole path of as many of the first as there are, so that the fault says what is allowed.
     Raises KeyError: several keys have these parts.
 
-    Examples
-    --------
     >>> axle = {"elements": {"primary": {"stiffness": [1.0, 2.0, 3.0]}}}
     >>> full_path({"assemblies": {"axle": axle}}, ["primary", "stiffness", "x"])
     ['assemblies', 'axle', 'elements', 'primary', 'stiffness', 'x']

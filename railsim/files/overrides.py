@@ -117,8 +117,6 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
 
     Raises InputError: an assignment with another beginning.
 
-    Examples
-    --------
     >>> split_overrides(["track.friction=0.3", "settings.scheme=rk4"])
     {'vehicle': [], 'track': ['friction=0.3'], 'settings': ['scheme=rk4']}
     """

@@ -178,8 +178,6 @@ class Unit:
 def exponents(unit: str) -> dict[str, int] | None:
     """Return the exponents of the base units in a unit; None for one that is not known.
 
-    Examples
-    --------
     >>> exponents("N m/rad"), exponents("m/s2"), exponents("kN")
     ({'kg': 1, 'm': 2, 's': -2, 'rad': -1}, {'m': 1, 's': -2}, None)
     """

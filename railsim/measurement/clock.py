@@ -122,8 +122,6 @@ def delayed(x: Floats, steps: float) -> Floats:
 
     Cubic polynomials through four neighbours (Lagrange); NaN where one of them is missing.
 
-    Examples
-    --------
     >>> delayed(np.arange(6.0), 1.5).tolist()
     [1.5, 2.5, 3.5, nan, nan, nan]
     """

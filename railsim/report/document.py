@@ -76,8 +76,6 @@ def of_values(table: values.Table, subject: str) -> Table:
 def day(created: str) -> str:
     """A time of ISO 8601 in words.
 
-    Examples
-    --------
     >>> day("2026-11-03T15:04:20+00:00"), day("earlier")
     ('3 November 2026, 15:04', 'earlier')
     """
@@ -91,8 +89,6 @@ def day(created: str) -> str:
 def in_words(value: Any) -> str:
     """A value of a file in words: no brackets of Python.
 
-    Examples
-    --------
     >>> in_words((10, 10)), in_words(True), in_words(None), in_words({"mu": 0.1 + 0.2})
     ('10, 10', 'yes', 'none', 'mu 0.3')
     """

@@ -27,8 +27,6 @@ def parameters(
     Numbers are numbers; the words are the end of the name that tells it from all others. `units`:
     By name, as of `railsim.report.inputs.units_of`.
 
-    Examples
-    --------
     >>> runs = [{"labels": {"vehicle": "a", "speed": 20.0, "track.friction": f}} for f in "12"]
     >>> parameters(runs)
     {'track.friction': {'words': 'friction', 'unit': '', 'values': [1.0, 2.0]}}
@@ -70,8 +68,6 @@ def command(record: Record, inputs: Mapping[str, Any]) -> str:
 
     Empty where the run belongs to no study: its labels are names, not files.
 
-    Examples
-    --------
     >>> run = {"labels": {"vehicle": "coach_25t", "track": "straight", "speed": 40.0}}
     >>> command(run, {"duration": 5.0})
     'railsim run coach_25t straight --speed 40 --duration 5'

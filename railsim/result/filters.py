@@ -41,8 +41,6 @@ def butterworth(low: float = 0.0, high: float = math.inf, order: int = 4) -> Res
     [Hz] to 1/sqrt(1 + x^(2 order)), x = f/high, low/f or, of a band pass, (f^2 - low high)/(f
     (high - low)).
 
-    Examples
-    --------
     >>> [round(float(g), 3) for g in butterworth(high=20.0)(np.array([10.0, 20.0, 30.0]))]
     [0.998, 0.707, 0.194]
     """
@@ -101,8 +99,6 @@ def _factor(response: Response, size: int, rate: float) -> NDArray[Any]:
 def fast_length(least: int) -> int:
     """Smallest length, `least` or more, that the transform takes apart into 2, 3 and 5.
 
-    Examples
-    --------
     >>> [fast_length(n) for n in (1, 7, 17, 1025, 65537)]
     [1, 8, 18, 1080, 65610]
     """
@@ -194,8 +190,6 @@ def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floa
     (float64[window]): Middles of the windows [m]; the windows lie within `s`. `length`: Length of
     a window [m]. Returns float64[window, ...].
 
-    Examples
-    --------
     >>> s = np.array([0.0, 3.0, 4.0])
     >>> distance_means(s, 2.0 * s, np.array([1.0, 2.5]), 2.0).tolist()
     [2.0, 5.0]
@@ -209,8 +203,6 @@ def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floa
 def window_centres(begin: float, end: float, length: float, step: float) -> Floats:
     """Middles of windows that lie within begin and end, a step apart [m].
 
-    Examples
-    --------
     >>> window_centres(10.0, 13.0, 2.0, 0.5).tolist()
     [11.0, 11.5, 12.0]
     """
@@ -230,8 +222,6 @@ class StreamingPercentiles:
     `width`: Width of the cells at the start, later their present one: no percentile is further than
     this from one of the whole record.
 
-    Examples
-    --------
     >>> stream = StreamingPercentiles(0.01)
     >>> for part in np.array_split(np.arange(1001.0), 7):
     ...     stream.add(part)

@@ -70,8 +70,6 @@ class Hunting:
     def sentence(self) -> str:
         """Remark for the reader of a result.
 
-        Examples
-        --------
         >>> Hunting(4.8, 7.4e-3, (0, 1, 2, 3), 300.0, 900.0, True).sentence
         'The vehicle hunts at 4.8 Hz, 7.4 mm, wheelsets 1 to 4, from s = 300 m.'
         """

@@ -11,8 +11,6 @@ from railsim.errors import nearest
 def known_labels(dim: str, names: Sequence[str]) -> dict[str, int]:
     """Return the indices of all texts that name a place along a dimension.
 
-    Examples
-    --------
     >>> known_labels("wheelset", ["front", "rear"])
     {'1': 0, '2': 1, 'front': 0, 'rear': 1}
     """

@@ -60,8 +60,6 @@ def lost_peak(
     all steps, both of the part that is evaluated. `outputs`: How often is stored, in words.
     `filtered`: Whether what is stored is filtered; then its peaks are those that tables list.
 
-    Examples
-    --------
     >>> words = lost_peak({"Q": 80e3}, {"Q": np.array([100e3, 0.0])}, "20 per s", filtered=False)
     >>> words.split(": ")[0], words.split("; ")[1]
     ('Between two outputs (20 per s) forces peak', 'tables of peaks list the former.')

@@ -86,8 +86,6 @@ LOADERS: dict[str, Callable[..., Any]] = {
 def _leads_to(name: str, key: str) -> bool:
     """Whether a path, perhaps a short one, is that of a key or of a table that holds it.
 
-    Examples
-    --------
     >>> key = "vehicle.elements.primary.stiffness.0"
     >>> [_leads_to(f"vehicle.{rest}", key) for rest in ("primary.stiffness.x", "secondary.mass")]
     [True, False]

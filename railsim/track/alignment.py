@@ -34,8 +34,6 @@ class Alignment:
     `track`: the track; beyond its ends the end elements continue. Raises InputError: elements that
     do not fit together.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_track
     >>> alignment = Alignment(load_track("curve_r250"))
     >>> round(float(1.0 / alignment.curvature(390.0)), 6)

@@ -42,8 +42,6 @@ class Curve:
 def curves(track: Track) -> tuple[Curve, ...]:
     """Return the circular curves of a track in their order.
 
-    Examples
-    --------
     >>> from railsim.definitions.loading import load_track
     >>> (curve,) = curves(load_track("curve_r250"))
     >>> round(1.0 / curve.curvature), round(curve.cant_deficiency(20.0), 3)
