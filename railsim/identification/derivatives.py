@@ -181,10 +181,6 @@ def sensitivity(
     **run
         Further arguments of `simulate`: `speed`, `start`, `until`, `duration`.
 
-    Returns
-    -------
-    Sensitivity
-
     Raises
     ------
     InputError

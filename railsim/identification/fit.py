@@ -87,10 +87,6 @@ def identify(
     progress : callable, optional
         Called with the number of runs simulated so far.
 
-    Returns
-    -------
-    Identified
-
     Raises
     ------
     InputError

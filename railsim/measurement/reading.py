@@ -47,10 +47,6 @@ def load_measurement(
         Names or quantities of the channels that are read; by default all.  A long record takes
         8 bytes for each value of a channel.
 
-    Returns
-    -------
-    Measurement
-
     Raises
     ------
     InputError

@@ -347,10 +347,6 @@ class Result:
         overwrite : bool
             Whether an existing file may be replaced.
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-
         Raises
         ------
         InputError

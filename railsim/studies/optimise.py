@@ -159,10 +159,6 @@ def optimise(
     progress, on_remark
         As in `railsim.study`.
 
-    Returns
-    -------
-    Optimisation
-
     Raises
     ------
     InputError

@@ -111,10 +111,6 @@ def study(
         Called with every remark on files found in the folder, such as damaged results that are
         computed again; by default remarks are logged.
 
-    Returns
-    -------
-    Outcome
-
     Raises
     ------
     InputError
