@@ -150,7 +150,7 @@ def _of_folder(folder: Path) -> tuple[list[Record], dict[str, Any]]:
 
 def _of_file(path: Path) -> Record:
     from railsim.result import open_run
-    from railsim.result.facts import run_facts
+    from railsim.result.extremes import run_facts
 
     result = open_run(path)
     labels = {"vehicle": result.vehicle().name, "track": result.track().name, "speed": result.speed}

@@ -88,7 +88,7 @@ def command(
     if output.out is not None:
         content = written(Collected(results, cases, optimum))
         if optimum is not None:
-            from railsim.mechanisms.optimised_file import optimised_text
+            from railsim.mechanisms.optimum import optimised_text
 
             own = Path(files[0])
             base = Path(os.path.relpath(own, output.out)).as_posix() if own.is_file() else files[0]

@@ -53,7 +53,7 @@ def command(
       railsim run coach_manchester curve_r250 --speed 20 --check-step --overwrite
     """
     from railsim.definitions.track.layout import track_remarks
-    from railsim.result.facts import run_facts
+    from railsim.result.extremes import run_facts
     from railsim.result.tables import result_parts
     from railsim.simulation.assumptions import assumptions
     from railsim.studies.case import of_settings

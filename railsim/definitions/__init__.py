@@ -9,7 +9,6 @@ module         job
 base           the common base class and the number types
 file_definition  definitions that fill a file: what is checked, changed, written
 faults         wrong values in the words of a user
-registry       kinds of a thing, one module each
 elements       force elements of a vehicle, a package
 excitations    irregularities of a track, a package
 vehicle        vehicle files: bodies, wheelsets, elements, assemblies, load cases, wheels out of

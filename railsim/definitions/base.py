@@ -10,8 +10,11 @@ import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from itertools import pairwise
-from typing import Annotated, Any, Literal, NoReturn, Self, TypeVar
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Annotated, Any, Literal, NoReturn, Self, TypeVar, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -226,3 +229,21 @@ SidedRows = Annotated[
     WithJsonSchema({"type": "array", "minItems": 1, "items": {**NUMBERS, "maxItems": 3}}),
 ]
 """Rows [s, value] or [s, left, right] [m]"""
+
+
+D = TypeVar("D", bound=Definition)
+
+
+def kinds(base: type[D], key: str, package: str) -> dict[str, type[D]]:
+    """Return all definitions in the modules of a package that give `key` one value, by it."""
+    for module in iter_modules([str(Path(str(import_module(package).__file__)).parent)]):
+        import_module(f"{package}.{module.name}")
+    found: dict[str, type[D]] = {}
+    waiting: list[Any] = [base]
+    while waiting:
+        one = waiting.pop()
+        waiting += one.__subclasses__()
+        annotation = one.model_fields[key].annotation if key in one.model_fields else None
+        if get_origin(annotation) is Literal:
+            found[get_args(annotation)[0]] = one
+    return dict(sorted(found.items()))

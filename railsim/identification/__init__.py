@@ -6,9 +6,8 @@
 `parameters.py`    keys of a model with factors, shares of a second wheel profile
 `runs.py`          measured runs made ready, and simulated at the same places
 `residuals.py`     histories, spectra or section values as residuals; whiteness
-`problem.py`       residuals and derivatives of all runs
+`problem.py`       residuals and derivatives of all runs, over the cores
 `derivatives.py`   `sensitivity`: derivatives of histories and values with their accuracy
-`variants.py`      variants over the cores
 =================  =============================================================================
 """
 

@@ -23,7 +23,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import argument_error, nearest
 from railsim.identification.parameters import Model, Parameter, parsed
-from railsim.identification.variants import Workers
+from railsim.identification.problem import Workers
 from railsim.measurement.counterpart import outputs_for, series
 from railsim.processes import available_cores
 from railsim.profiles import Profile

@@ -19,10 +19,9 @@ from railsim.errors import Faults, argument_error
 from railsim.files.access import make_folder
 from railsim.identification.identified import AT_BOUND, INFINITE, Channel, Identified, Place
 from railsim.identification.parameters import Parameter, parsed
-from railsim.identification.problem import STRETCH, Problem
+from railsim.identification.problem import STRETCH, Problem, Workers
 from railsim.identification.residuals import FORMS, Form, banded, whiteness
 from railsim.identification.runs import FEWEST, model_of, prepared, track_of
-from railsim.identification.variants import Workers
 from railsim.measurement import Measurement, load_measurement
 from railsim.measurement.alignment import common_shift
 from railsim.measurement.likeness import suspicions

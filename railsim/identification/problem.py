@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from railsim.files.access import read_bytes, whole_file
 from railsim.identification.parameters import Model, Parameter
 from railsim.identification.residuals import Form
 from railsim.identification.runs import Prepared
-from railsim.identification.variants import Task, Workers
+from railsim.processes import WorkerPool
 from railsim.profiles import load_profile
 from railsim.profiles.used import used_profiles
 
@@ -28,6 +29,33 @@ STEP = 0.02  # of a coordinate, for differences: sticking and cells of the conta
 STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
 NEAR = 0.03  # change of a coordinate up to which derivatives serve
 LARGEST_KEPT = 2_000_000_000  # bytes
+
+Task = tuple[Callable[..., Any], tuple[Any, ...]]
+
+
+@dataclass
+class Workers:
+    """Processes for tasks, within a block; with one worker everything happens in this process."""
+
+    count: int
+    _pool: WorkerPool | None = field(default=None, init=False, repr=False)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if self._pool is not None:
+            self._pool.__exit__(*error)
+            self._pool = None
+
+    def run(self, tasks: Sequence[Task]) -> list[Any]:
+        """Return what the tasks return, in their order; raise the first error of a task."""
+        if self.count <= 1 or len(tasks) <= 1:
+            return [function(*arguments) for function, arguments in tasks]
+        if self._pool is None:
+            self._pool = WorkerPool(self.count)
+        futures = [self._pool.submit(function, *arguments) for function, arguments in tasks]
+        return [future.result() for future in futures]
 
 
 @dataclass(eq=False)

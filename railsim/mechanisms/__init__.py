@@ -23,7 +23,7 @@ module             job
 `comparison`       several mechanisms at equal output
 `targets`          positions and ratios of a reference
 `judgement`        objective and constraints with exact gradients
-`optimised_file`   the file that a search writes
+`optimum`          what a search found, the file that it writes
 `drawing`          lines and points for pictures
 `summary`          results as plain numbers, for ``--json``
 `tables`           results as texts, for the terminal and the page

@@ -1,15 +1,19 @@
 """What an optimisation found: starts, active constraints, the best point."""
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import tomli_w
 from scipy.optimize import nnls
 
 from railsim.arrays import Floats
-from railsim.definitions.mechanism.definition import Mechanism
+from railsim.definitions.mechanism.definition import MECHANISM_FORMAT, Mechanism
 from railsim.design_checks import ROUNDING
 from railsim.errors import InputError
+from railsim.files.key_paths import key_path
 from railsim.mechanisms.analysis import Analysis, analyse
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import check_freedom
@@ -148,3 +152,48 @@ def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
     weights, _ = nnls(both, np.append(np.zeros(len(x)), large))
     each = zip(rows, (weights[: len(rows)] / norms).tolist(), strict=True)
     return tuple(Active(*row[:3], weight) for row, weight in each)
+
+
+def optimised_text(base: str, optimum: Optimum, changes: Sequence[str], case: str | None) -> str:
+    """Return the text of the file.
+
+    `base` is the searched file as the new one must name it; the overrides ``key.path=value`` and
+    the parameters of the case that were in force are written down.
+    """
+    definition = optimum.definition
+    data: dict[str, Any] = {}
+    changed: list[str] = []
+    for text in changes:
+        key, _, written = text.partition("=")
+        path = key_path(key.strip())
+        if any(part.isdecimal() for part in path):
+            # a member of a list cannot be changed by a file that extends another: all of it
+            return definition.to_toml()
+        node = data
+        for part in path[:-1]:
+            node = node.setdefault(part, {})
+        node[path[-1]] = _value(written.strip())
+        changed += [path[1]] if path[0] == "parameters" and len(path) == 2 else []
+    parameters = data.setdefault("parameters", {})
+    if case is not None:
+        parameters |= definition.cases[case]
+        changed += definition.cases[case]
+    parameters |= optimum.parameters
+    best = list(optimum.parameters)
+    provenance = data.setdefault("provenance", {})
+    provenance["set"] = [name for name in dict.fromkeys(changed) if name not in best]
+    provenance["optimised"] = best
+    head = {"format": MECHANISM_FORMAT, "extends": base, "name": f"{definition.name}, optimised"}
+    count = len(optimum.starts)
+    lead = (
+        f"# Found by {count} starts with seed {optimum.seed}: objective {optimum.objective:.6g}"
+        + ("" if optimum.feasible else ", a compromise that breaks constraints")
+    )
+    return f"{lead}\n{tomli_w.dumps({**head, **data})}"
+
+
+def _value(written: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {written}")["value"]
+    except (ValueError, RecursionError):  # no TOML is text
+        return written

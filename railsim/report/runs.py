@@ -52,7 +52,7 @@ def page(
 ) -> str:
     """Return the page as HTML.
 
-    `title`: Title of the page. `records`: One for each run, as `railsim.result.facts.run_facts`
+    `title`: Title of the page. `records`: One for each run, as `railsim.result.extremes.run_facts`
     with ``name`` and ``labels``, including runs that failed or have not been done. `results`:
     Results, by the names of their runs, whose curves are shown. `remarks`: Further notes for the
     reader. `assessable`: All results, which are assessed together and whose inputs are told; by

@@ -3,8 +3,7 @@
 ==============  ===========================================================================
 `data.py`       `Result`: arrays by name, coordinates, attributes, the embedded inputs
 `labels.py`     names and numbers of wheelsets along the dimensions of a result
-`extremes.py`   largest values with wheelset, side, time and distance; values at mid-curve
-`facts.py`      what summaries and reports say of a result
+`extremes.py`   largest values with wheelset, side, time and distance; values at mid-curve; facts
 `sinks.py`      `Sink`, what a simulation writes to; `MemorySink`
 `hdf5.py`       layout of the result file, `Hdf5Sink`
 `reading.py`    `open_result`, `open_run`, `check_result`: any damage is an input error

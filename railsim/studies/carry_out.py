@@ -27,7 +27,7 @@ from railsim.laws.permission import check_laws
 from railsim.notation import QUANTITIES
 from railsim.processes import available_cores
 from railsim.result import Result, open_result
-from railsim.result.facts import OF_FACTS
+from railsim.result.extremes import OF_FACTS
 from railsim.result.hdf5 import Storage
 from railsim.result.sinks import matches
 from railsim.simulation.outputs import requested

@@ -30,7 +30,7 @@ from railsim.errors import ModelError, RailsimError, argument_error
 from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.processes import WorkerPool, begin_worker, worker_context
 from railsim.result import Result, open_result
-from railsim.result.facts import OF_FACTS
+from railsim.result.extremes import OF_FACTS
 from railsim.result.hdf5 import PLAIN, Storage, write
 from railsim.result.sinks import EVERYTHING, matches
 from railsim.simulation import simulate

@@ -28,8 +28,7 @@ from railsim.definitions.study.design import Optimise, Value
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error, nearest
 from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
-from railsim.result.extremes import BY_SIGN, PEAK_QUANTITIES
-from railsim.result.facts import FACTS
+from railsim.result.extremes import BY_SIGN, FACTS, PEAK_QUANTITIES
 from railsim.studies.analyses import check_analyses, numbers_of
 from railsim.studies.case import Case, Loader, Overrides, run_labels, run_name
 from railsim.studies.rows import PERMITTED, Row, made_rows

@@ -21,7 +21,7 @@ from railsim.errors import Fault, Faults, RailsimError, input_error, words_of
 from railsim.files.access import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
-from railsim.result.facts import FACTS, run_facts
+from railsim.result.extremes import FACTS, run_facts
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, NOT_DONE, Records

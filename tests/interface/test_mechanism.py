@@ -14,7 +14,7 @@ from railsim import cli
 from railsim.definitions.loading import load_mechanism
 from railsim.files.sources import find_file, shipped_names
 from railsim.mechanisms.analysis import analyse
-from railsim.mechanisms.optimised_file import optimised_text
+from railsim.mechanisms.optimum import optimised_text
 from railsim.plot.mechanisms import angles_figure
 from railsim.report.mechanisms import GIF_FRAMES
 

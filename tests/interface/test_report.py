@@ -36,7 +36,7 @@ from railsim.report.runs import _peaks, page
 from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
-from railsim.result.facts import run_facts
+from railsim.result.extremes import run_facts
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None

@@ -17,10 +17,9 @@ from railsim.identification.derivatives import Derivative, Sensitivity, _central
 from railsim.identification.fit import _counting, _solved
 from railsim.identification.identified import Channel, _wheels
 from railsim.identification.parameters import Parameter
-from railsim.identification.problem import Problem
+from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import Prepared
-from railsim.identification.variants import Workers
 from railsim.profiles import save_profile
 
 N, STEP, SPEED, BAND = 1200, 0.01, 20.0, (0.5, 8.0)

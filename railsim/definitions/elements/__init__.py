@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
+from railsim.definitions.base import kinds
 from railsim.definitions.elements.base import Element
-from railsim.definitions.registry import kinds
 from railsim.files.key_paths import NEW_MEMBERS
 
 KINDS = kinds(Element, "kind", __name__)  # type: ignore[type-abstract]

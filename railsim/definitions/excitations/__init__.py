@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
+from railsim.definitions.base import kinds
 from railsim.definitions.excitations.base import Irregular
-from railsim.definitions.registry import kinds
 
 TYPES = kinds(Irregular, "type", __name__)  # type: ignore[type-abstract]
 """Definition of every type of irregularity."""
