@@ -200,8 +200,7 @@ def _largest(body: Drawn, shape: np.ndarray) -> float:
     a, b, c, *middle = body.box
     half = a if body.kind == "wheelset" else c
     corners = np.array([[x, y, z] for x in (-a, a) for y in (-b, b) for z in (-half, half)])
-    moved = shape[:3] + np.cross(shape[3:], corners + middle)
-    return float(np.max(np.abs(moved)))
+    return float(np.max(np.abs(shape[:3] + np.cross(shape[3:], corners + middle))))
 
 
 def _drawn(flat: FlatVehicle) -> tuple[Drawn, ...]:
@@ -256,13 +255,14 @@ def chosen_mode(
 
 
 Section = Mapping[str, Floats]
+Profiles = tuple[tuple[Section, ...], ...]
 POINTS = 150  # of a profile
 MEETS = 2e-4  # m, to which both wheels of a wheelset touch
 WIDEST = 0.012  # m, by which rails are moved apart
 STEPS = 10  # of the search for it
 
 
-def sections(result: Result, flat: FlatVehicle) -> tuple[tuple[Section, ...], ...]:
+def sections(result: Result, flat: FlatVehicle) -> Profiles:
     """Profiles of each wheelset, left and right.
 
     Returns: ``wheel_y``, ``wheel_z`` in the wheelset's axes (y from its middle, z from its axis),
@@ -292,9 +292,7 @@ def _thinned(length: int) -> Floats:
     return np.unique(np.linspace(0, length - 1, min(POINTS, length)).astype(int))
 
 
-def contact_points(
-    result: Result, rows: Floats, profiles: tuple[tuple[Section, ...], ...]
-) -> Floats:
+def contact_points(result: Result, rows: Floats, profiles: Profiles) -> Floats:
     """Points at which the wheel forces act, from the wheelsets' centres in track axes.
 
     A wheel that yaws touches ahead of its axle or behind it by -z dz/dy psi, with the slope of its
@@ -329,9 +327,7 @@ def contact_points(
     return found
 
 
-def seats(
-    result: Result, rows: Floats, profiles: tuple[tuple[Section, ...], ...], pose: Floats
-) -> Floats:
+def seats(result: Result, rows: Floats, profiles: Profiles, pose: Floats) -> Floats:
     """How wheelsets sit so that the drawn sections of wheels and rails meet.
 
     A result gives the wheelset against the middle of its rails and the line over their tops.  The

@@ -128,14 +128,10 @@ def _conicity(y: Floats, delta_r: Floats, potential: Floats, amplitude: float) -
         return float("nan")  # a hump in between: no oscillation of this amplitude
     if np.max(room) <= 1e-9 * scale:
         return 0.0
-    time = _travel_time(positions, forces, np.sqrt(2.0 * np.maximum(room, 0.0)))
-    return float(0.5 * np.pi**2 / time**2)
-
-
-def _travel_time(y: Floats, force: Floats, speed: Floats) -> float:
-    """Sum of the exact times over pieces on which the force is linear in y."""
-    dy = np.diff(y)
-    f0, f1, v0, v1 = force[:-1], force[1:], speed[:-1], speed[1:]
+    # exact times over the pieces, on which the force is linear in y
+    speed = np.sqrt(2.0 * np.maximum(room, 0.0))
+    dy = np.diff(positions)
+    f0, f1, v0, v1 = forces[:-1], forces[1:], speed[:-1], speed[1:]
     slope = (f1 - f0) / dy
     omega = np.sqrt(np.abs(slope))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -145,4 +141,5 @@ def _travel_time(y: Floats, force: Floats, speed: Floats) -> float:
         exact = np.where(slope > 0.0, harmonic, hyperbolic)
     # the closed forms cancel where the force is nearly constant over the piece
     nearly_constant = omega * straight < 1e-3
-    return float(np.sum(np.where(nearly_constant, straight, exact)))
+    time = float(np.sum(np.where(nearly_constant, straight, exact)))
+    return float(0.5 * np.pi**2 / time**2)

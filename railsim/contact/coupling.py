@@ -74,5 +74,4 @@ def mean_inverse_distance(distance: float, semi_axis: float) -> float:
     1.0
     """
     x = semi_axis * (np.arange(200) + 0.5) / 200.0
-    weight = 1.0 - (x / semi_axis) ** 2
-    return float(np.average(1.0 / np.hypot(distance, x), weights=weight))
+    return float(np.average(1.0 / np.hypot(distance, x), weights=1.0 - (x / semi_axis) ** 2))

@@ -148,7 +148,12 @@ def _solved(problem: Problem, loss: str) -> Identified:
     x = _at_best_shares(problem, x)
     near = stated and all(len(one.run.at) * one.step > LONG * PART for one in problem.runs)
     if near:
-        x = _by_a_part(problem, x, bounds, loss)
+        # by the beginnings of the runs: near the solution at a low cost; their stretch says little
+        short = problem.shortened(PART)
+        _weigh(short, x, stated=True)
+        found, _ = _least(short, x, bounds, loss, COARSE)
+        problem.simulations = short.simulations
+        x = np.concatenate([found[: problem.count], x[problem.count :]])
         _weigh(problem, x, stated=stated)
     for tolerance in [FINE] if known else [*[COARSE][near:], *[FINE] * REWEIGHTED]:
         x, settled = _least(problem, x, bounds, loss, tolerance)
@@ -250,16 +255,6 @@ def _at_best_shares(problem: Problem, x: Floats) -> Floats:
             sums = [float(row @ row) for row in problem.vectors(points)]
             x = points[int(np.argmin(sums))]
     return x
-
-
-def _by_a_part(problem: Problem, x: Floats, bounds: Floats, loss: str) -> Floats:
-    """Return coordinates by the beginnings of the runs: near the solution at a low cost."""
-    short = problem.shortened(PART)
-    _weigh(short, x, stated=True)
-    found, _ = _least(short, x, bounds, loss, COARSE)
-    problem.simulations = short.simulations
-    # the stretch of a short part says little about the whole
-    return np.concatenate([found[: problem.count], x[problem.count :]])
 
 
 def _places(problem: Problem, x: Floats) -> Floats:

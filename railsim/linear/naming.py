@@ -152,8 +152,7 @@ def _phase(parts: Parts, shape: Complexes, component: int) -> str:
     if min(abs(first), abs(last)) < 0.1 * max(abs(first), abs(last)):
         moving = parts.frames[0] if abs(first) > abs(last) else parts.frames[-1]
         return f", {parts.bogie_of(moving)}"
-    in_phase = (first * last.conjugate()).real > 0.0
-    return ", in phase" if in_phase else ", out of phase"
+    return ", in phase" if (first * last.conjugate()).real > 0.0 else ", out of phase"
 
 
 def _hunting_bogie(

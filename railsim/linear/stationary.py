@@ -60,8 +60,7 @@ def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = Fal
 
 def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -> float:
     """Roll of a body against the track over the angle of cant (EN 15273, UIC 505)."""
-    roll = standing.state[model.index.coordinate(body, 3)]
-    return float(roll / np.arcsin(cant / CANT_BASE))
+    return float(standing.state[model.index.coordinate(body, 3)] / np.arcsin(cant / CANT_BASE))
 
 
 @dataclass(frozen=True)

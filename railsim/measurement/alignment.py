@@ -55,9 +55,7 @@ def common_shift(
     every = [shift_of(*signal, most=most) for signal in signals]
     found = [one for one in every if one is not None and one.share >= AGREEING]
     best = max((one.correlation for one in found), default=0.0)
-    alike = sorted(
-        (one for one in found if one.correlation >= best - AS_ALIKE), key=lambda one: one.shift
-    )
+    alike = sorted((s for s in found if s.correlation >= best - AS_ALIKE), key=lambda s: s.shift)
     middle = alike[len(alike) // 2] if alike else None
     near = [one for one in found if middle is not None and abs(one.shift - middle.shift) < NEAR]
     return middle if len(near) >= TOGETHER * len(every) else None

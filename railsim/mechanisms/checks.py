@@ -146,8 +146,7 @@ def _gas_spring(result: Analysis, name: str, spring: GasSpring) -> Iterator[Chec
     """Temperature against the nearer end of the service range; the rod's end when compressed."""
     n = result.model.number
     value, (low, high) = n(spring.temperature), (n(x) for x in spring.service)
-    above = value < 0.5 * (low + high)
-    limit, sense = (low, "above") if above else (high, "below")
+    limit, sense = (low, "above") if value < 0.5 * (low + high) else (high, "below")
     note = "temperature against the range in service"
     yield Check(f"{name}_temperature", value, limit, sense, "°C", note)
     if spring.rod_end is not None:

@@ -155,8 +155,7 @@ class Judge:
         drift = np.where(at_height, 0.0, moved.drift(both))
         later[len(grid) - 1] = 2  # of equal values the range's own are the first and the last
         order = np.lexsort((later, model.sense * both))
-        positions = solve(model, both[order])
-        motion = tangents(positions, moved, drift=drift[..., order], second=False)
+        motion = tangents(solve(model, both[order]), moved, drift=drift[..., order], second=False)
         rank = np.argsort(order, kind="stable")
         return self._judged(motion, model, rank[: len(grid)], rank[len(grid) :])
 

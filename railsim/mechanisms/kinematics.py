@@ -75,8 +75,7 @@ class Motion:
         r = np.stack((x + ax, y + ay), axis=-1)
         r1 = np.stack((self.q1[..., body, 0] - ay * w, self.q1[..., body, 1] + ax * w), axis=-1)
         x2, y2 = self.q2[..., body, 0], self.q2[..., body, 1]
-        r2 = np.stack((x2 - ay * w1 - ax * w * w, y2 + ax * w1 - ay * w * w), axis=-1)
-        return r, r1, r2
+        return r, r1, np.stack((x2 - ay * w1 - ax * w * w, y2 + ax * w1 - ay * w * w), axis=-1)
 
     def length(self, pair: Sequence[str]) -> Triple:
         """Distance of two points with two derivatives, shape (..., position) [m]."""

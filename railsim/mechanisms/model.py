@@ -255,8 +255,7 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
         angle = float(np.arctan2(dy, dx))
         same = cam.arcs[i].turns == cam.arcs[i + 1].turns
         here = angle + (np.pi if same and real(radii[i]) < real(radii[i + 1]) else 0.0)
-        there = here if same else here + np.pi
-        shared.append((here, there))
+        shared.append((here, here if same else here + np.pi))
     found = []
     for i, arc in enumerate(cam.arcs):
         turn = 1.0 if arc.turns == "left" else -1.0

@@ -109,8 +109,7 @@ def _gas_spring(
         factor, constant = (n(x) for x in row.extended)
         longest, shortest = lengths.most + unlock, lengths.least * (1.0 + ROUNDING)
         long = (c for c in strokes if factor * c + constant >= longest * (1.0 - ROUNDING))
-        fitting = (c for c in long if (factor - 1.0) * c + constant <= shortest)
-        stroke = next(fitting, None)
+        stroke = next((c for c in long if (factor - 1.0) * c + constant <= shortest), None)
         if stroke is None:
             least, most = lengths.least * 1e3, lengths.most * 1e3
             why.append(f"{least:.1f} to {most:.1f} mm is no range of its lengths")

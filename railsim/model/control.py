@@ -138,8 +138,7 @@ class _Wiring:
             w = self._number(index.wheelsets, signal.wheelset, f"{key}.wheelset", "wheelset")
             if quantity == "wheel_speed":
                 return kernel.WHEEL_SPEED, int(self._model.system.contact.body[w]), 0, 0
-            column = W_Q if quantity == "Q" else W_Y
-            return kernel.WHEEL, w, int(signal.side == "right"), column
+            return kernel.WHEEL, w, int(signal.side == "right"), W_Q if quantity == "Q" else W_Y
         if quantity in OF_RUN:
             return kernel.TRAVEL, 0, 0, OF_RUN[quantity]
         return (kernel.CURVATURE if quantity == "curvature" else kernel.CANT), 0, 0, 0

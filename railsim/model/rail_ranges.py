@@ -72,8 +72,7 @@ PLAIN = RailRanges((), np.zeros((0, 0, 2), dtype=np.int64), np.zeros((0, 2)))
 def _one_after_another(values: list[Floats]) -> Floats:
     if len(values) == 1:
         return values[0]
-    empty = np.zeros((0, N_PATCH, 2, 2, 2, N_FIELD))
-    joined = np.concatenate(values) if values else empty
+    joined = np.concatenate(values) if values else np.zeros((0, N_PATCH, 2, 2, 2, N_FIELD))
     joined.setflags(write=False)  # as on disk
     return joined
 

@@ -171,8 +171,7 @@ def static_loads(
     model = assemble(vehicle, track, settings or Settings(), profiles)
     balance = equilibrium(model, SLOW)
     model = balance.model
-    tensions = np.array(model.system.links.spring[:, 2:])
-    preload = dict(zip(model.index.links, tensions, strict=True))
+    preload = dict(zip(model.index.links, np.array(model.system.links.spring[:, 2:]), strict=True))
     preload |= dict(zip(model.index.mounts, nominal_forces(model.system.mounts), strict=True))
     springs, stops = _springs_and_stops(model, balance.state)
     return StaticLoads(

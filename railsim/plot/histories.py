@@ -105,8 +105,7 @@ def _figure(
             if not (i + 1 < rows and grid[i + 1][j] is not None):
                 axes[i, j].set_xlabel(result.quantities[over].label)
                 axes[i, j].tick_params(labelbottom=True)
-    drawn = [panel for row in grid for panel in row if panel is not None]
-    handles = _legend(result, drawn, by)
+    handles = _legend(result, [panel for row in grid for panel in row if panel is not None], by)
     if handles:
         figure.legend(handles=handles, loc="outside lower left", ncols=4 if columns == 1 else 6)
     return figure

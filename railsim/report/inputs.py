@@ -147,8 +147,7 @@ def _inputs(inputs: Mapping[str, Any]) -> Table:
     for key, value in inputs.items():
         if value in (None, [], {}, False, "", ()) or key in ("folder", "name"):
             continue
-        parts = value.items() if isinstance(value, dict) else [("", value)]
-        for name, part in parts:
+        for name, part in value.items() if isinstance(value, dict) else [("", value)]:
             values = [v for v in (part if isinstance(part, list) else [part]) if v is not None]
             if not values:
                 continue

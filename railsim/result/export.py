@@ -143,8 +143,7 @@ def _smooth(result: Result, name: str, rate: float) -> Floats:
 
 
 def _at(instants: Floats, time: Floats, values: Floats) -> Floats:
-    series = values.reshape(len(time), -1).T
-    found = np.array([np.interp(instants, time, one) for one in series])
+    found = np.array([np.interp(instants, time, one) for one in values.reshape(len(time), -1).T])
     return found.T.reshape(len(instants), *values.shape[1:])
 
 

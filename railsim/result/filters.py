@@ -196,8 +196,7 @@ def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floa
     """
     summed = integral(s, x)
     high = _integral_at(s, x, summed, centres + 0.5 * length)
-    low = _integral_at(s, x, summed, centres - 0.5 * length)
-    return (high - low) / length
+    return (high - _integral_at(s, x, summed, centres - 0.5 * length)) / length
 
 
 def window_centres(begin: float, end: float, length: float, step: float) -> Floats:

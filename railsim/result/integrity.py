@@ -54,8 +54,7 @@ def sealed(path: Path) -> bool:
         found = _SEAL.fullmatch(file.read())
     if not found:
         return False
-    stated = int(found[1], 16), int(found[2])
-    if stated != _crc_of(path, size - _SEAL_BYTES):
+    if (int(found[1], 16), int(found[2])) != _crc_of(path, size - _SEAL_BYTES):
         raise input_error(str(path), "its bytes are not those of its seal", REMEDY)
     return True
 

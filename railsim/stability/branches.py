@@ -113,8 +113,7 @@ class Limit:
 
 def far_apart(one: float, other: float) -> bool:
     """Whether two amplitudes may belong to different motions."""
-    share = DROP if abs(one - other) > SMALLEST_JUMP else DEATH
-    return min(one, other) < share * max(one, other)
+    return min(one, other) < (DROP if abs(one - other) > SMALLEST_JUMP else DEATH) * max(one, other)
 
 
 def lowest_of(branches: Sequence[Branch]) -> Point | None:

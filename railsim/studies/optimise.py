@@ -342,15 +342,11 @@ def _difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str
     {'a': {'c': [1, 3]}, 'd': {'e': 4}}
     """
     found: dict[str, Any] = {}
-    for key, value in after.items():
+    for key, new in after.items():
         old = before.get(key)
-        if value == old:
+        if new == old:
             continue
-        if (
-            isinstance(value, dict)
-            and isinstance(old, dict)
-            and value.get("kind") == old.get("kind")
-        ):
-            value = _difference(old, value)
-        found[key] = value
+        if isinstance(new, dict) and isinstance(old, dict) and new.get("kind") == old.get("kind"):
+            new = _difference(old, new)
+        found[key] = new
     return found

@@ -89,8 +89,7 @@ class Alignment:
 
     def grade_angle_rate(self, s: ArrayLike) -> Floats:
         """Derivative of the grade angle along the track [rad/m]."""
-        gradient = self._gradient(s)
-        climb_rate = self._gradient.rate(s) / (1.0 + gradient**2) ** 1.5
+        climb_rate = self._gradient.rate(s) / (1.0 + self._gradient(s) ** 2) ** 1.5
         climb_rate += 0.5 * self._lifting_cant.second_rate(s)
         return climb_rate / np.sqrt(1.0 - self._climb(s) ** 2)
 

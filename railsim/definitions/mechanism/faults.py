@@ -112,12 +112,11 @@ def _parameter_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 def _reference_faults(mechanism: Mechanism) -> Iterator[Fault]:
     """Names that mean nothing; where there are none, parts that do not suit each other."""
-    gas_springs = [k for k, part in mechanism.elements.items() if isinstance(part, GasSpring)]
     allowed: dict[str, Any] = {
         "point": point_names(mechanism),
         "body": ["ground", *mechanism.bodies],
         "actuator": mechanism.actuators,
-        "gas spring": gas_springs,
+        "gas spring": [k for k, part in mechanism.elements.items() if isinstance(part, GasSpring)],
         "catalogue": mechanism.catalogues,
     }
     faults = []
