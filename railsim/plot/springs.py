@@ -105,8 +105,8 @@ def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
             axes.plot(d * 1e3, n, color=colour, label=label)
             axes.plot(1e3 * wires, [row["active_coils"] for row in rows], ".", color=colour, ms=5)
         if spring.wire_diameter is not None and spring.active_coils is not None:
-            built = spring.wire_diameter * 1e3
-            axes.plot(built, spring.active_coils, "o", mfc="w", mec=colour, ms=8)
+            wire = spring.wire_diameter * 1e3
+            axes.plot(wire, spring.active_coils, "o", mfc="w", mec=colour, ms=8)
     axes.plot([], [], "o", mfc="w", mec="0.3", ms=8, label="built")
     axes.axhline(3.0, color=LIMIT, lw=0.9, ls=":", label="3 coils (EN 13906-1, hot coiled)")
     axes.set(xlabel="wire diameter $d$ (mm)", ylabel="active coils $n$", ylim=(0.0, 12.5))
