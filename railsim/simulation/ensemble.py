@@ -147,7 +147,9 @@ def joined_system(models: Sequence[Model]) -> System:
     offset = np.unique(np.concatenate([system.frame_offset for system in systems]))
 
     def starts(name: str) -> Integers:
-        return _joined_starts([getattr(system, name).start for system in systems])
+        # first points of the tables of one system after the other, and the end
+        counts = [np.diff(getattr(system, name).start) for system in systems]
+        return np.concatenate([[0], np.cumsum(np.concatenate(counts))])
 
     # track and rails are those of all; vehicles with actuators, signals or laws run alone
     return systems[0]._replace(
@@ -290,11 +292,6 @@ def _joined(groups: Sequence[Group], **shifts: Integers) -> Group:
         )
     )
     return joint
-
-
-def _joined_starts(starts: Sequence[Integers]) -> Integers:
-    """First points of tables of several groups, one group after the other, and the end."""
-    return np.concatenate([[0], np.cumsum(np.concatenate([np.diff(start) for start in starts]))])
 
 
 def _starts(lengths: Iterable[int]) -> Integers:

@@ -48,7 +48,13 @@ from railsim.model.assembly import Model
 from railsim.model.check_rails import CheckRails, standing_at
 from railsim.model.equilibrium import Equilibrium, initial_state
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
-from railsim.simulation import auxiliary_track
+from railsim.simulation.auxiliary_track import (
+    DOING,
+    NEGLIGIBLE,
+    Progress,
+    advance,
+    curve_to_settle_in,
+)
 from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.tables import track_tables
 
@@ -66,7 +72,7 @@ def start_state(
     start: float,
     step: float,
     scheme: int,
-    progress: auxiliary_track.Progress | None = None,
+    progress: Progress | None = None,
     remark: Callable[[str], None] | None = None,
 ) -> Floats:
     """State of the undisturbed vehicle at time 0 and exactly at `start`, float64[n_state].
@@ -241,11 +247,12 @@ def _run(
     scheme: int,
     start: float,
     where: str,
-    progress: auxiliary_track.Progress | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
-    auxiliary_track.DOING.info("on the way to the start")
-    if auxiliary_track.advance(model, system, state, step, steps, scheme, progress) != RUNNING:
+    DOING.info("on the way to the start")
+    status = advance(model, system, state, step, steps, scheme, progress)
+    if status != RUNNING:
         words = f"the vehicle does not stay on the track at s = {start:g} m, "
         found = f"{words}{where}, at {state[SPEED]:g} m/s"
         raise argument_error("start", found, "a start on straight track or a lower speed")
@@ -256,8 +263,8 @@ def _curve(track: Track, s: float) -> tuple[float, float]:
     alignment = alignment_of(track)
     curvature, cant = float(alignment.curvature(s)), float(alignment.cant(s))
     return (
-        curvature if abs(curvature) >= auxiliary_track.NEGLIGIBLE else 0.0,
-        cant if abs(cant) >= auxiliary_track.NEGLIGIBLE else 0.0,
+        curvature if abs(curvature) >= NEGLIGIBLE else 0.0,
+        cant if abs(cant) >= NEGLIGIBLE else 0.0,
     )
 
 
@@ -298,7 +305,7 @@ def settled(
     track: Track,
     start: float,
     step: float,
-    progress: auxiliary_track.Progress | None = None,
+    progress: Progress | None = None,
 ) -> Floats | None:
     """State of a vehicle that has settled into the curve at `start`, None on straight track.
 
@@ -310,7 +317,7 @@ def settled(
     if not (curvature or cant):
         return None
     speed = float(balance.state[SPEED])
-    auxiliary = auxiliary_track.curve_to_settle_in(
+    auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
     there = without_loads(model.system)
