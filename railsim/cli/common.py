@@ -135,8 +135,7 @@ def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["
     if isinstance(definition, Track):
         from railsim.track.irregularity import measured_remarks
 
-        texts = measured_remarks(definition)
-        found = [*found, *(Remark("irregularities", text) for text in texts)]
+        found = [*found, *(Remark("irregularities", text) for text in measured_remarks(definition))]
     if isinstance(definition, Vehicle | Track):
         from railsim.laws.permission import refused
 

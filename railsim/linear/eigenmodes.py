@@ -259,8 +259,7 @@ def _least_damped(
     Where no mode counts, the least damped of those that decay.
     """
     inside = _searched(modes.eigenvalues)
-    order = inside[np.argsort(-modes.eigenvalues[inside].real)]
-    ordered = [modes.taken([int(k)]) for k in order]
+    ordered = [modes.taken([int(k)]) for k in inside[np.argsort(-modes.eigenvalues[inside].real)]]
     if counts is not None:
         ordered = [m for m in ordered if m.eigenvalues[0].real < 0.0 or counts(m)] or ordered
     return ordered[0]

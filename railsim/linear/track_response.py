@@ -135,8 +135,8 @@ def track_response(
             for order, step in enumerate(STEPS):
                 ends = []
                 for sign in (1.0, -1.0):
-                    shape = np.zeros(4)  # (v - u)^order / order! over v, by rising powers
-                    shape[: order + 1] = ([1.0], [-u, 1.0], [0.5 * u * u, -u, 0.5])[order]
+                    shape = np.zeros(4)
+                    shape[: order + 1] = _power(order, u)
                     rail[cell] = smooth
                     rail[cell, :4] += sign * step * np.outer(shares, shape)
                     ends.append(evaluated(x))
@@ -186,6 +186,11 @@ def _forces_of(system: System, before: int) -> Floats:
             own[Q + 2 * count, w, 0] = -0.5 * mass
         own[before + 4 * count + w, w, 0] = -mass
     return own
+
+
+def _power(order: int, u: float) -> Floats:
+    """Coefficients of (v - u)^order / order! over v, by rising powers."""
+    return np.array(([1.0], [-u, 1.0], [0.5 * u * u, -u, 0.5])[order])
 
 
 def _readings(

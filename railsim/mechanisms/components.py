@@ -95,8 +95,7 @@ def _interval(grid: Any, x: Any) -> tuple[Any, Any]:
     k = np.clip(below, 0, grid.shape[-1] - 2)
     low, high = (np.take_along_axis(grid, i[..., None], -1)[..., 0] for i in (k, k + 1))
     share = (x - low) / (high - low)
-    inside = (np.real(share) >= -EDGE) & (np.real(share) <= 1.0 + EDGE)
-    return k, np.where(inside, share, np.nan)
+    return k, np.where((np.real(share) >= -EDGE) & (np.real(share) <= 1.0 + EDGE), share, np.nan)
 
 
 @dataclass(frozen=True)

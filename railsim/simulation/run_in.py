@@ -251,8 +251,7 @@ def _run(
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
     DOING.info("on the way to the start")
-    status = advance(model, system, state, step, steps, scheme, progress)
-    if status != RUNNING:
+    if advance(model, system, state, step, steps, scheme, progress) != RUNNING:
         words = f"the vehicle does not stay on the track at s = {start:g} m, "
         found = f"{words}{where}, at {state[SPEED]:g} m/s"
         raise argument_error("start", found, "a start on straight track or a lower speed")

@@ -249,10 +249,9 @@ def wear_rows(
     rails = load_profile(track.rail[0]), load_profile(track.rail[1])
     rows = []
     for distance, worn, lost in since_new(found, WHEEL):
-        geometry = contact_geometry(
+        (conicity,) = contact_geometry(
             worn, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
-        )
-        (conicity,) = geometry.equivalent_conicity([AMPLITUDE])
+        ).equivalent_conicity([AMPLITUDE])
         rows.append({
             **row(distance, worn, lost),
             "equivalent_conicity": float(conicity) if math.isfinite(conicity) else None,
