@@ -23,6 +23,8 @@ LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
 STICK, HELD = "#2a6f97", "stick; elsewhere slip"
 DIRECTION = "direction of the traction on the rail"
 KEY = 0.3  # inch, for the key of the traction
+Laws = Sequence[CreepLawName]
+Cells = tuple[int, int]
 LARGEST = 5.0  # end of the axis of normalised creepage
 
 
