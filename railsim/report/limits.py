@@ -68,7 +68,7 @@ def assessed(results: Mapping[str, Result]) -> tuple[list[tuple[str, str]], Sect
         words = f"{one.vehicle}, {edition}: {one.verdict} ({parts})."
         verdicts.append((KINDS.get(one.verdict, OPEN), words))
         found.tables.append(_reasons(one))
-        found.details += [_conditions(one), _sections(one), *_rows(one)]
+        found.details += [_conditions(one), _sections(one), *_track(one), *_rows(one)]
         found.details += [_influences(one)] if one.influences else []
         if any(one.transitions.values()):
             found.details.append(of_values(transition_table(one), f"Transitions: {one.vehicle}"))
@@ -146,29 +146,36 @@ def _conditions(one: Assessment) -> Table:
 
 def _sections(one: Assessment) -> Table:
     header = ["run", "zone", "from (m)", "to (m)", "R (m)", "I (mm)", "speed (m/s)",
-              "alignment (mm)", "level (mm)", "conicity", "quality", "D2, D3 (mm)",
-              "single defects (mm)", "not counted"]  # fmt: skip
+              "alignment (mm)", "level (mm)", "conicity", "quality", "not counted"]  # fmt: skip
     rows = [
         [
             row.run, s.zone, f"{s.begin:.0f}", f"{s.end:.0f}",
             "straight" if math.isinf(s.radius) else f"{s.radius:.0f}",
             f"{1e3 * s.cant_deficiency:.0f}", f"{s.speed:.2f}", f"{1e3 * row.alignment:.2f}",
             f"{1e3 * row.level:.2f}", "" if math.isnan(row.conicity) else f"{row.conicity:.2f}",
-            row.quality, *_further(row.further), "" if row.counts else s.reason or "no zone",
+            row.quality, "" if row.counts else s.reason or "no zone",
         ]
         for row in one.sections
         for s in [row.section]
     ]  # fmt: skip
-    return Table(header, rows, f"Sections: {one.vehicle}", (0, 10, 11, 12, 13))
+    return Table(header, rows, f"Sections: {one.vehicle}", (0, 10, 11))
 
 
-def _further(values: Mapping[str, Any]) -> list[str]:
-    """Alignment / level in D2 and D3, and the largest in D1 with their class."""
-    if not values:
-        return ["", ""]
-    texts = [f"{1e3 * value:.1f}" for value in values.values() if not isinstance(value, str)]
-    d2, d3, largest = (" / ".join(texts[k : k + 2]) for k in (0, 2, 4))
-    return [f"{d2}, {d3}", f"{largest}, {values['defects']}"]
+def _track(one: Assessment) -> list[Table]:
+    """Standard deviations in D2 and D3, and the largest deviation in D1 with its class."""
+    texts = {"largest": "largest in D1", "defects": "single defects"}
+    measured = [row for row in one.sections if row.further]
+    header = ["run", "from (m)", "to (m)"]
+    for key in measured[0].further if measured else ():
+        words = " ".join(texts.get(part, part) for part in key.split("_"))
+        header.append(words if key == "defects" else f"{words} (mm)")
+    rows = [
+        [row.run, f"{row.section.begin:.0f}", f"{row.section.end:.0f}"]
+        + [x if isinstance(x, str) else f"{1e3 * x:.1f}" for x in row.further.values()]
+        for row in measured
+    ]
+    caption = f"Track of the sections in D2, D3 and single defects: {one.vehicle}"
+    return [Table(header, rows, caption, (0, len(header) - 1))] if rows else []
 
 
 def _rows(one: Assessment) -> list[Table]:
