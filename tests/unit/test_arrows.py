@@ -57,5 +57,5 @@ def test_every_type_that_is_drawn_has_a_method_plot(name):
 
 
 def test_what_nothing_draws_is_refused():
-    with pytest.raises(TypeError, match="a dict cannot be plotted; .*CriticalSpeed"):
+    with pytest.raises(TypeError, match=r"a dict cannot be plotted; .*CriticalSpeed"):
         plot({})
