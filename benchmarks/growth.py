@@ -70,7 +70,7 @@ def evaluation(vehicle: Vehicle, settings: Settings) -> dict[str, Any]:
     time = least_time(
         lambda: loops.many_mechanics(system, work, state, derivative, CALLS), 100, CALLS
     )
-    patches = loops.many_normal_contacts(system, work, state, derivative, 1)
+    patches = loops.many_mechanics(system, work, state, derivative, 1)
     return {
         "wheelsets": len(prepared.model.index.wheelsets),
         "patches": patches,
