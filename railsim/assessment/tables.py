@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -52,13 +53,13 @@ def transition_table(assessment: Assessment) -> Table:
                 largest[name] = max(largest.get(name, found), found, key=lambda row: row[0])
     number = sum(map(len, assessment.transitions.values()))
     head = f"{number} transition{'s' * (number > 1)}, in no statistics"
-    rows = [
-        [c.words, place, c.unit, c.text(value), run, f"{s.begin:.0f} to {s.end:.0f}", s.radius]
-        for name, (value, place, run, s) in largest.items()
-        for c in [CRITERIA[name]]
-    ]
+    rows = []
+    for name, (value, place, run, s) in largest.items():
+        c, radius = CRITERIA[name], "reverse" if math.isinf(s.radius) else f"{s.radius:.0f}"
+        part = f"{s.begin:.0f} to {s.end:.0f}"
+        rows.append([c.words, place, c.unit, c.text(value), run, part, radius])
     columns = [Column("quantity", head), *map(Column, ("location", "unit", "largest", "run")),
-               Column("part", unit="m"), Column("radius", "R", "m", ".0f")]  # fmt: skip
+               Column("part", unit="m"), Column("radius", "R", "m")]  # fmt: skip
     return Table(columns, rows)
 
 

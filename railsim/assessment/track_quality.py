@@ -7,6 +7,7 @@ standard deviations, and single defects, the largest deviation in D1.
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -79,13 +80,18 @@ class TrackQuality:
         }  # fmt: skip
 
 
+def _at_speed(table: Sequence[tuple[Any, ...]], speed: float) -> tuple[Any, ...]:
+    """Row of `QN` or `DEFECTS` for a speed [m/s]."""
+    return next((row for row in table if 3.6 * speed <= row[0] + 1e-3), table[-1])
+
+
 def defect_class(speed: float, alignment: float, level: float) -> str:
     """Class of the single defects of a section after UIC 518; arguments as of `quality_class` [m].
 
     >>> defect_class(40.0, 7e-3, 9e-3), defect_class(40.0, 10.5e-3, 9e-3)
     ('between QN1 and QN2', 'worse than QN3')
     """
-    _, first, second = next((row for row in DEFECTS if 3.6 * speed <= row[0] + 1e-3), DEFECTS[-1])
+    _, first, second = _at_speed(DEFECTS, speed)
     limits = (first, first), second, tuple(1.3 * value for value in second)
     over = [1e3 * alignment > of_y or 1e3 * level > of_z for of_y, of_z in limits]
     names = "better than QN1", "between QN1 and QN2", "between QN2 and QN3", "worse than QN3"
@@ -101,6 +107,6 @@ def quality_class(speed: float, alignment: float, level: float) -> str:
     >>> quality_class(40.0, 0.71e-3, 0.98e-3), quality_class(40.0, 1.21e-3, 1.61e-3)
     ('better than QN1', 'between QN1 and QN2')
     """
-    row = next((row for row in QN if 3.6 * speed <= row[0] + 1e-3), QN[-1])
+    row = _at_speed(QN, speed)
     over = [(1e3 * alignment > row[1][k]) or (1e3 * level > row[2][k]) for k in (0, 1)]
     return ("better than QN1", "between QN1 and QN2", "worse than QN2")[sum(over)]

@@ -131,7 +131,7 @@ def add_creep_forces(system, work, n, speed, state):
             across /= 1.0 + across * (c * c * y + s * s * z)
             contact_damping = damping + lag * patch[NORMAL_STIFFNESS, k]
             damping /= 1.0 + contact_damping * (s * s * y + c * c * z)
-        else:
+        else:  # over long steps, see `model.time_step`
             damping += stiff * patch[NORMAL_STIFFNESS, k]
         work.contact_jacobian[b, J_ALONG] += patch[SLOPE_ALONG, k]
         work.contact_jacobian[b, J_SECANT] += secant

@@ -161,7 +161,7 @@ def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     return Eigenmodes(modes.linearisation, values, shapes, left)
 
 
-def left_aside(modes: Eigenmodes) -> tuple[str, ...]:
+def divergence(modes: Eigenmodes) -> tuple[str, ...]:
     """Remark on an equilibrium that is left without an oscillation: a real lambda > 0."""
     still = modes.eigenvalues[np.abs(modes.frequencies) < SLOWEST].real
     growth = float(np.max(still, initial=0.0))

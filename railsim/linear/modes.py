@@ -17,9 +17,9 @@ from railsim.linear.eigenmodes import (
     SEARCHED,
     SLOWEST,
     Eigenmodes,
+    divergence,
     eigenmodes,
     followed,
-    left_aside,
 )
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
@@ -410,7 +410,7 @@ def _named(
         shown = (positions / largest if largest else positions).tolist()
         shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
         listed.append(Mode(name, complex(value), _participation(parts, shape), shapes))
-    remarks = (*prepared.remarks, *left_aside(found))
+    remarks = (*prepared.remarks, *divergence(found))
     about = remarks, parameter, prepared.name, prepared.place
     return Modes(speed, prepared.contact, tuple(listed), *about)
 

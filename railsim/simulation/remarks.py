@@ -284,8 +284,8 @@ def vibration(
     elif irregular:
         cause = "excited by the irregularities or sections of the rails"
     else:
-        by = "a check rail, or " * struck
-        cause = f"excited by {by}sliding friction in flange contact, on smooth rails"
+        by = "excited by a check rail, or" if struck else "self-excited by"
+        cause = f"{by} sliding friction in flange contact, on smooth rails"
     if not elastic:
         cause += "; the rails are rigid, [support] of the track makes them elastic"
     return (

@@ -19,8 +19,8 @@ from railsim.linear.eigenmodes import (
     SEARCHED,
     Eigenmodes,
     LossOfStability,
+    divergence,
     eigenmodes,
-    left_aside,
     loss_of_stability,
     oscillations,
 )
@@ -223,7 +223,10 @@ def _loss_of_hunting(
 def _linear(
     found: CriticalSpeed, prepared: LinearVehicle
 ) -> tuple[LinearLoss | None, float | None]:
-    """The linear critical speed; from which speed a mode is undamped as friction sticks [m/s]."""
+    """The linear critical speed; a remark where there is none, or where friction sticks.
+
+    Besides: from which speed another mode is undamped as long as friction sticks [m/s].
+    """
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
     def words(mode: Eigenmodes) -> str:
@@ -233,8 +236,8 @@ def _linear(
         )
 
     lost, stuck = _loss_of_hunting(prepared, low, high), None
-    found.left_aside = left_aside(eigenmodes(prepared.linearised(low)))
-    found.remarks += found.left_aside
+    found.divergence = divergence(eigenmodes(prepared.linearised(low)))
+    found.remarks += found.divergence
     if prepared.sticking:
         other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
         mode = other.modes[0]
@@ -452,10 +455,11 @@ def _conclude(
 ) -> None:
     """Find type and limits from all branches.
 
-    Where rest is unstable at the lower end, or nothing hunts where it becomes so: type not known.
+    Where rest is unstable at the lower end already, or nothing was seen to hunt where it becomes
+    so, the type is not known.
     """
     lowest, at = found.lowest, begins.parameter
-    already = begins.already or found.left_aside
+    already = begins.already or found.divergence
     if not found.nonlinear:
         return  # every method failed, as the remarks say
     if lowest is None:

@@ -78,7 +78,7 @@ class CriticalSpeed(Plottable):
     - `type`: whether anything hunts below the speed at which rest loses its stability, in the runs'
       own law; empty where it was not looked for, rest is unstable at the lower end already, or
       nothing was seen to hunt where it becomes so
-    - `left_aside`: remark on a rest that is left without an oscillation
+    - `divergence`: remark on a rest that is left without an oscillation
     - `unstable_at_low`: whether rest is unstable at the lower end, as linearised for `linear`
     - `onset`: how the small motions begin there, whatever else is possible
     - `amplitude_limit`, `instability_limit`: amplitude of 3 mm, and half the limit of the
@@ -95,7 +95,7 @@ class CriticalSpeed(Plottable):
     high: float = 0.0
     linear: LinearLoss | None = None
     unstable_at_low: bool = False
-    left_aside: tuple[str, ...] = ()
+    divergence: tuple[str, ...] = ()
     linear_over_amplitude: OverAmplitude | None = None
     nonlinear: dict[str, Point | None] = field(default_factory=dict)
     branches: list[Branch] = field(default_factory=list)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from railsim.linear.eigenmodes import (
+    divergence,
     eigenmodes,
     followed,
-    left_aside,
     loss_of_stability,
     oscillations,
 )
@@ -55,7 +55,7 @@ def test_a_wheelset_of_negative_conicity_leaves_the_middle(conicity):
     """Klingel: y'' = -conicity V^2 y/(r b): a wave, or a growth of V sqrt(-conicity/(r b))."""
     rate = conicity * 40.0**2 / (0.46 * 0.75)
     free = Linearisation(("y", "y'"), np.array([[0.0, 1.0], [-rate, 0.0]]), np.zeros(2), 40.0)
-    remarks = left_aside(eigenmodes(free))
+    remarks = divergence(eigenmodes(free))
     assert len(remarks) == (conicity < 0.0)
     assert all("grows by 13.6 1/s" in remark for remark in remarks)
 
