@@ -16,6 +16,7 @@ from railsim.assessment.record import Record
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.notation import SIDES
 from railsim.profiles import Profile
+from railsim.result.extremes import evaluated
 from railsim.track.irregularity import shown_displacement
 
 
@@ -127,24 +128,28 @@ class SafetyReport:
 
 
 def safety_report(record: Record) -> SafetyReport:
-    """Nadal, climb distance and overturning of a run with Q, Y_over_Q and positions."""
+    """Nadal, climb distance and overturning of a run with Q, Y_over_Q and positions.
+
+    As peaks, they leave out the run's start.
+    """
     record.need_quantities("safety")
-    result = record.result
+    result, rows = record.result, evaluated(record.result)
     track, wheels = result.track(), []
     flat = flatten(result.vehicle())
     wheelsets = [w.wheelset for w in flat.of_kind("wheelset") if w.wheelset]
-    quotient, s = result["Y_over_Q"], result["wheelset_distance"]
+    quotient, s = result["Y_over_Q"][rows], result["wheelset_distance"][rows]
     for w, wheelset in enumerate(wheelsets):
         for k, side in enumerate(SIDES):
             angle = flange_angle(result.profiles[wheelset.profile[k]])
             limit = nadal(angle, track.friction_at(s[:, w])[:, k])
-            climb = climb_distance(s[:, w], quotient[:, w, k], limit, _height(record, w, k))
+            height = _height(record, w, k)[rows]
+            climb = climb_distance(s[:, w], quotient[:, w, k], limit, height)
             unloaded = np.isnan(quotient[:, w, k])
             nearest = int(np.argmax(np.where(unloaded, -np.inf, quotient[:, w, k] / limit)))
             there = float(limit[nearest]), float(quotient[nearest, w, k])
             own = f"wheelset {w + 1} {side}", *there, climb.length, climb.begin, climb.rise
             wheels.append(WheelSafety(*own, bool(unloaded.any())))
-    Q = result["Q"]
+    Q = result["Q"][rows]
     most = {name: largest_overturning(Q[:, own]) for name, own in record.bogies.items()}
     return SafetyReport(tuple(wheels), most)
 

@@ -59,6 +59,7 @@ def command(
     cli.goes_with("--method bifurcation or all", method in ("bifurcation", "all"), "points")
     tried = method not in ("linear", "continuation")
     cli.goes_with("--method ramp, bifurcation or all", tried, "excitations")
+    cli.goes_with("--linearisation harmonic", how["linearisation"] == "harmonic", "amplitude")
     output.reserve(*FILES)
     inputs, ranges = given.inputs(), _ranges(conicity, friction, over)
     how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))

@@ -5,12 +5,13 @@ import keyword
 import re
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import argument_error, input_error, nearest, optional_package
+from railsim.errors import argument_error, changed_faults, input_error, nearest, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
 from railsim.plot.selection import panels
@@ -116,6 +117,8 @@ def _variables(
     vehicle: Vehicle, result: Result, signals: Sequence[str], wanted: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Return name, quantity, place in its array, unit and words of every output."""
+    with changed_faults(lambda fault: replace(fault, file="outputs", option="--outputs")):
+        panels(result, [one for one in wanted if one not in signals])  # all faults at once
     found: dict[str, dict[str, Any]] = {}
     for selection in wanted:
         if selection in signals:

@@ -47,6 +47,11 @@ def _checks(result: Analysis) -> Iterator[Check]:
     if result.contact is not None:
         note = "static contact force in the zone: the head must not come down"
         yield Check("contact_force", result.contact.least, 0.0, "above", "N", note)
+        assert definition.solve is not None
+        supply = getattr(definition.actuators[definition.solve.unknown], "supply_pressure", None)
+        if supply is not None:
+            note = "pressure held for the contact force against the supply pressure"
+            yield Check("held_pressure", result.contact.pressure, n(supply), "below", "Pa", note)
 
 
 def _forces(result: Analysis, unknown: Actuator) -> Iterator[Check]:

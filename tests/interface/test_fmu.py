@@ -244,7 +244,7 @@ def test_a_unit_as_controller_acts_one_period_late(active, track, tmp_path):
     [
         ({"inputs": ["pull"]}, "no actuator 'pull'; allowed: push"),
         ({"outputs": ["R"]}, "no quantity 'R'"),
-        ({"outputs": ["Q:9"]}, "no label '9'"),
+        ({"outputs": ["R", "Q:9"]}, "outputs: Q:9: no label '9'"),  # both are named
     ],
 )
 def test_wrong_variables_are_input_errors(active, track, tmp_path, change, words):

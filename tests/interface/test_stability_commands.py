@@ -299,6 +299,10 @@ def test_curving_over_a_grid(capsys, tmp_path):
             ["critical-speed", "coach_manchester", "--method", "linear", "--excitation", "0.002"],
             "--excitation goes with --method ramp, bifurcation or all",
         ),
+        (
+            ["critical-speed", "coach_manchester", "--amplitude", "0.003"],
+            "--amplitude goes with --linearisation harmonic",
+        ),
         (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
         (
             ["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"],

@@ -87,6 +87,7 @@ def test_checks_are_those_of_all_positions(result, seen):
         ("envelope.0", np.min(both[:, 1]), 0.1, "above"),
         ("envelope.0", np.max(both[:, 1]), 1.3, "below"),
         ("contact_force", np.min(contact), 0.0, "above"),
+        ("held_pressure", held / area, 0.7e6, "below"),
     ]
     found = checks(result)
     assert [(one.name, one.sense) for one in found] == [(row[0], row[3]) for row in wanted]
@@ -167,6 +168,12 @@ def test_the_supply_pressure_of_an_air_spring_is_a_limit():
         check = by_name(analyse(changed), "available_pressure")
         assert check.value == pytest.approx(0.48390e6, abs=50.0)
         assert check.ok == ok
+
+
+def test_no_pressure_above_the_supply_can_be_held():
+    for pressure, ok in ((0.59e6, True), (0.61e6, False)):
+        held = [f"parameters.held_pressure={pressure}", "parameters.supply_pressure=0.6e6"]
+        assert by_name(analyse(load_mechanism("atr95", held)), "held_pressure").ok == ok
 
 
 def test_a_force_that_the_search_allows_is_a_limit_of_a_cylinder_too():
