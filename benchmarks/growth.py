@@ -14,17 +14,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import loops
 import numpy as np
 import tomli_w
 from commands import run_command
-from parts import CALLS, least_time
+from parts import least_time
 
 from railsim import simulate
 from railsim.bench.machine import hardware, versions
 from railsim.definitions.loading import load_track, load_vehicle, load_vehicle_text
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.kernels.rhs import right_hand_sides
 from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 
@@ -34,6 +34,7 @@ RATES = (10.0, 200.0, 1000.0)
 LENGTHS = (5.0, 20.0, 50.0, 100.0)  # km
 COACH_LENGTH = 26.4  # m
 SPEED = 20.0
+EVALUATIONS = 200  # in a call, which takes a System apart in 10 us
 
 
 def train(coaches: int) -> Vehicle:
@@ -66,11 +67,13 @@ def evaluation(vehicle: Vehicle, settings: Settings) -> dict[str, Any]:
     """Time of one evaluation in steady rolling on straight track."""
     prepared = prepare(vehicle, load_track("straight"), settings, SPEED)
     system, state = prepared.model.system, prepared.state
-    work, derivative = work_arrays(system), np.zeros_like(state)
-    time = least_time(
-        lambda: loops.many_mechanics(system, work, state, derivative, CALLS), 100, CALLS
-    )
-    patches = loops.many_mechanics(system, work, state, derivative, 1)
+    work, states = work_arrays(system), np.tile(state, (EVALUATIONS, 1))
+    derivatives = np.zeros_like(states)
+
+    def evaluate() -> int:
+        return right_hand_sides(system, work, states, derivatives)[2]
+
+    time, patches = least_time(evaluate, 100, EVALUATIONS), evaluate()
     return {
         "wheelsets": len(prepared.model.index.wheelsets),
         "patches": patches,
