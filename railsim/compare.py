@@ -32,10 +32,11 @@ class Comparison:
 
     @property
     def differences(self) -> dict[str, float]:
-        """Relative difference of every magnitude from the first one's; nan if that is zero."""
+        """Relative difference of every magnitude from the first one's; nan if that is shown as 0."""
         sizes = {label: abs(peak.value) for label, peak in self.peaks.items()}
         first = next(iter(sizes.values()))
-        return {n: (size - first) / first if first > 0.0 else nan for n, size in sizes.items()}
+        zero = first * self.quantity.scale <= 0.5 * self.quantity.least
+        return {n: nan if zero else (size - first) / first for n, size in sizes.items()}
 
     def record(self) -> dict[str, Any]:
         """Return the comparison as plain numbers and strings, SI."""
