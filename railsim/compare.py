@@ -32,7 +32,7 @@ class Comparison:
 
     @property
     def differences(self) -> dict[str, float]:
-        """Relative difference of every magnitude from the first one's; nan if that is shown as 0."""
+        """Relative difference of every magnitude from the first; nan where that is shown as 0."""
         sizes = {label: abs(peak.value) for label, peak in self.peaks.items()}
         first = next(iter(sizes.values()))
         zero = first * self.quantity.scale <= 0.5 * self.quantity.least

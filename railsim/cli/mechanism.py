@@ -160,7 +160,6 @@ def _parts(
     results: Sequence["Analysis"], at: Sequence[list[dict[str, Any]]], optimum: "Optimum | None"
 ) -> "list[str | Table]":
     from railsim.mechanisms import tables
-    from railsim.mechanisms.comparison import compare
 
     parts: list[str | Table] = []
     if optimum is not None:
@@ -169,7 +168,7 @@ def _parts(
             parts += [table, ""]
     for number, (result, values) in enumerate(zip(results, at, strict=True)):
         parts += [*[""] * (number > 0), *_result_parts(result, values)]
-    return [*parts, "", tables.comparison_table(compare(results))] if len(results) > 1 else parts
+    return [*parts, "", tables.comparison_table(results)] if len(results) > 1 else parts
 
 
 def _result_parts(result: "Analysis", at: Sequence[dict[str, Any]]) -> "list[str | Table]":

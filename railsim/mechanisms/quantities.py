@@ -1,5 +1,7 @@
 """Names, units and meanings of a mechanism's results: tables, files and pictures take them here."""
 
+from collections.abc import Iterable
+
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.parts import HandTorque
 from railsim.table import Column
@@ -47,3 +49,9 @@ def quantity(name: str, definition: Mechanism) -> Column:
 def force_unit(actuator: str, definition: Mechanism) -> str:
     """Unit of the force, or torque, of an actuator."""
     return "N m" if isinstance(definition.actuators[actuator], HandTorque) else "N"
+
+
+def force_units(definitions: Iterable[Mechanism]) -> str:
+    """Unit of the unknown forces of mechanisms; where they differ, each of them."""
+    units = {force_unit(one.solve.unknown, one) for one in definitions if one.solve is not None}
+    return " or ".join(sorted(units)) or "N"

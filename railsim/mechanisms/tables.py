@@ -1,6 +1,7 @@
 """Results as tables and sentences in the field's units, for terminal, notebook and page."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,10 +9,11 @@ import numpy as np
 from railsim.definitions.mechanism.faults import bounds_remarks
 from railsim.design_checks import shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.contact import Contact, moved
 from railsim.mechanisms.dynamics import NEAR, driving
 from railsim.mechanisms.kinematics import folded
-from railsim.mechanisms.quantities import force_unit, quantity
+from railsim.mechanisms.quantities import force_unit, force_units, quantity
 from railsim.mechanisms.selection import Choice
 from railsim.mechanisms.summary import parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
@@ -38,8 +40,8 @@ SELECTION = [
     Column("sizes", "body/rod (mm)", format=">"),
     Column("progression", "p", "", ".2f"),
     Column("F1", "F1 (N)", format=">"),
-    Column("force", "unknown force (N)", format=">"),
-    Column("extreme", "over temperature and F1 (N)", format=">"),
+    Column("force", "unknown force (N), torque (N m)", format=">"),
+    Column("extreme", "over temperature and F1", format=">"),
 ]
 
 
@@ -205,10 +207,14 @@ def _contact_sentences(contact: Contact) -> list[str]:
     return found
 
 
-def comparison_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return one row for each mechanism of `compare`; the first is the reference of the error."""
-    unknown = {column.name: np.nan for column in COMPARISON}
-    return Table(COMPARISON, [{**unknown, **row} for row in rows])
+def comparison_table(results: Sequence[Analysis]) -> Table:
+    """Return one row for each mechanism; the first is the reference of the error."""
+    unknown, unit = (
+        {column.name: np.nan for column in COMPARISON},
+        force_units(r.definition for r in results),
+    )
+    columns = [replace(one, unit=unit) if one.unit == "N" else one for one in COMPARISON]
+    return Table(columns, [{**unknown, **row} for row in compare(results)])
 
 
 def optimum_sentences(optimum: "Optimum") -> list[str]:

@@ -23,7 +23,7 @@ from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.links import Course, actuators, links
-from railsim.mechanisms.quantities import force_unit, quantity
+from railsim.mechanisms.quantities import force_unit, force_units, quantity
 from railsim.plot import style
 from railsim.plot.point_names import name_points
 from railsim.text import unformatted
@@ -420,10 +420,11 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
             mark_zone(panels[0, column], first, way(first))
         panels[-1, column].set_xlabel(label_of(way(first), first))
     panels[0, 0].set_ylabel("ratio dy/dL")
-    panels[0, 1].set_ylabel("force (N)")
+    unit = force_units(one.definition for one in results.values())
+    panels[0, 1].set_ylabel(f"force ({unit})")
     if zoom:
         panels[1, 0].set_ylabel("ratio minus the first's")
-        panels[1, 1].set_ylabel("force minus the first's (N)")
+        panels[1, 1].set_ylabel(f"force minus the first's ({unit})")
     panels[0, 0].legend(fontsize=7.5)
     return figure
 

@@ -18,7 +18,6 @@ from railsim.design_checks import check_table
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
-from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.links import Course, actuators, links
@@ -308,7 +307,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         ]
     if len(collected.results) > 1:
         compared += shown(*(name for name in drawn if name.startswith("drawing_")))
-        rows = [tables.comparison_table(compare(collected.results))]
+        rows = [tables.comparison_table(collected.results)]
         sections.append(Section("Comparison", [], rows, compared))
     kinematics = shown("kinematics", "actuators", "angles", "cam")
     forces = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")

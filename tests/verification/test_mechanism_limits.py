@@ -14,7 +14,7 @@ from railsim.mechanisms.dynamics import free_motion
 from railsim.mechanisms.model import build
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
-from railsim.mechanisms.tables import published_table, sentences
+from railsim.mechanisms.tables import comparison_table, published_table, sentences
 from railsim.mechanisms.targets import positions
 from railsim.mechanisms.tolerance import scatter
 
@@ -411,6 +411,9 @@ mass = [50.0, 150.0]
     assert by_name(result)["available_force"].unit == "N m"
     assert {one.unit for one in scatter(result.definition)} == {"N m"}
     assert "981 N m" in str(published_table(result))
+    assert "largest force (N m)" in str(comparison_table([result, result]))
+    by_force = analyse(load_mechanism("tilting_one_spring"))
+    assert "largest force (N or N m)" in str(comparison_table([result, by_force]))
 
 
 def test_the_contact_force_counts_everywhere_in_the_zone(arm):
