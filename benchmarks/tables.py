@@ -20,7 +20,7 @@ RESULTS = ROOT / "benchmarks" / "results"
 sys.path.insert(0, str(ROOT / "docs"))
 from generators.filling import fill_page, table  # noqa: E402
 
-BENCH = ("loop", "parts", "fastsim_grids", "ensembles", "cores", "commands")
+BENCH = ("loop", "parts", "fastsim_grids", "cores", "commands")
 Row = list[str]
 
 

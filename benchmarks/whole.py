@@ -2,8 +2,8 @@
 
     python benchmarks/whole.py [--out bench.json] [--small]
 
-The runs of `railsim bench` and more; the parts of a step; FASTSIM over its grid; many runs in one
-call; one core and two; whole commands, cold and warm.  `--small` runs 10 m of each.
+The runs of `railsim bench` and more; the parts of a step; FASTSIM over its grid; one core and two;
+whole commands, cold and warm.  `--small` runs 10 m of each.
 """
 
 import argparse
@@ -15,7 +15,6 @@ from typing import Any
 
 from commands import commands
 from cores import SPIN, two_cores
-from ensembles import COACH_IN_CURVE, SIZES, ensembles
 from parts import GRIDS, REPETITIONS, fastsim_grids, right_hand_side_parts
 
 from railsim.bench.runs import benchmark, table
@@ -33,8 +32,6 @@ def measure(*, small: bool) -> dict[str, Any]:
     found = benchmark(runs, repetitions)
     found["parts"] = right_hand_side_parts(distance=until or 396.0, repetitions=of_parts)
     found["fastsim"] = fastsim_grids(GRIDS[:2] if small else GRIDS, repetitions=of_parts)
-    together = replace(COACH_IN_CURVE, until=until)
-    found["ensembles"] = ensembles((1, 3) if small else SIZES, repetitions, together)
     if small:
         return found
     found["two_cores"] = two_cores(4, STUDY, SPIN)
@@ -47,12 +44,7 @@ def tables(found: dict[str, Any]) -> list[Rows]:
     shown = [k for k, column in enumerate(runs.columns) if column.heading != "target"]
     header = [runs.columns[k].heading for k in shown]
     texts = [[runs.columns[k].text(row[k]) for k in shown] for row in runs.rows]
-    made = [
-        (header, texts),
-        _parts(found["parts"]),
-        _fastsim(found["fastsim"]),
-        _ensembles(found["ensembles"]),
-    ]
+    made = [(header, texts), _parts(found["parts"]), _fastsim(found["fastsim"])]
     if "two_cores" in found:
         made += [_two_cores(found["two_cores"]), _commands(found["commands"])]
     return made
@@ -86,21 +78,6 @@ def _fastsim(records: Sequence[dict[str, float]]) -> Rows:
         for record in records
     ]
     return ["FASTSIM", "us per patch, all at once", "us, one alone", "ns per cell"], rows
-
-
-def _ensembles(records: Sequence[dict[str, Any]]) -> Rows:
-    alone = records[0]
-    rows = [
-        [
-            str(record["members"]),
-            f"{record['real_time']:.0f}",
-            f"{record['real_time_best']:.0f}",
-            f"{1e6 * record['cpu_per_step']:.2f}",
-            f"{record['real_time'] / alone['real_time']:.2f}",
-        ]
-        for record in records
-    ]
-    return ["runs in one call", "x real time, all", "best", "us per step and run", "gain"], rows
 
 
 def _two_cores(found: dict[str, Any]) -> Rows:

@@ -103,10 +103,6 @@ LONG = frozenset(
         "test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white",
         "verification/test_compliant_rails.py::"
         "test_what_lateral_compliance_of_the_rails_costs[coach_flexicoil-7.1-1.5]",
-        "verification/test_ensemble.py::"
-        "test_one_speed_table_and_outputs_in_equal_steps_of_distance",
-        "verification/test_ensemble.py::test_runge_kutta",
-        "verification/test_ensemble.py::test_the_one_that_finds_no_step_on_the_way_fails_by_itself",
         "verification/test_linear_contact.py::"
         "test_a_run_from_the_modes_own_shape_decays_with_its_damping[6.0-coach_manchester]",
         "verification/test_hollow_wheels.py::"

@@ -69,13 +69,7 @@ def _is_number(text: str) -> bool:
 @cli.option("--out", "Folder.", "DIR", default="study")
 @cli.given_options()
 @cli.workers_option
-@cli.option(
-    "--together",
-    "Up to N runs that differ in the vehicle only in one call: same results, 15 to 20 % faster.",
-    "N",
-    cli.COUNT,
-    default=1,
-)
+@cli.option("--together", "Without effect since 2026-11-28.", "N", cli.COUNT, hidden=True)
 @cli.scheduler_option
 @cli.flag("--resume", "Continue the study in DIR; compute what has changed.")
 @cli.option("--keep", "all; summary: no result files; or quantities: Q,Y.", "WHAT", default="all")
@@ -111,7 +105,7 @@ def command(
       railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \\
           --grid track.friction=0.3,0.4,0.5 --out friction
       railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \\
-          --grid vehicle.bodies.carbody.mass=36e3,40e3,44e3,48e3 --together 8 --out mass
+          --grid vehicle.bodies.carbody.mass=36e3,40e3,44e3,48e3 --out mass
       railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """
@@ -119,7 +113,8 @@ def command(
     asked = {name: how.pop(name) for name in OF_FILE if name != "settings"}
     taken = {**asked, **kept, "keep": kept["keep"] != "all", "settings": given.settings}
     taken |= {"STUDY": file, "quantities": quantities, "plots": how["plots"], "vehicles": None}
-    taken["together"] = how["together"] > 1
+    if how.pop("together"):
+        output.remark("--together has no effect since 2026-11-28: it was no faster")
     named = [name for name, value in taken.items() if value]
     where = {name: how[name] for name in ("workers", "scheduler")}
     campaign: Callable[..., int] = partial(_campaign, taken=named, report=report, **where)

@@ -20,7 +20,7 @@ from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.steady import SteadyRolling, led
 from railsim.linear.system import Linearisation
-from railsim.model.assembly import Model, SharedTables, assemble, check_fixed
+from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import without_loads
 from railsim.profiles import Profile
@@ -146,7 +146,7 @@ class LinearVehicle:
         if self.contact.linearisation == "harmonic" and not held:
             self._path = ContactPath(self.contact.amplitude)
         rolling = (settings or Settings()).in_steady_rolling()
-        assembled = assemble(vehicle, circle(track, at=at), rolling, known, SharedTables())
+        assembled = assemble(vehicle, circle(track, at=at), rolling, known)
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0

@@ -4,7 +4,7 @@ Only `assemble` knows both sides: what a user wrote (bodies, elements with names
 and what the kernels read (arrays with indices).  `Index` keeps the way back.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,7 +44,6 @@ from railsim.kernels.system import (
     Support,
     System,
 )
-from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails
 from railsim.model.contact_laws import settings_creep_law, with_own_laws
 from railsim.model.element_arrays import ElementArrays, LawBlocks
@@ -125,32 +124,29 @@ def assemble(
     track: Track,
     settings: Settings,
     profiles: Mapping[str, Profile] | None = None,
-    shared: "SharedTables | None" = None,
+    make_table: Callable[..., ContactTable] | None = None,
 ) -> Model:
     """Build the arrays of one vehicle on one track.
 
     `vehicle`, `track`, `settings`: valid definitions; `profiles`: profiles by name that take
-    precedence over built-in ones and files (a result carries those that it used); `shared`: tables
-    of other models with the same track, settings and profiles; takes those made now. Raises
-    InputError: a profile cannot be read, a law is not permitted or cannot be compiled. TypeError:
-    something else than a vehicle, a track, profiles by name. ModelError: the wheels do not fit on
-    the rails.
+    precedence over built-in ones and files (a result carries those that it used); `make_table`:
+    instead of `cached_contact_table`. Raises InputError: a profile cannot be read, a law is not
+    permitted or cannot be compiled. TypeError: something else than a vehicle, a track, profiles by
+    name. ModelError: the wheels do not fit on the rails.
     """
     check_types([vehicle], track, settings=settings)
     flat = flatten(vehicle)
     given = _profiles_by_name(profiles)
     check_fixed(flat, track, settings.drive.mode)
-    shared = shared or SharedTables()
-    if shared.track is None:
-        shared.track = track_tables(track)
-    contact, tables, used = _contact(flat, track, settings, given, shared)
+    make_table = make_table or _tables_made_once()
+    contact, tables, used = _contact(flat, track, settings, given, make_table)
     contact = with_own_laws(contact, settings)
     if vehicle.laws:  # whose blocks the loop writes into: each model has its own
         system, index = _suspension(flat, vehicle.laws)
     else:
         system, index = kept(vehicle, "_suspension", lambda: _suspension(flat))
     system = system._replace(
-        track=shared.track,
+        track=track_tables(track),
         support=support_arrays(track.support, track.rail_base),
         contact=contact,
         drive=drive_arrays(settings.drive),
@@ -158,7 +154,7 @@ def assemble(
     design = None
     if vehicle.load is not None:
         unloaded = vehicle.model_copy(update={"load": None})
-        design = assemble(unloaded, track, settings, profiles, shared)
+        design = assemble(unloaded, track, settings, profiles, make_table)
     wheels = uneven_wheels(flat, track, used)
     check = check_rails(flat, track, used)
     rails = rail_ranges(flat, track, used, (tables, contact.table), settings.normal_contact)
@@ -297,20 +293,17 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
     return values
 
 
-class SharedTables:
-    """Tables of a track, once it is known, and of contacts by what they depend on beside it."""
+def _tables_made_once() -> Callable[..., ContactTable]:
+    """Return `cached_contact_table` that makes no table twice, also where there is no cache."""
+    made: dict[object, ContactTable] = {}
 
-    def __init__(self) -> None:
-        self.track: TrackTables | None = None
-        self.contact: dict[tuple[Any, ...], ContactTable] = {}
+    def table(wheel: Profile, rail: Profile, **how: Any) -> ContactTable:
+        key = wheel.key(), rail.key(), repr(how)
+        if key not in made:
+            made[key] = cached_contact_table(wheel, rail, **how)
+        return made[key]
 
-    def contact_table(
-        self, key: tuple[Any, ...], wheel: Profile, rail: Profile, **how: Any
-    ) -> ContactTable:
-        """Return `cached_contact_table`, once for what it depends on."""
-        if key not in self.contact:
-            self.contact[key] = cached_contact_table(wheel, rail, **how)
-        return self.contact[key]
+    return table
 
 
 def _profiles_by_name(profiles: Mapping[str, Profile] | None) -> dict[str, Profile]:
@@ -329,7 +322,7 @@ def _contact(
     track: Track,
     settings: Settings,
     profiles: dict[str, Profile],
-    shared: "SharedTables",
+    make_table: Callable[..., ContactTable],
 ) -> tuple[Contact, tuple[ContactTable, ...], dict[str, Profile]]:
     """Contact arrays, one table for each different wheel on its rail, and the profiles used."""
     used: dict[str, Profile] = {}
@@ -362,12 +355,11 @@ def _contact(
                 "widening": covered_widening(track.widest),  # auxiliary runs stand on plain track
             }
             of_wheel, of_rail = wheelset.profile[side], track.rail[side]
-            wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")
             key = (of_wheel, of_rail, *own.values())
-            table = shared.contact_table(key, wheel, rail, **own, **alike)
             if key not in keys:
                 keys[key] = len(tables)
-                tables.append(table)
+                wheel, rail = profile(of_wheel, "wheel"), profile(of_rail, "rail")
+                tables.append(make_table(wheel, rail, **own, **alike))
             which[w, side] = keys[key]
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")

@@ -136,18 +136,3 @@ def _range(
         plain=plain,
         normal=normal,
     )
-
-
-def joined(ranges: list[RailRanges]) -> RailRanges:
-    """Return those of several vehicles on one track as one."""
-    tables: list[ContactTable] = []
-    which = []
-    for one in ranges:
-        places = []
-        for table in one.tables:
-            found = [k for k, known in enumerate(tables) if known is table]
-            places.append(found[0] if found else len(tables))
-            if not found:
-                tables.append(table)
-        which.append(np.where(one.which >= 0, np.array([*places, -1])[one.which], -1))
-    return RailRanges(tuple(tables), np.concatenate(which, axis=1), ranges[0].ends)

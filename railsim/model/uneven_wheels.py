@@ -90,28 +90,6 @@ def rolling(system: System, wheels: UnevenWheels, check: CheckRails, rails: Rail
     return system._replace(contact=contact)
 
 
-def joined(wheels: list[UnevenWheels], counts: list[int]) -> UnevenWheels:
-    """Return those of several vehicles with some numbers of wheelsets as one."""
-    if not any(len(one.surface_of) for one in wheels):
-        return ROUND
-    surface_of, row = [], []
-    first = values = aheads = 0
-    for one, count in zip(wheels, counts, strict=True):
-        own = one.surface_of if len(one.surface_of) else np.full((count, 2, N_PATCH), -1)
-        surface_of.append(np.where(own >= 0, own + first, -1))
-        moved = one.surface_row.copy()
-        moved[:, :2] += (values, aheads)
-        row.append(moved)
-        first += len(moved)
-        values, aheads = values + len(one.surface), aheads + len(one.flat_ahead)
-    return UnevenWheels(
-        np.concatenate(surface_of),
-        np.concatenate(row),
-        np.concatenate([one.surface for one in wheels]),
-        np.concatenate([one.flat_ahead for one in wheels]),
-    )
-
-
 def longest_part(system: System, speed: float) -> float:
     """Longest part of a step in which a wheel passes a flat [s]; infinite without flats."""
     flat = min(system.contact.surface_row[:, FLAT], default=np.inf)

@@ -38,7 +38,7 @@ ARRAYS = ("time", "distance")
 DIMENSIONS = ("wheelset", "side", "body")
 NUMBERS = (
     "speed", "start", "duration", "evaluation_start", "requested_duration",
-    "requested_until", "step", "wall_time", "cpu_time", "real_time_factor", "runs_together",
+    "requested_until", "step", "wall_time", "cpu_time", "real_time_factor",
     "patches_evaluated", "patches_out_of_range", "hunting_frequency", "hunting_amplitude",
 )  # fmt: skip
 STATES = ("complete", "derailed", "stopped")

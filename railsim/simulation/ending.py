@@ -50,7 +50,6 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
         "scheme": settings.scheme,
         "wall_time": run.wall_time + time.perf_counter() - began,
         "cpu_time": run.cpu_time,
-        "runs_together": run.together,
         "patches_evaluated": int(run.events[0]),
         "patches_out_of_range": int(run.events[1]),
         "steps": int(run.parts[STEPS]),

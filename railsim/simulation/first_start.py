@@ -20,7 +20,7 @@ from railsim.kernels.compiler import PRIVATE
 from railsim.kernels.contact_table import N_FIELD, N_PATCH
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.model.assembly import SharedTables, assemble
+from railsim.model.assembly import assemble
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
 from railsim.processes import WorkerPool, available_cores
@@ -72,20 +72,17 @@ def _begun(stack: ExitStack) -> "Future[None] | None":
     return stack.enter_context(WorkerPool(1)).submit(compile_time_loop)
 
 
-class _NoTables(SharedTables):
-    """Empty contact tables: compiled code depends on their types alone."""
-
-    def contact_table(self, key: tuple[Any, ...], *_: Any, **how: Any) -> ContactTable:
-        values = np.zeros((N_PATCH, 2, 2, 2, N_FIELD))
-        numbers = 0.0, 1.0, 0.0, 1.0, np.zeros(2), 0.0, how["radius"], how["centre_height"]
-        return ContactTable(values, *numbers, how["G"], how["nu"])
+def _empty_table(*_: Any, **how: Any) -> ContactTable:
+    """Return an empty contact table: compiled code depends on its type alone."""
+    values = np.zeros((N_PATCH, 2, 2, 2, N_FIELD))
+    numbers = 0.0, 1.0, 0.0, 1.0, np.zeros(2), 0.0, how["radius"], how["centre_height"]
+    return ContactTable(values, *numbers, how["G"], how["nu"])
 
 
 def compile_time_loop() -> None:
     """Compile the equations of motion and the time loop by calls without states and steps."""
-    model = assemble(
-        load_vehicle("coach_manchester"), load_track("straight"), Settings(), shared=_NoTables()
-    )
+    coach, track = load_vehicle("coach_manchester"), load_track("straight")
+    model = assemble(coach, track, Settings(), make_table=_empty_table)
     system, work, state = model.system, work_arrays(model.system), np.zeros(model.n_state)
     right_hand_sides(system, work, state[None][:0], state[None][:0])
     recorder, stages = empty_recorder(model, 1), np.zeros((3, len(state)))

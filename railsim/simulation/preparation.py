@@ -13,7 +13,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import argument_error
 from railsim.kernels.controllers import START
 from railsim.kernels.state import TIME
-from railsim.model.assembly import SharedTables, assemble
+from railsim.model.assembly import assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import Equilibrium, stored_equilibrium
 from railsim.model.plausibility import gauge_remarks, vehicle_remarks
@@ -47,14 +47,13 @@ def prepare(
     duration: float | None = None,
     until: float | None = None,
     profiles: Mapping[str, Profile] | None = None,
-    shared: SharedTables | None = None,
     before: TakenUp | None = None,
     *,
     on_judgement: SettlingProgress | None = None,
     on_run_in: SettlingProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
-    balance, steps = _balanced(vehicle, track, settings, speed, profiles, shared, on_judgement)
+    balance, steps = _balanced(vehicle, track, settings, speed, profiles, on_judgement)
     model = balance.model
     step, _ = steps.at(speed)
     unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
@@ -98,12 +97,11 @@ def _balanced(
     settings: Settings,
     speed: float,
     profiles: Mapping[str, Profile] | None = None,
-    shared: SharedTables | None = None,
     on_judgement: SettlingProgress | None = None,
 ) -> tuple[Equilibrium, StepChoice]:
     """Return the model in its equilibrium, and what chooses its steps."""
     with compiled_beside():
-        model = assemble(vehicle, track, settings, profiles, shared)
+        model = assemble(vehicle, track, settings, profiles)
     inputs = inputs_hash(vehicle, track, settings, model)
     balance = stored_equilibrium(model, speed, inputs)
     known = {speed: balance.state}
@@ -147,7 +145,6 @@ def begin(
     sink: Sink,
     profiles: Mapping[str, Profile] | None,
     before: TakenUp | None,
-    shared: SharedTables,
     fraction: RunProgress,
 ) -> Run:
     """Prepare a run and tell its sink what will come."""
@@ -163,7 +160,6 @@ def begin(
         inputs.duration,
         inputs.until,
         profiles,
-        shared,
         before,
         on_judgement=fraction.of_judgement,
         on_run_in=fraction.of_run_in,

@@ -27,14 +27,13 @@ from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.laws import allowed
-from railsim.model.assembly import SharedTables
 from railsim.model.time_step import divide_strikes
 from railsim.model.uneven_wheels import longest_part
 from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
 from railsim.profiles import Profile
 from railsim.result import Hdf5Sink, MemorySink, Result, Sink
-from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, Convoy, SavedState, take_extremes
+from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, SavedState, TimeLoop, take_extremes
 from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.conditions import Inputs, check_numbers, own_speed, state_before
 from railsim.simulation.ending import end, verdict
@@ -104,20 +103,18 @@ class Simulation:
         if before is not None:
             speed, start = own_speed(before.motion, speed, start)
         inputs = Inputs.checked(track, settings, speed, start, duration, until)
-        self._fraction = RunProgress(progress, 1, inputs)
-        self._fraction.next_run()
+        self._fraction = RunProgress(progress, inputs)
         self._sink = sink or (MemorySink() if isinstance(record, bool) else Hdf5Sink(record))
         try:
             with allowed(allow_code):
-                how = profiles, before, SharedTables(), self._fraction
-                run = begin(vehicle, inputs, self._sink, *how)
+                run = begin(vehicle, inputs, self._sink, profiles, before, self._fraction)
         except BaseException:
             self._sink.abort()
             raise
         DOING.info("")
         self._vehicle, self._inputs, self._before, self._run = vehicle, inputs, before, run
         self._records = record is not False
-        self._convoy = Convoy([run], settings)
+        self._loop = TimeLoop(run, settings)
         self._whole = max(run.prepared.left(run.state), SHORTEST)
         self._phase, self._missing, self._behind, self._rows = 0, 0.0, 0.0, 0
         self._written = -math.inf
@@ -131,17 +128,17 @@ class Simulation:
     @property
     def time(self) -> float:
         """Time [s]."""
-        return float(self._convoy.state[TIME])
+        return float(self._loop.state[TIME])
 
     @property
     def distance(self) -> float:
         """Arc length of the reference body [m]."""
-        return float(self._convoy.state[ARC_LENGTH])
+        return float(self._loop.state[ARC_LENGTH])
 
     @property
     def speed(self) -> float:
         """Speed of the reference body [m/s]."""
-        return float(self._convoy.state[SPEED])
+        return float(self._loop.state[SPEED])
 
     @property
     def step_length(self) -> float:
@@ -170,7 +167,7 @@ class Simulation:
         run = copy(self._run)
         run.extremes = run.extremes.copy()
         if self._closed is None:
-            take_extremes(run.extremes, self._convoy.work.extremes)
+            take_extremes(run.extremes, self._loop.work.extremes)
         return verdict(run)
 
     @property
@@ -238,46 +235,46 @@ class Simulation:
 
     def _ahead(self) -> float:
         """Time of a good number of whole steps, fewer where the speed changes."""
-        return self._missing + self.step_length * (1 if self._convoy.varies else STEPS)
+        return self._missing + self.step_length * (1 if self._loop.varies else STEPS)
 
     def _to_the_end(self) -> None:
         """Advance to the end by the chunks of `simulate`."""
         self._flush()
         self._seen = None
 
-        def moved(_: object, state: Floats) -> None:
+        def moved(state: Floats) -> None:
             left = self._run.prepared.left(state)
-            self._fraction.of_runs(min(1.0, 1.0 - left / self._whole))
+            self._fraction.of_run(min(1.0, 1.0 - left / self._whole))
 
-        self._convoy.chunks(moved)
+        self._loop.to_the_end(moved)
         self._raise_error()
 
     def _left(self) -> float:
-        return self._run.prepared.left(self._convoy.state)
+        return self._run.prepared.left(self._loop.state)
 
     def _begin_interval(self) -> None:
         """Choose step and number of steps to the next output where the speed changes."""
-        convoy = self._convoy
-        if self._length == 0.0 or convoy.varies:
-            ((self._length, self._every),) = convoy.choices()
-            self._longest = longest_part(convoy.system, convoy.state[SPEED])
+        loop = self._loop
+        if self._length == 0.0 or loop.varies:
+            self._length, self._every = loop.choice() or (math.nan, 0)
+            self._longest = longest_part(loop.system, loop.state[SPEED])
             self._prepared_for = math.nan
-            self._goal = convoy.state[ARC_LENGTH] + (convoy.spacing or 0.0)
+            self._goal = loop.state[ARC_LENGTH] + (loop.spacing or 0.0)
 
     def _next(self) -> float:
         """Length of the next step of the grid [s]."""
-        convoy = self._convoy
+        loop = self._loop
         if self._phase == 0 and self._missing == 0.0:
             self._begin_interval()
-        if convoy.spacing is None or self._phase < self._every - 1 or self._run.ended:
+        if loop.spacing is None or self._phase < self._every - 1 or self._run.ended:
             return self._length
         # the last step of an interval of distance ends where the interval ends
-        s, v = convoy.state[ARC_LENGTH], convoy.state[SPEED]
-        return time_for(self._goal - s, v, convoy.derivative[SPEED])
+        s, v = loop.state[ARC_LENGTH], loop.state[SPEED]
+        return time_for(self._goal - s, v, loop.derivative[SPEED])
 
     def _part(self, most: float, whole: float) -> float:
         """Take whole steps, or a part of one, within a time `most` [s]; the time taken."""
-        convoy, every = self._convoy, self._every
+        loop, every = self._loop, self._every
         if self._missing > 0.0:
             taken = self._missing if self._missing <= most + SHARE * whole else most
             self._call(taken, 1, 1, NEVER)
@@ -288,15 +285,15 @@ class Simulation:
         if steps == 0:
             self._begun = self.state
             self._call(most, self._phase, 1, every)
-            self._missing, convoy.due = whole - most, False
+            self._missing, loop.due = whole - most, False
             return most
         steps = min(steps, STEPS, max(1, math.ceil(self._left() / whole * (1.0 - 1e-9))))
-        if convoy.varies:  # the last step of an interval of distance has its own length
-            one = int(convoy.spacing is not None and self._phase < every - 1)
+        if loop.varies:  # the last step of an interval of distance has its own length
+            one = int(loop.spacing is not None and self._phase < every - 1)
             steps = min(steps, every - self._phase - one)
         elif self._records:
             steps = min(steps, (ROWS - self._rows) * every - self._phase)
-        if not convoy.evaluates:
+        if not loop.evaluates:
             steps = min(steps, every - self._phase)
         taken = self._call(whole, self._phase, steps, every)
         self._on_grid(taken)
@@ -307,26 +304,26 @@ class Simulation:
         if steps:
             self._missing = 0.0
             self._phase = (self._phase + steps) % self._every
-            self._convoy.due = self._phase == 0
+            self._loop.due = self._phase == 0
             if self._phase == 0:
-                self._convoy.begin_evaluation()
+                self._loop.begin_evaluation()
             if self._rows >= ROWS:
                 self._flush()
 
     def _call(self, length: float, first: int, steps: int, every: int) -> int:
         """Call the time loop; the number of steps that it has taken."""
-        convoy, run = self._convoy, self._run
+        loop, run = self._loop, self._run
         if length != self._prepared_for:
-            divide_strikes(convoy.work, convoy.scheme, length, self._longest)
+            divide_strikes(loop.work, loop.scheme, length, self._longest)
             self._prepared_for = length
-        kept = convoy.work.vibration.copy() if length < self._length else 0.0  # of whole steps
+        kept = loop.work.vibration.copy() if length < self._length else 0.0  # of whole steps
         if not self._records:
             first, every = first + 1, NEVER
-        chunk = Chunk(first, steps, every, int(convoy.fresh), 0, self._rows)
-        run.status, run.where, taken, self._rows = convoy.loop(length, chunk)
-        convoy.fresh = convoy.fresh and taken == 0
+        chunk = Chunk(first, steps, every, int(loop.fresh), 0, self._rows)
+        run.status, run.where, taken, self._rows = loop.call_once(length, chunk)
+        loop.fresh = loop.fresh and taken == 0
         if length < self._length:
-            convoy.work.vibration[:] = kept
+            loop.work.vibration[:] = kept
         if run.status != RUNNING:
             self._flush()
         return int(taken)
@@ -334,8 +331,8 @@ class Simulation:
     def _flush(self) -> None:
         """Hand what has been recorded to the sink."""
         if self._rows:
-            self._written = float(self._convoy.ensemble.recorder.state[self._rows - 1, TIME])
-        self._convoy.write(self._rows)
+            self._written = float(self._loop.recorder.state[self._rows - 1, TIME])
+        self._loop.write(self._rows)
         self._rows = 0
 
     def _raise_error(self) -> None:
@@ -362,12 +359,12 @@ class Simulation:
             raise argument_error("actuator", found, allowed)
         if not math.isfinite(value):
             raise argument_error("value", f"found {value}", "a finite number")
-        convoy, number = self._convoy, names.index(actuator)
-        memory = convoy.work.memory
-        if value == memory[convoy.system.actuators.which[number, COMMAND]]:
+        loop, number = self._loop, names.index(actuator)
+        memory = loop.work.memory
+        if value == memory[loop.system.actuators.which[number, COMMAND]]:
             return
         plain = getattr(send, "py_func", send)
-        if not plain(convoy.system.actuators, memory, number, float(value), self.time):
+        if not plain(loop.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
             raise argument_error("actuator", found, "fewer commands", actuator)
         self._seen = self._begun = None
@@ -382,9 +379,9 @@ class Simulation:
         displacement, velocity : float64[wheelset, side, 2]
             Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
         """
-        if self._convoy.system.support.elastic:
+        if self._loop.system.support.elastic:
             raise argument_error("set_rails", "a track with a support", "rigid rails")
-        motion = self._convoy.work.rail_motion
+        motion = self._loop.work.rail_motion
         before = motion.copy()
         motion[..., :2], motion[..., 2:] = displacement, velocity
         if not np.array_equal(motion, before):
@@ -402,7 +399,7 @@ class Simulation:
         signals = self._run.prepared.model.index.signals
         values = self._present()
         if name in signals:
-            base = self._convoy.system.signals.which[signals.index(name), BASE]
+            base = self._loop.system.signals.which[signals.index(name), BASE]
             return float(self._probe[0].memory[base + VALUE])
         if name in values:
             value = np.asarray(values[name])
@@ -416,23 +413,23 @@ class Simulation:
         """Quantities at the present state, evaluated beside the loop."""
         if self._seen is not None:
             return self._seen
-        convoy, run, length = self._convoy, self._run, self.step_length
+        loop, run, length = self._loop, self._run, self.step_length
         if self._probe is None:
-            self._probe = work_arrays(convoy.system), run.plan.recorder(1)
-        (work, recorder), state = self._probe, convoy.state.copy()
-        work.memory[:] = convoy.work.memory
-        work.rail_motion[:] = convoy.work.rail_motion
-        divide_strikes(work, convoy.scheme, length, self._longest)
+            self._probe = work_arrays(loop.system), run.plan.recorder(1)
+        (work, recorder), state = self._probe, loop.state.copy()
+        work.memory[:] = loop.work.memory
+        work.rail_motion[:] = loop.work.rail_motion
+        divide_strikes(work, loop.scheme, length, self._longest)
         status, where, _, _ = time_loop(
-            convoy.system,
+            loop.system,
             work,
             state,
             np.zeros_like(state),
-            convoy.stages,
+            loop.stages,
             recorder,
-            convoy.scheme,
+            loop.scheme,
             length,
-            Chunk(0, 0, 1, int(convoy.fresh), 1),
+            Chunk(0, 0, 1, int(loop.fresh), 1),
         )
         if status != RUNNING:
             run.status, run.where = status, where
@@ -445,23 +442,23 @@ class Simulation:
     @property
     def state(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        saved, run = self._convoy.saved(), self._run
+        saved, run = self._loop.saved(), self._run
         grid = (self._phase, self._missing, self._behind, self._length, self._every, self._goal)
         return replace(saved, grid=(*grid, run.status, run.where, *saved.grid), begun=self._begun)
 
     @state.setter
     def state(self, saved: SavedState) -> None:
-        convoy = self._convoy
-        if saved.motion.shape != convoy.state.shape:
+        loop = self._loop
+        if saved.motion.shape != loop.state.shape:
             found = f"a state of {saved.motion.size} values"
-            allowed = f"{convoy.state.size} values, those of this vehicle and track"
+            allowed = f"{loop.state.size} values, those of this vehicle and track"
             raise argument_error("state", found, allowed)
-        recorded = convoy.ensemble.recorder.state[: self._rows, TIME]
+        recorded = loop.recorder.state[: self._rows, TIME]
         if self._records and saved.motion[TIME] < self._written + SHORTEST:
             found = "an instant before what is recorded already"
             raise argument_error("state", found, "record=False")
         self._rows = int(np.searchsorted(recorded, saved.motion[TIME] - SHORTEST))
-        convoy.restore(saved)
+        loop.restore(saved)
         self._phase, self._missing, self._behind, self._length, self._every, self._goal = (
             saved.grid[:6]
         )
@@ -471,14 +468,14 @@ class Simulation:
     def result(self) -> Result:
         """End the run where it is, and return its result."""
         if self._closed is None:
-            convoy = self._convoy
-            due = self._phase == 0 and self._missing == 0.0 and convoy.due
+            loop = self._loop
+            due = self._phase == 0 and self._missing == 0.0 and loop.due
             if due and self._records and self._run.status == RUNNING:
                 self._flush()
-                self._run.status, self._run.where, self._rows = convoy.last_record()
+                self._run.status, self._run.where, self._rows = loop.last_record()
             self._flush()
             self._raise_error()
-            convoy.give_back()
+            loop.give_back()
             self._closed = end(self._run, self._vehicle, self._inputs, self._before)
         return self._closed
 

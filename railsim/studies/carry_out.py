@@ -144,18 +144,13 @@ def _computed(
 ) -> Iterable[Record]:
     progress = execution.progress or (lambda _: None)
     if client is not None:
-        threads = sum(client.nthreads().values())
         execute.compile_on_cluster(client, remark)
-        return execute.on_cluster(
-            execute.batches(jobs, execution.together, max(1, threads)), client, progress
-        )
-    workers = execution.workers or available_cores()
-    work = execute.batches(jobs, execution.together, workers)
-    workers = min(workers, len(work))
+        return execute.on_cluster(jobs, client, progress)
+    workers = min(execution.workers or available_cores(), len(jobs))
     return (
-        execute.in_processes(work, workers, progress)
+        execute.in_processes(jobs, workers, progress)
         if workers > 1
-        else execute.in_this_process(work, progress)
+        else execute.in_this_process(jobs, progress)
     )
 
 

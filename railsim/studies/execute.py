@@ -1,13 +1,11 @@
 """Jobs over the cores of this machine, or over a dask cluster.
 
-Jobs come in batches, whose runs share a call; most batches hold one job.  A failed job becomes a
-record with the reason; the others continue.  On Ctrl-C running jobs are requested to stop and leave
-no files behind; a process that does not respond, because it is compiling, is killed after a
-moment.  Processes whose study has ended terminate by themselves.
+A failed job becomes a record with the reason; the others continue.  On Ctrl-C running jobs are
+requested to stop and leave no files behind; a process that does not respond, because it is
+compiling, is killed after a moment.  Processes whose study has ended terminate by themselves.
 """
 
 import logging
-import math
 import os
 import secrets
 import signal
@@ -20,7 +18,6 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -38,12 +35,12 @@ from railsim.simulation.first_start import compile_time_loop, is_compiled
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.records import Record
-from railsim.studies.run import can_share_a_call, run_case, run_cases
+from railsim.studies.run import run_case
 from railsim.studies.summary import failed_record, finished_record, waiting_record
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
-AHEAD = 8  # batches for each process that wait in its pool: each end takes a look at all of them
+AHEAD = 8  # jobs for each process that wait in its pool: each end takes a look at all of them
 ALWAYS_KEPT = ("time", "distance", "Q0")
 
 Progress = Callable[[float], None]
@@ -69,63 +66,28 @@ class Job:
         return self.keep == EVERYTHING and self.storage == PLAIN
 
 
-Batch = tuple[Job, ...]
-
-
 class Stopped(Exception):
     """The study was interrupted."""
 
 
-def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
-    """Group jobs that can share a call into batches of at most `together` jobs.
-
-    No batch is larger than the share of one worker in all jobs, so that no worker is idle.
-    """
-    size = min(together, math.ceil(len(jobs) / workers))
-    found: list[Batch] = []
-    alike: list[list[Job]] = []  # jobs that differ only in the vehicle
-    for job in jobs:
-        if size <= 1 or job.known is not None or not job.case.file_name:
-            found.append((job,))
-            continue
-        group = next((some for some in alike if can_share_a_call(some[0].case, job.case)), None)
-        if group is None:
-            group = []
-            alike.append(group)
-        group.append(job)
-    for group in alike:
-        parts = math.ceil(len(group) / size)
-        ends = [len(group) * part // parts for part in range(parts + 1)]
-        found += [tuple(group[begin:end]) for begin, end in pairwise(ends)]
-    return found
-
-
-def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
-    """Carry out the jobs of a batch and return their records, whether they succeed or fail."""
-    first = batch[0]
-    if not first.case.file_name:
-        return [_analysed(job) for job in batch]
-    if first.known is not None:
+def perform(job: Job, progress: Progress | None = None) -> Record:
+    """Carry out a job and return its record, whether it succeeds or fails."""
+    case = job.case
+    if not case.file_name:
+        return _analysed(job)
+    if job.known is not None:
         with suppress(RailsimError):  # its file lacks required quantities: it is run again
-            result = open_result(first.path)
-            return [finished_record(first.case, result, first.function, first.known)]
-    files = [job.path if job.whole else None for job in batch]
-    found: list[Result | Exception]
+            return finished_record(case, open_result(job.path), job.function, job.known)
+    # the quantities that records and files need
+    wants_all = job.function or case.analyses or job.picture
+    only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *job.keep}
+    file = job.path if job.whole else None
     try:
-        # the quantities that records and files need
-        wants_all = any(job.function or job.case.analyses or job.picture for job in batch)
-        only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *first.keep}
-        if len(batch) == 1:
-            found = [run_case(first.case, files[0], overwrite=True, progress=progress, only=only)]
-        else:
-            cases = [job.case for job in batch]
-            found = run_cases(cases, files, overwrite=True, progress=progress, only=only)
+        return _record(job, run_case(case, file, overwrite=True, progress=progress, only=only))
     except Stopped:
         raise
     except Exception as error:
-        found = [error] * len(batch)
-    found.reverse()  # each result is released after its record: it holds data read from its file
-    return [_record(job, found.pop()) for job in batch]
+        return failed_record(case, error)
 
 
 def _analysed(job: Job) -> Record:
@@ -144,19 +106,14 @@ def _analysed(job: Job) -> Record:
     return waiting_record(job.case) | facts
 
 
-def _record(job: Job, outcome: Result | Exception) -> Record:
-    """Draw the result of a job, and return its record, or the record of a failure."""
-    try:
-        if isinstance(outcome, Exception):
-            raise outcome
-        if job.picture is not None and len(outcome["time"]):
-            from railsim.plot.histories import histories
-            from railsim.plot.style import save
+def _record(job: Job, result: Result) -> Record:
+    """Draw the result of a job, and return its record."""
+    if job.picture is not None and len(result["time"]):
+        from railsim.plot.histories import histories
+        from railsim.plot.style import save
 
-            save(histories(outcome), job.picture, overwrite=True)
-        return {**finished_record(job.case, outcome, job.function), "file": _reduced(job, outcome)}
-    except Exception as error:
-        return failed_record(job.case, error)
+        save(histories(result), job.picture, overwrite=True)
+    return {**finished_record(job.case, result, job.function), "file": _reduced(job, result)}
 
 
 def _reduced(job: Job, result: Result) -> str:
@@ -171,58 +128,50 @@ def _reduced(job: Job, result: Result) -> str:
     return job.path.name
 
 
-def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:
-    """Carry out batches one after the other."""
-    done = 0.0
-    for batch, share in zip(batches, _shares(batches), strict=True):
+def in_this_process(jobs: Sequence[Job], progress: Progress) -> Iterator[Record]:
+    """Carry out jobs one after the other."""
+    for done, job in enumerate(jobs):
 
-        def tell(fraction: float, before: float = done, of: float = share) -> None:
-            progress(before + fraction * of)
+        def tell(fraction: float, before: int = done) -> None:
+            progress((before + fraction) / len(jobs))
 
-        yield from perform(batch, tell)
-        done += share
+        yield perform(job, tell)
 
 
-def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> Iterator[Record]:
-    """Carry out batches on several cores; records are returned as the batches end.
+def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Iterator[Record]:
+    """Carry out jobs on several cores; records are returned as the jobs end.
 
-    If the time loop has to be compiled, the first batch starts alone, so that it is compiled only
+    If the time loop has to be compiled, the first job starts alone, so that it is compiled only
     once.
 
     When a process dies (for instance killed for lack of memory), its pool ends with it; unfinished
-    batches start again in a new pool.  A batch whose process has died twice is abandoned.
+    jobs start again in a new pool.  A job whose process has died twice is abandoned.
     """
-    shares = _shares(batches)
-    todo = dict.fromkeys(range(len(batches)))
+    todo = dict.fromkeys(range(len(jobs)))
     deaths = Counter[int]()
     while todo:
-        done = sum(share for index, share in enumerate(shares) if index not in todo)
-
-        def tell(more: float, done: float = done) -> None:
-            progress(done + more)
-
-        pool = _Pool(batches, list(todo), workers)
-        for index, records in pool.outcomes(tell):
+        pool = _Pool(jobs, list(todo), workers)
+        for index, record in pool.outcomes(progress):
             del todo[index]
-            yield from records
+            yield record
         deaths.update(pool.lost)
         for index in [index for index in todo if deaths[index] > 1]:
             del todo[index]
             reason = "its process died twice, perhaps for lack of memory"
-            yield from [failed_record(job.case, reason) for job in batches[index]]
+            yield failed_record(jobs[index].case, reason)
 
 
 class _Pool:
-    """One pool of processes, until all batches are done or one dies, whose batches are `lost`."""
+    """One pool of processes, until all jobs are done or one dies, whose jobs are `lost`."""
 
-    def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
+    def __init__(self, jobs: Sequence[Job], indices: Sequence[int], workers: int) -> None:
         context: Any = worker_context()
-        self._batches, self._indices = batches, indices
-        self._fractions = context.Array("d", len(batches), lock=False)
-        self._holders = context.Array("l", len(batches), lock=False)  # process of each batch
+        self._jobs, self._indices = jobs, indices
+        self._fractions = context.Array("d", len(jobs), lock=False)
+        self._holders = context.Array("l", len(jobs), lock=False)  # process of each job
         # not an event, whose lock would be held for ever by a process that is killed as it looks
         self._stop = context.Value("b", 0, lock=False)
-        self._running: dict[Future[list[Record]], int] = {}
+        self._running: dict[Future[Record], int] = {}
         shared = self._fractions, self._holders, self._stop
         begun = (*shared, bool(logging.getLogger("railsim").handlers))
         self._most = AHEAD * workers
@@ -230,12 +179,12 @@ class _Pool:
         self.lost: set[int] = set()
 
     def _submit(self, index: int) -> None:
-        self._running[self._pool.submit(_work, index, self._batches[index])] = index
+        self._running[self._pool.submit(_work, index, self._jobs[index])] = index
 
-    def outcomes(self, progress: Progress) -> Iterator[tuple[int, list[Record]]]:
-        """Yield index and records of every batch that ends."""
-        first, rest = self._indices[0], deque(self._indices[1:])
-        shares, done = _shares(self._batches), 0.0
+    def outcomes(self, progress: Progress) -> Iterator[tuple[int, Record]]:
+        """Yield index and record of every job that ends."""
+        first, rest, number = self._indices[0], deque(self._indices[1:]), len(self._jobs)
+        done = number - len(self._indices)
         broken = False
         try:
             self._submit(first)
@@ -246,18 +195,18 @@ class _Pool:
                 while rest and compiled and len(self._running) < self._most:
                     self._submit(rest.popleft())
                 ended, _ = wait(self._running, timeout=POLL, return_when=FIRST_COMPLETED)
-                progress(done + sum(self._fractions[i] * shares[i] for i in self._running.values()))
+                progress((done + sum(self._fractions[i] for i in self._running.values())) / number)
                 compiled = compiled or bool(ended) or self._fractions[first] > 0.0
                 for future in ended:
                     index = self._running[future]
                     try:
-                        records = _outcome(future, self._batches[index])
+                        record = _outcome(future, self._jobs[index])
                     except BrokenProcessPool:
                         broken = True
                         continue
                     del self._running[future]
-                    done += shares[index]
-                    yield index, records
+                    done += 1
+                    yield index, record
         except BrokenProcessPool:  # nothing more can be submitted
             broken = True
         except BaseException:
@@ -266,25 +215,19 @@ class _Pool:
             raise
         finally:
             self._pool.shutdown(wait=True, cancel_futures=True)
-            for folder in {job.path.parent for batch in self._batches for job in batch}:
+            for folder in {job.path.parent for job in self._jobs}:
                 sweep(folder)  # left by a process that was killed
         if broken:
             self.lost = self._lost()
 
     def _lost(self) -> set[int]:
-        """Return the batches of the process that died; the pool has terminated the others."""
+        """Return the jobs of the process that died; the pool has terminated the others."""
         for process in self._pool.begun:
             process.join(GRACE)
         ended = (None, 0, -signal.SIGTERM)
         dead = {process.pid for process in self._pool.begun if process.exitcode not in ended}
         begun = {i for i in self._running.values() if self._holders[i]}
         return {i for i in begun if self._holders[i] in dead} or begun or {self._indices[0]}
-
-
-def _shares(batches: Sequence[Batch]) -> list[float]:
-    """Share of each batch in all jobs."""
-    total = sum(len(batch) for batch in batches)
-    return [len(batch) / total for batch in batches]
 
 
 def cluster(address: str) -> Any:
@@ -323,28 +266,24 @@ def compile_on_cluster(client: Any, remark: Callable[[str], None]) -> None:
         client.gather(runs, errors="skip")
 
 
-def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:
-    """Carry out batches on the workers of a dask cluster.
+def on_cluster(jobs: Sequence[Job], client: Any, progress: Progress) -> Iterator[Record]:
+    """Carry out jobs on the workers of a dask cluster.
 
     A worker with access to the folder of the study writes into it; other workers return the files
-    with the records.  A batch of a worker that died starts again on another one; a batch whose
-    workers have died several times (``allowed-failures`` of dask) is abandoned.
+    with the records.  A job of a worker that died starts again on another one; a job whose workers
+    have died several times (``allowed-failures`` of dask) is abandoned.
     """
     from distributed import as_completed
 
-    folders = {job.path.parent for batch in batches for job in batch}
-    with client, _marks(folders) as mark:
-        futures = client.map(perform_there, list(batches), mark=mark, pure=False)
-        batch_of = {future.key: batch for future, batch in zip(futures, batches, strict=True)}
-        share_of = dict(zip(batch_of, _shares(batches), strict=True))
+    with client, _marks({job.path.parent for job in jobs}) as mark:
+        futures = client.map(perform_there, list(jobs), mark=mark, pure=False)
+        job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
         waiting = as_completed(futures)
         del futures
-        fraction = 0.0
-        for future in waiting:
-            yield from _taken(future, batch_of[future.key])
+        for number, future in enumerate(waiting):
+            yield _taken(future, job_of[future.key])
             future.release()  # its files are no longer needed
-            fraction += share_of[future.key]
-            progress(min(1.0, fraction))
+            progress((number + 1) / len(jobs))
 
 
 @contextmanager
@@ -360,40 +299,37 @@ def _marks(folders: set[Path]) -> Iterator[str]:
             (folder / mark).unlink(missing_ok=True)
 
 
-def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, bytes]]:
-    """Carry out a batch, perhaps without access to the folder; then the files it wrote come too."""
-    if all((job.path.parent / mark).is_file() for job in batch):
-        return perform(batch), {}
+def perform_there(job: Job, mark: str) -> tuple[Record, dict[str, bytes]]:
+    """Carry out a job, perhaps without access to the folder; then the files it wrote come too."""
+    if (job.path.parent / mark).is_file():
+        return perform(job), {}
     with tempfile.TemporaryDirectory(prefix="railsim-") as folder:
         there = Path(folder)
-        here = []
-        for job in batch:
-            picture = job.picture and there / job.picture.name
-            here.append(replace(job, path=there / job.path.name, picture=picture))
-        return perform(tuple(here)), {path.name: path.read_bytes() for path in there.iterdir()}
+        picture = job.picture and there / job.picture.name
+        here = replace(job, path=there / job.path.name, picture=picture)
+        return perform(here), {path.name: path.read_bytes() for path in there.iterdir()}
 
 
-def _taken(future: Any, batch: Batch) -> list[Record]:
-    """Return the records of a batch of the cluster after writing its files."""
-    folder = batch[0].path.parent
+def _taken(future: Any, job: Job) -> Record:
+    """Return the record of a job of the cluster after writing its files."""
     try:
-        records, files = future.result()
+        record, files = future.result()
         for name, data in files.items():
-            with whole_file(folder / name) as partial:
+            with whole_file(job.path.parent / name) as partial:
                 partial.write_bytes(data)
     except Exception as error:
-        return [failed_record(job.case, error) for job in batch]
-    found: list[Record] = records
+        return failed_record(job.case, error)
+    found: Record = record
     return found
 
 
-def _outcome(future: Future[list[Record]], batch: Batch) -> list[Record]:
+def _outcome(future: Future[Record], job: Job) -> Record:
     try:
         return future.result()
     except BrokenProcessPool:
         raise
     except Exception as error:
-        return [failed_record(job.case, error) for job in batch]
+        return failed_record(job.case, error)
 
 
 # shared with worker processes: progress and process of all jobs, and whether to stop
@@ -415,7 +351,7 @@ def _stop(stop: Any) -> None:
     remove_partial_files()
 
 
-def _work(index: int, batch: Batch) -> list[Record]:
+def _work(index: int, job: Job) -> Record:
     fractions, holders, stop = _shared
     holders[index] = os.getpid()
 
@@ -425,4 +361,4 @@ def _work(index: int, batch: Batch) -> list[Record]:
             raise Stopped
 
     progress(0.0)  # it may have waited in the queue
-    return perform(batch, progress)
+    return perform(job, progress)

@@ -1,13 +1,11 @@
-"""Run of a case to a file; runs of several cases in one call."""
+"""Run of a case to a file."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
-from railsim.errors import InputError
 from railsim.result import Hdf5Sink, Result
 from railsim.result.sinks import EVERYTHING, MemorySink
-from railsim.simulation import outcomes, simulate
+from railsim.simulation import simulate
 from railsim.studies.case import Case
 
 
@@ -47,43 +45,3 @@ def _sink(
     if path is None:
         return MemorySink(facts, only)
     return Hdf5Sink(path, overwrite=overwrite, attributes=facts)
-
-
-def can_share_a_call(one: Case, other: Case) -> bool:
-    """Whether two cases differ only in the vehicle."""
-    return one.track == other.track and one.conditions == other.conditions
-
-
-def run_cases(
-    cases: Sequence[Case],
-    paths: Sequence[Path | None],
-    *,
-    overwrite: bool = False,
-    progress: Callable[[float], None] | None = None,
-    only: Collection[str] = EVERYTHING,
-) -> list[Result | Exception]:
-    """Run cases that differ only in the vehicle in one call; failures do not affect the others.
-
-    Arguments as of `run_case`.
-    """
-    found: dict[int, Result | Exception] = {}
-    sinks: dict[int, Hdf5Sink | MemorySink] = {}
-    with ExitStack() as stack:
-        for number, (case, path) in enumerate(zip(cases, paths, strict=True)):
-            facts = {"run": case.name, "inputs_hash": case.key}
-            try:
-                sink = _sink(path, overwrite, facts, only)
-            except InputError as error:
-                found[number] = error
-            else:
-                stack.enter_context(sink)
-                sinks[number] = sink
-        done = outcomes(
-            [cases[number].vehicle for number in sinks],
-            cases[0].track,
-            **cases[0].conditions,
-            sinks=list(sinks.values()),
-            progress=progress,
-        )
-    found |= zip(sinks, done, strict=True)
-    return [found[number] for number in range(len(cases))]

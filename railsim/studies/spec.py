@@ -147,7 +147,6 @@ class Execution:
     """How the runs of a study are carried out, see `railsim.study`; no number depends on it."""
 
     workers: int | None = None
-    together: int = 1
     scheduler: str | None = None
     resume: bool = False
     overwrite: bool = False
@@ -160,10 +159,10 @@ class Execution:
     on_remark: Callable[[str], None] | None = None
 
     def __post_init__(self) -> None:
-        """Raise InputError: numbers of processes or of runs in one call that are none."""
-        for name, value in (("together", self.together), ("workers", self.workers)):
-            if not (value is None or (isinstance(value, Integral) and value > 0)):
-                raise argument_error(name, f"found {value!r}", "a whole number above 0")
+        """Raise InputError: a number of processes that is none."""
+        number = self.workers
+        if not (number is None or (isinstance(number, Integral) and number > 0)):
+            raise argument_error("workers", f"found {number!r}", "a whole number above 0")
         if self.workers is not None and self.scheduler is not None:
             allowed = "not with it: the runs are on its own workers"
             raise argument_error("workers", f"{self.workers} beside `scheduler`", allowed)

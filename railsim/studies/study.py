@@ -2,6 +2,7 @@
 
 import os
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
@@ -43,7 +44,7 @@ def study(
     until: float | None = None,
     assignments: Sequence[str] = (),
     workers: int | None = None,
-    together: int = 1,
+    together: int | None = None,
     scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -87,9 +88,8 @@ def study(
         ``key.path=value`` for all runs.
     workers : int, optional
         Processes; by default one for each core.
-    together : int
-        Largest number of runs, different only in the vehicle, that share a call; the results do not
-        change.
+    together : int, optional
+        Without effect since 2026-11-28; warns.
     scheduler : str, optional
         Address of a dask scheduler whose workers carry out the runs instead.
     resume : bool
@@ -127,6 +127,8 @@ def study(
     ...     print([record["status"] for record in outcome.records])
     ['complete']
     """
+    if together is not None:
+        warnings.warn("`together` has no effect", DeprecationWarning, stacklevel=2)
     folder = Path(out)
     check_folder(folder)
     inputs = {
@@ -149,7 +151,6 @@ def study(
     }
     execution = Execution(
         workers=workers,
-        together=together,
         scheduler=scheduler,
         resume=resume,
         overwrite=overwrite,

@@ -29,7 +29,7 @@ SMALL = {
                       "--speeds", "1", "--frictions", "2", "--duration", "1", "--workers", "1"],
     "whole.py": ["--small"],
 }  # fmt: skip
-IMPORTED = {"commands.py", "cores.py", "ensembles.py", "exudyn_coach.py", "exudyn_contact.py",
+IMPORTED = {"commands.py", "cores.py", "exudyn_coach.py", "exudyn_contact.py",
             "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py"}  # fmt: skip
 WRITES_THE_MANUAL = {"tables.py"}  # from the figures in `benchmarks/results`
 STUDY = """
@@ -99,12 +99,8 @@ def test_parts_of_a_step_and_runs_in_one_call_are_measured(whole):
     assert all(time > 0.0 for time in parts["parts"].values())
     assert max(parts["parts"].values()) < parts["right_hand_side"]
     assert [row["grid"] for row in found["fastsim"]] == [5, 10]
-    assert [record["members"] for record in found["ensembles"]] == [1, 3]
-    for record in found["ensembles"]:
-        assert len(record["real_time_all"]) == 2
-        assert record["real_time_best"] >= record["real_time"] > 0.0
     headers = [header[0] for header, _ in whole.tables(found)]
-    assert headers == ["time loop", "right-hand side, 8 patches", "FASTSIM", "runs in one call"]
+    assert headers == ["time loop", "right-hand side, 8 patches", "FASTSIM"]
     for header, rows in whole.tables(found):
         assert all(len(row) == len(header) for row in rows)
 

@@ -82,27 +82,23 @@ def test_ten_runs_share_a_line_in_large_studies(capsys):
 
 
 def test_finished_fraction_is_that_of_the_simulated_time():
-    """Three runs of 10 s, each judged for 5 s and run in for 10 s: of 75 s in all."""
+    """A run of 10 s, judged for 5 s and run in for 10 s: of 25 s in all."""
     told = []
     inputs = SimpleNamespace(
         track=SimpleNamespace(length=260.0), start=60.0, speed=20.0, until=None, duration=None
     )
-    course = RunProgress(told.append, 3, inputs)
-    for _ in range(3):
-        course.next_run()
-        course.of_judgement(5.0, 5.0)  # so far the run-in is not known of: of 45 s
-        course.of_run_in(4.0, 10.0)
-        course.of_run_in(10.0, 10.0)
+    course = RunProgress(told.append, inputs)
+    course.of_judgement(5.0, 5.0)  # so far the run-in is not known of: of 15 s
+    course.of_run_in(4.0, 10.0)
+    course.of_run_in(10.0, 10.0)
     for done in (0.0, 0.6, 1.0 - 1e-13):
-        course.of_runs(done)
-    first = [0.0, 5.0 / 45.0, 9.0 / 75.0, 15.0 / 75.0]
-    second = [15.0 / 75.0, *3 * [20.0 / 45.0]]  # what was told is not taken back
-    third = [20.0 / 45.0, *3 * [35.0 / 45.0]]
-    preparation = [*first, *second, *third]
-    assert told == pytest.approx([*preparation, 35.0 / 45.0, 63.0 / 75.0, 1.0], abs=1e-12)
+        course.of_run(done)
+    # what was told is not taken back
+    expected = [5.0 / 15.0, 9.0 / 25.0, 15.0 / 25.0, 15.0 / 25.0, 21.0 / 25.0, 1.0]
+    assert told == pytest.approx(expected, abs=1e-12)
     assert told[-1] == 1.0
     for short in (SimpleNamespace(**{**vars(inputs), "until": 100.0}),
                   SimpleNamespace(**{**vars(inputs), "duration": 2.0})):  # fmt: skip
-        other = RunProgress(told.append, 1, short)
+        other = RunProgress(told.append, short)
         other.of_judgement(6.0, 6.0)
         assert told[-1] == pytest.approx(6.0 / 8.0)

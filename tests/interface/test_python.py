@@ -15,9 +15,10 @@ import pytest
 import railsim
 from railsim.cli import main
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import InputError
+from railsim.errors import InputError, ModelError
 from railsim.linear.modes import Mode, Modes
 from railsim.linear.vehicle import Contact
+from railsim.result import Hdf5Sink
 from railsim.table import Table
 
 COACH = "coach_manchester"
@@ -214,8 +215,8 @@ def test_a_study_of_what_is_no_input_is_refused(tmp_path):
     for wrong in ({"vehicles": None}, {"tracks": [3]}, {"settings": {"step": 1e-3}}):
         with pytest.raises(TypeError, match="one of the inputs of the study is a"):
             railsim.study(**{**of, **wrong})
-    with pytest.raises(InputError, match="together: found '2'; a whole number"):
-        railsim.study(**of, together="2")
+    with pytest.raises(InputError, match="workers: found '2'; a whole number"):
+        railsim.study(**of, workers="2")
     assert not list(tmp_path.iterdir())
 
 
@@ -242,6 +243,34 @@ def test_one_vehicle_at_least_and_a_sink_for_each_run_together(coach):
         railsim.simulate_together([], track, speed=20.0)
     with pytest.raises(InputError, match="sinks: 0 for 1 vehicles"):
         railsim.simulate_together([coach], track, speed=20.0, sinks=[])
+
+
+def test_several_vehicles_over_one_track_are_runs_as_alone(coach):
+    track, seen = railsim.load_track("straight"), []
+    light = coach.with_values({"bodies.carbody.mass": 25e3})
+    both = railsim.simulate_together(
+        [coach, light], track, speed=20.0, until=2.0, progress=seen.append
+    )
+    for vehicle, result in zip((coach, light), both, strict=True):
+        alone = railsim.simulate(vehicle, track, speed=20.0, until=2.0)
+        np.testing.assert_array_equal(result.Q, alone.Q)
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+    assert 0.5 in seen
+
+
+def test_a_vehicle_that_fails_fails_when_all_others_are_done(coach, tmp_path):
+    floating = coach.with_values(
+        {"assemblies.bogie.elements.secondary_spring.preload": [0.0, 0.0, 0.0]}
+    )
+    sinks = [Hdf5Sink(tmp_path / f"{number}.h5") for number in (1, 2, 3)]
+    with pytest.raises(ModelError, match="no static equilibrium") as caught:
+        railsim.simulate_together(
+            [coach, floating, coach], railsim.load_track("straight"), speed=20.0, until=1.0,
+            sinks=sinks,
+        )  # fmt: skip
+    assert caught.value.__notes__ == ["this was vehicle 2 of 3"]
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["1.h5", "3.h5"]
 
 
 def test_names_instead_of_what_they_stand_for_are_told(coach):

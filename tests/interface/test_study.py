@@ -767,13 +767,13 @@ def test_run_whose_process_dies_twice_is_given_up_and_the_others_go_on(tmp_path,
     assert "its process died twice" in outcome.failed[0]["status_reason"]
 
 
-def deadly_work(index, batch):
+def deadly_work(index, job):
     from railsim.studies import execute  # in the process of the worker
 
-    if batch[0].case.speed == 21.0:
+    if job.case.speed == 21.0:
         execute._shared[1][index] = os.getpid()
         os.kill(os.getpid(), signal.SIGKILL)
-    return execute._work(index, batch)
+    return execute._work(index, job)
 
 
 @pytest.mark.parametrize("workers", [0, -1, 2.5, "2"])
@@ -783,10 +783,13 @@ def test_workers_that_are_no_number_of_processes_are_refused(tmp_path, workers):
     assert not (tmp_path / "s").exists()
 
 
-def test_no_runs_in_one_call_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"together: found 0; a whole number above 0"):
-        railsim.study(COACH, CURVE, 20.0, out=tmp_path / "s", together=0)
-    assert not (tmp_path / "s").exists()
+def test_runs_in_one_call_are_an_option_without_effect(tmp_path, capsys):
+    arguments = ["--vehicles", COACH, "--tracks", "straight", "--speeds", "20", "--until", "2"]
+    out = ["--workers", "1", "--out", str(tmp_path / "s")]
+    assert main(["study", *arguments, *out, "--together", "8"]) == 0
+    assert "remark: --together has no effect" in capsys.readouterr().err
+    with pytest.warns(DeprecationWarning, match="no effect"):
+        railsim.study(COACH, "straight", 20.0, until=2.0, out=tmp_path / "s", together=8, workers=1)
 
 
 def test_a_key_that_changes_nothing_is_told(tmp_path, capsys):

@@ -18,7 +18,7 @@ from railsim.definitions import Settings
 from railsim.definitions.loading import load_study, load_track, load_vehicle
 from railsim.definitions.study.definition import Sample, Spread
 from railsim.errors import InputError, input_error
-from railsim.studies import user_function
+from railsim.studies import execute, user_function
 from railsim.studies.plan import Plan
 from railsim.studies.rows import made_rows, quantile, sampled
 from railsim.studies.spec import Execution, StudySpec
@@ -543,3 +543,30 @@ def test_settings_that_do_not_fit_a_vehicle_are_named_with_their_file_before_the
     assert words in capsys.readouterr().err
     assert simulated == []
     assert not (tmp_path / "s").exists()
+
+
+def test_a_run_holds_no_more_in_memory_than_what_is_kept_and_summed_up(tmp_path, monkeypatch):
+    held, finished = [], execute.finished_record
+
+    def noted(case, result, *more):
+        held.append(set(result))
+        return finished(case, result, *more)
+
+    monkeypatch.setattr(execute, "finished_record", noted)
+    more = {"keep": "Q,xi_x", "workers": 1, "until": 10.0}
+    outcome = railsim.study(COACH, "straight", 20.0, out=tmp_path, **more)
+    assert {"xi_x", "T_gamma"} <= held[0]
+    assert not {"body_position", "phi"} & held[0]
+    (result,) = outcome.results().values()
+    assert set(result) == {"time", "distance", "Q0", "Q", "xi_x"}
+
+
+def test_a_run_without_equilibrium_fails_by_itself(tmp_path):
+    """Without preload nothing carries the body; the other run is as usual."""
+    key = "vehicle.assemblies.bogie.elements.secondary_spring.preload"
+    grid = {key: ["auto", [0.0, 0.0, 0.0]]}
+    outcome = railsim.study(COACH, "straight", 20.0, grid=grid, until=2.0, out=tmp_path, workers=1)
+    fine, failed = outcome.records
+    assert (fine["status"], failed["status"]) == ("complete", "failed")
+    assert failed["status_reason"].startswith("no static equilibrium")
+    assert [path.name for path in tmp_path.glob("*.h5")] == [fine["file"]]

@@ -17,7 +17,7 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.state import N_SCALARS
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE, WEIGHT
-from railsim.simulation import simulate, simulate_together
+from railsim.simulation import simulate
 from railsim.simulation.remarks import MOST_Q
 
 SPEED, UNTIL = 40.0, 36.0
@@ -144,46 +144,6 @@ def test_recorded_patches_change_no_bit_of_a_run_on_elastic_rails():
     np.testing.assert_array_equal(plain.groups["state"]["end"], recorded.groups["state"]["end"])
     N = np.nansum(recorded["patch_N"], axis=3)
     assert np.all((N > 0.0) == (plain.Q > 0.0))
-
-
-def test_vehicles_on_irregular_elastic_rails_are_together_as_alone():
-    hunts, heavier = (load_vehicle("coach_manchester", change) for change in ((), [HEAVIER]))
-    coaches = [hunts, load_vehicle("coach_flexicoil"), heavier]
-    track = load_any_track("straight").replace(irregularities=IRREGULAR)
-    how = {"speed": 60.0, "until": 40.0, "settings": Settings(step=0.5e-3)}
-    together = simulate_together(coaches, track, **how)
-    for vehicle, result in zip(coaches, together, strict=True):
-        alone = simulate(vehicle, track, **how)
-        assert result.attributes["runs_together"] == 3
-        np.testing.assert_array_equal(result.groups["state"]["end"], alone.groups["state"]["end"])
-        for name in ("steps", "evaluations", "contacts_evaluated_again"):
-            assert result.attributes[name] == alone.attributes[name]
-    for result in (together[0], together[2]):
-        assert result.attributes["contacts_evaluated_again"] > 100
-
-
-def test_vehicles_whose_last_steps_on_the_way_to_the_start_differ_run_as_alone():
-    """A strike divided that of one of them; the step is part of what its rails are to do next."""
-    coaches = [load_vehicle("coach_manchester"), load_vehicle("coach_manchester", [HEAVIER])]
-    track = load_any_track("straight").replace(irregularities=[{**IRREGULAR[0], "scale": 4.0}])
-    how = {"speed": 60.0, "duration": 0.01, "settings": Settings(step=0.5e-3)}
-    for vehicle, result in zip(coaches, simulate_together(coaches, track, **how), strict=True):
-        alone = simulate(vehicle, track, **how)
-        np.testing.assert_array_equal(result.groups["state"]["end"], alone.groups["state"]["end"])
-        np.testing.assert_array_equal(result.Q, alone.Q)
-
-
-def test_vehicle_that_lifts_a_wheel_goes_on_as_alone():
-    track = load_track("straight").replace(irregularities=[{**AT, "rail": "left"}])
-    coaches = [load_vehicle("coach_manchester"), load_vehicle("coach_flexicoil")]
-    how = {"speed": SPEED, "until": UNTIL}
-    for vehicle, result in zip(coaches, simulate_together(coaches, track, **how), strict=True):
-        alone = simulate(vehicle, track, **how)
-        for name in alone:
-            np.testing.assert_array_equal(result[name], alone[name])
-        for name, values in alone.groups["peaks"].items():
-            np.testing.assert_array_equal(result.groups["peaks"][name], values)
-        assert result.remarks == alone.remarks
 
 
 def test_peaks_are_at_least_those_of_the_outputs():

@@ -21,7 +21,7 @@ from railsim.kernels.transient import (
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import level_track_with_friction, work_arrays
-from railsim.simulation import simulate, simulate_together
+from railsim.simulation import simulate
 
 FURTHER = pytest.mark.further
 TRANSIENT = {"transient_creep": True}
@@ -150,16 +150,6 @@ def test_memory_belongs_to_the_state(coach):
     half = len(first["time"]) - 1
     for name in ("Q", "Y", "T_gamma"):
         np.testing.assert_array_equal(second[name], whole[name][half:])
-
-
-@FURTHER
-def test_vehicles_side_by_side_keep_their_memories(coach):
-    track, how = load_track("straight").with_values(RIGID), {"duration": 0.05, **RUN}
-    other = coach.with_values({"bodies.carbody.mass": 25e3})
-    both = simulate_together([coach, other], track, settings=settings(**STRUCK), **how)
-    for vehicle, one in zip((coach, other), both, strict=True):
-        alone = simulate(vehicle, track, settings=settings(**STRUCK), **how)
-        np.testing.assert_array_equal(one["Y"], alone["Y"])
 
 
 @FURTHER
