@@ -137,7 +137,7 @@ def forces_of(model, stops, reference, t, q, q_t, forces, scratch, records):
     for c in range(system.contact.body.shape[0]):
         b = system.contact.body[c]
         put_on(forces, b, work.frames[bodies.frame[b]], G, vector, work.rail_force[b])
-    b = bodies.references[0]
+    b = bodies.reference
     vector[0, :] = 0.0
     hold = np.zeros(6)
     hold[0] = -HOLD_STIFFNESS * state[6 * b] - HOLD_DAMPING * state[6 * n + 6 * b]

@@ -37,7 +37,7 @@ def many_mechanics(system, work, state, derivative, n):
 @compiled
 def many_frames(system, work, state, derivative, n):
     """Track frames of all bodies."""
-    origin = system.bodies.frame[system.bodies.references[0]]
+    origin = system.bodies.frame[system.bodies.reference]
     for _ in range(n):
         locate_frames(
             system.track,

@@ -44,7 +44,7 @@ def add_traction(system, work, speed):
     drive, bodies, frames, pose = system.drive, system.bodies, work.frames, work.pose
     force, _ = table_value_slope(drive.table, speed)
     force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
-    b = bodies.references[0]
+    b = bodies.reference
     f = bodies.frame[b]
     for k in range(3):
         pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
@@ -113,7 +113,7 @@ def speed_change(system, work, state, derivative):
         _, slope = table_value_slope(drive.table, state[ARC_LENGTH])
         return state[SPEED] * slope
     if drive.mode == FREE:
-        b = bodies.references[0]
+        b = bodies.reference
         f = bodies.frame[b]
         y = state[6 * b + 1] + bodies.row[b, Y_0]
         z = state[6 * b + 2] + bodies.row[b, Z_0]
@@ -144,16 +144,13 @@ def apply_speed_change(system, work, state, rate, derivative):
 
 @compiled(python=False)
 def hold_reference(bodies, work, derivative):
-    """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
-    relative, acceleration = work.relative, work.acceleration
-    n = bodies.kind.shape[0]
-    for k in range(bodies.references.shape[0]):
-        b = bodies.references[k]
-        held = velocity_begin(n) + 6 * b
-        for i in range(3):
-            acceleration[b, i] -= derivative[held] * relative[b, i]
-        derivative[6 * b] = 0.0
-        derivative[held] = 0.0
+    """Keep the reference body's x; the force that holds it is part of its acceleration."""
+    b = bodies.reference
+    held = velocity_begin(bodies.kind.shape[0]) + 6 * b
+    for i in range(3):
+        work.acceleration[b, i] -= derivative[held] * work.relative[b, i]
+    derivative[6 * b] = 0.0
+    derivative[held] = 0.0
 
 
 @compiled(python=False)

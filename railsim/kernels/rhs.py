@@ -416,7 +416,7 @@ def mechanics(system, work, state, derivative, rails):
     status = locate_frames(
         system.track,
         system.frame_offset,
-        bodies.frame[bodies.references[0]],
+        bodies.frame[bodies.reference],
         s,
         work.frames,
         work.cell,

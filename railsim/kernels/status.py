@@ -9,7 +9,6 @@ YAW_RANGE = 5
 NOT_FINITE = 6
 END_OF_TRACK = 7
 STANDSTILL = 8
-STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; each goes on alone
 BESIDE_RAIL = 10
 LAW_NOT_FINITE = 11
 WRONG_SIDE = 12

@@ -72,7 +72,7 @@ class Bodies(NamedTuple):
                              [m], nominal rolling radius [m] and 1 for a wheelset, else 1 and 0
     whole, axleboxes : int64[...]   bodies with six coordinates, and with one
     fixed : int64[...]       bodies, part of `whole`, that are at rest in their track frames
-    references : int64[v]    one body of each vehicle, whose frame is `s`; its x is held
+    reference : int          the body whose frame is `s`; its x is held
     """
 
     kind: np.ndarray
@@ -82,7 +82,7 @@ class Bodies(NamedTuple):
     whole: np.ndarray
     axleboxes: np.ndarray
     fixed: np.ndarray
-    references: np.ndarray
+    reference: int
 
     @property
     def mass(self) -> np.ndarray:

@@ -16,7 +16,7 @@ from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.recording import record_row
 from railsim.kernels.rhs import mechanics
 from railsim.kernels.state import ARC_LENGTH
-from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
+from railsim.kernels.status import NOT_FINITE, RUNNING
 from railsim.kernels.step_fast import remember, step_fast
 from railsim.kernels.step_rk4 import all_rates, first_not_finite, step_rk4
 from railsim.kernels.support import AFTER_STEP
@@ -98,8 +98,6 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                 decay, length, left = work.decay, h, np.int64(1)
                 w, parts = striking(system, work, h)
                 if w >= 0:
-                    if system.bodies.references.shape[0] > 1:
-                        return STRIKES, w, step - chunk.first, rows
                     decay, length, left = work.decay_part, h / parts, parts
                     begin_division(system, work, length)
             note_unloaded(work.wheel, length, work.unloaded)

@@ -171,7 +171,7 @@ class FreeVehicle:
         self._whole = np.asarray(bodies.whole)
         self._frames = bodies.frame[self._whole]
         self._nominal = np.hstack([np.zeros((len(self._whole), 1)), bodies.nominal[self._whole]])
-        reference = int(bodies.references[0])
+        reference = bodies.reference
         self._reference = 6 * reference, 6 * self._n + 6 * reference
         self.system = system._replace(drive=Drive(FREE, np.zeros((1, 2)), np.zeros(3)))
         change = self.evaluate(state)[-1]

@@ -261,7 +261,7 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
         whole=np.flatnonzero(kinds != AXLEBOX),
         axleboxes=np.flatnonzero(kinds == AXLEBOX),
         fixed=np.flatnonzero(kinds == FIXED),
-        references=np.array([names.index(flat.reference)], dtype=np.int64),
+        reference=names.index(flat.reference),
     )
     return bodies, np.array(offsets)
 

@@ -241,7 +241,7 @@ def conditions(
     for body, kind in enumerate(bodies.kind):
         for component in components_of(int(kind)):
             spin = kind == WHEELSET and component == 4
-            given = body in bodies.references and component == 0
+            given = body == bodies.reference and component == 0
             if given or (kind == WHEELSET and held) or (spin and not rolling):
                 continue
             unknowns.append((velocity_begin(n) if spin else 0) + 6 * body + component)

@@ -59,7 +59,8 @@ def _key(model: Model) -> bytes:
         facts.append((e.name, e.body1, e.body2, *preload, law.has_levelling))
     names = index.bodies, index.links, index.mounts
     digest = hashlib.sha256(repr((names, facts, system.gravity)).encode())
-    for array in (*bodies, system.frame_offset, links.body, links.row, mounts.body, mounts.row):
+    arrays = *bodies, system.frame_offset, links.body, links.row, mounts.body, mounts.row
+    for array in map(np.asarray, arrays):
         digest.update(repr(array.shape).encode())
         digest.update(array.tobytes())
     if model.design is not None:

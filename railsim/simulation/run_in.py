@@ -213,7 +213,7 @@ def _located(model: Model, s: float) -> Work:
 def _frames(model: Model, s: float) -> Floats:
     """Track frames of a vehicle at `s`."""
     system, count = model.system, len(model.system.frame_offset)
-    reference = system.bodies.frame[system.bodies.references[0]]
+    reference = system.bodies.frame[system.bodies.reference]
     frames, cell = np.zeros((count, FRAME_SIZE)), np.zeros(count, dtype=np.int64)
     track = system.track, system.frame_offset, reference
     if locate_frames(*track, s, frames, cell, np.zeros(count)) != RUNNING:

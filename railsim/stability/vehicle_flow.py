@@ -39,7 +39,7 @@ class VehicleFlow:
         model, system = self._motion.model, self._system
         n, m = model.index.n_bodies, len(system.internal.kind)
         c = self._motion.prepared.coordinates
-        reference = int(system.bodies.references[0])
+        reference = system.bodies.reference
         found: list[tuple[int, float]] = []
         for k in range(c.n_positions + c.n_velocities):
             body, component = int(c.bodies[k]), int(c.components[k])

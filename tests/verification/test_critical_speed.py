@@ -521,7 +521,7 @@ def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest
     rest = flow.full(flow.reduced(of.steady(20.0)), 20.0)
     changed = rest + np.random.default_rng(1).standard_normal(rest.size)
     after = flow.full(flow.reduced(changed), 20.0)
-    first = 6 * of.system.bodies.references[0]
+    first = 6 * of.system.bodies.reference
     assert after[first] == rest[first]
     assert np.array_equal(after[first + 1 : first + 6], changed[first + 1 : first + 6])
     before, found, known = (tracks_under(of.system, state) for state in (changed, after, rest))
