@@ -101,11 +101,11 @@ def shift_of(
 
 def _lag(a: Floats, b: Floats) -> tuple[float, float]:
     """Place of a within the longer b in grid points, and the correlation there."""
-    parts = np.lib.stride_tricks.sliding_window_view(b, len(a))
-    parts = parts - parts.mean(axis=1, keepdims=True)
-    own = a - a.mean()
-    scale = np.sqrt(np.sum(parts**2, axis=1) * np.sum(own**2))
-    values = parts @ own / np.where(scale > 0.0, scale, np.inf)
+    own, b, ones = a - a.mean(), b - b.mean(), np.ones(len(a))
+    energy = np.correlate(b**2, ones) - np.correlate(b, ones) ** 2 / len(a)
+    scale = np.sqrt(np.maximum(energy, 0.0) * np.sum(own**2))
+    # where b is constant, rounding is no likeness
+    values = np.correlate(b, own) / np.where(scale > 1e-6 * scale.max(), scale, np.inf)
     k = int(np.argmax(values))
     offset = 0.0
     if 0 < k < len(values) - 1:

@@ -213,10 +213,10 @@ def test_a_study_gives_the_result_on_the_same_track_in_the_same_load(measured, r
 
 
 def test_a_run_that_is_compared_in_part_only_is_said(measured):
-    """A simulated run up to 1000 m of 2900 m, such as on a track file that ends there."""
-    found = railsim.validate_model(measured, simulated(make.true_vehicle(), until=1000.0))
+    """A simulated run up to 500 m of 2900 m, such as on a track file that ends there."""
+    found = railsim.validate_model(measured, simulated(make.true_vehicle(), until=500.0))
     (said,) = [words for words in found.remarks if "compared from" in words]
-    assert said.endswith(("m, compared from 78 to 1000 m", "m, compared from 79 to 1000 m"))
+    assert said.endswith(("m, compared from 78 to 500 m", "m, compared from 79 to 500 m"))
 
 
 @pytest.mark.parametrize("status", ["derailed", "stopped"])
