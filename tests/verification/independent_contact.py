@@ -89,8 +89,7 @@ def lowest_gap(
         lift = approach * np.interp(lateral, rail_y, stretch) if approach else 0.0
         return height + radius - points[2] + lift, lateral, lift
 
-    stretch = np.hypot(1.0, np.gradient(rail_z, rail_y))
-
+    stretch = np.hypot(1.0, np.gradient(rail_z, rail_y)) if approach else None
     theta = np.linspace(-0.12, 0.12, 61) if yaw else np.zeros(1)
     h, lateral, lift = gaps(wheel_y, wheel_z, theta)
     i, k = np.unravel_index(np.argmin(h), h.shape)
