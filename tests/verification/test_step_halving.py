@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from step_halving import changes, half_as_long, irregular_run
 
-CASES = [(60.0, 1000.0), (3.0, 300.0)]
+CASES = [(60.0, 1000.0), (3.0, 150.0)]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{case[0]:g} m/s")

@@ -194,7 +194,7 @@ def test_reference_scheme_and_fast_one_agree_without_masses():
     track = on("ballasted", "curve_r250")
     vehicle = load_vehicle("coach_manchester")
     fast, reference = (
-        simulate(vehicle, track, speed=20.0, start=250.0, until=380.0, settings=settings)
+        simulate(vehicle, track, speed=20.0, start=250.0, until=340.0, settings=settings)
         for settings in (Settings(step=1.25e-3), Settings(scheme="rk4", step=0.25e-3))
     )
     assert fast.dQ_over_Q0.max() == pytest.approx(reference.dQ_over_Q0.max(), abs=1e-3)
