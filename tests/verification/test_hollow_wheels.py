@@ -34,7 +34,7 @@ def test_load_moves_across_a_hollow_as_by_boundary_elements(depth, inclination, 
     wheel, rail = hollow_wheel(depth), load_profile("60E1")
     table = build_contact_table(wheel, rail, inclination=inclination, grid=NARROW)
     shares = []
-    for y in lateral + np.array([-0.1e-3, 0.0, 0.1e-3]):
+    for y in lateral + np.array([-0.1e-3, 0.0]):
         found = loaded_contact(table, y, 0.0, LOAD)
         exact = exact_contact(wheel, rail, y, 0.0, LOAD, inclination=inclination)
         rim, exact_rim = (
