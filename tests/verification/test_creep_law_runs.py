@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -48,6 +49,12 @@ def in_curve(vehicle, law, track=None, **more):
                     settings=settings(law, **more))  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def plain(coach):
+    """Run in the curve by law, each once."""
+    return cache(lambda law: in_curve(coach, law))
+
+
 def patches(vehicle, law, track, result):
     """Work arrays at the end of a run, and how many patches carry load."""
     system = prepare(vehicle, track, settings(law), SPEED).model.system
@@ -79,10 +86,9 @@ def test_loop_has_the_forces_of_creep_force(law, coach):
 
 
 @laws
-def test_sum_of_lateral_forces_in_a_curve_does_not_depend_on_the_law(law, coach):
+def test_sum_of_lateral_forces_in_a_curve_does_not_depend_on_the_law(law, plain):
     """Newton's law for the whole coach: the wheels share it differently, the sum stays."""
-    mean = in_curve(coach, law).sum_Y.sum(axis=1).mean()
-    fastsim = in_curve(coach, "fastsim").sum_Y.sum(axis=1).mean()
+    mean, fastsim = (plain(one).sum_Y.sum(axis=1).mean() for one in (law, "fastsim"))
     m, kappa, cant = 42.0e3, 1.0 / 250.0, 0.15
     scale = m * (SPEED**2 * kappa + 9.81 * cant / 1.5)
     # both have settled within 1 % of the forces that nearly balance here
@@ -124,9 +130,9 @@ def test_friction_that_falls_by_nothing_or_at_once(law, coach):
 
 
 @some_laws
-def test_third_body_softens_and_keeps_the_friction(law, coach):
+def test_third_body_softens_and_keeps_the_friction(law, coach, plain):
     """The curve imposes the leading wheelset's creepages: softer contact, smaller force."""
-    stiff = in_curve(coach, law)
+    stiff = plain(law)
     track = curve(third_body=0.25)
     soft = in_curve(coach, law, track)
     ratio = np.abs(soft.Y[-1, 0] / stiff.Y[-1, 0])

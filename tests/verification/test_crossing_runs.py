@@ -45,7 +45,7 @@ def path_of_the_wheel():
     return s, np.min(gaps, axis=0)[:, 0, 0]
 
 
-def blow(s, z, speed, h=4e-6, every=50):
+def blow(s, z, speed, h=8e-6, every=25):
     """Largest contact force below 90 Hz of two masses, written anew [N].
 
     A wheel under its load on a mass on spring and damper, between them a sphere's contact, over the
@@ -95,7 +95,7 @@ def test_short_ramps_are_what_the_formula_leaves_out(speed):
     s, z = path_of_the_wheel()
     slopes = np.diff(z) / np.diff(s)
     assert slopes.max() - slopes.min() == pytest.approx(DIP, abs=1e-3)
-    long = np.arange(-2.5, 2.5, 2e-3)
+    long = np.arange(-1.9, 1.5, 2e-3)
     assert 0.8 < blow(long, ramps(long), speed) / FORMULA[speed] < 1.0
     share = {10.0: 0.96, 20.0: 0.65, 27.8: 0.48}[speed]
     assert blow(s, z, speed) / FORMULA[speed] == pytest.approx(share, abs=0.01)
