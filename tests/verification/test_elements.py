@@ -28,7 +28,7 @@ def harmonic(amplitude, frequency):
     return lambda t: amplitude * np.sin(omega * t), lambda t: amplitude * omega * np.cos(omega * t)
 
 
-def last_period(rig, axis, motion, frequency, periods=2, steps=2000):
+def last_period(rig, axis, motion, frequency, periods=2, steps=1000):
     """Deflections and forces over the last of several periods."""
     time = np.arange(periods * steps) / (frequency * steps)
     force = rig.history(axis, time, *motion)
@@ -54,7 +54,7 @@ def component(deflection, force):
 def test_loop_of_constant_friction_has_masings_area(motion):
     """4 F (A - F/k_t): sliding both ways less the elastic travel at each turn (Masing 1926).
 
-    Within 0.1 %: the corners are met to one step of 1/2000 of a period.
+    Within 0.1 %: the corners are met to one step of 1/1000 of a period.
     """
     rig = Rig(kind="friction", friction_force=[0.0, 0.0, 4e3], stick_stiffness=[0.0, 0.0, 4e6])
     d, f = last_period(rig, Z, motion(0.01, 1.0), 1.0)
@@ -380,16 +380,16 @@ def test_blow_off_damper_with_series_stiffness_follows_its_table_when_slow():
     """At 0.02 Hz the series spring's own rate is below 1 % of the velocity at the bend."""
     rig = Rig(**LINK, damper_table=BLOW_OFF, series_stiffness=5e6)
     position, rate = harmonic(2.0, 0.02)
-    time = np.arange(0.0, 60.0, 0.01)
-    force = rig.history(Z, time, position, rate)[500:]
-    v = np.array([rate(t) for t in time])[500:]
+    time = np.arange(0.0, 60.0, 0.04)
+    force = rig.history(Z, time, position, rate)[125:]
+    v = np.array([rate(t) for t in time])[125:]
     expected = np.sign(v) * np.interp(np.abs(v), [0.0, 0.1, 0.5], [0.0, 10e3, 12e3])
     assert np.max(np.abs(force - expected)) < 0.06 * 10e3
     assert np.sqrt(np.mean((force - expected) ** 2)) < 0.02 * 10e3
 
 
 @pytest.mark.parametrize("velocity", [0.05, 0.3, 2.0])
-@pytest.mark.parametrize("h", [1e-4, 1e-3])
+@pytest.mark.parametrize("h", [2.5e-4, 1e-3])
 def test_series_damper_relaxes_branch_by_branch(velocity, h):
     """After a step of velocity F' = k_s (v - u), F = F_d(u): closed form for every step h."""
     k_s, c_low, c_high = 5e6, 1e5, 5e3
@@ -402,7 +402,7 @@ def test_series_damper_relaxes_branch_by_branch(velocity, h):
     high = high_end - (high_end - 10e3) * np.exp(-np.maximum(time - kink, 0.0) * k_s / c_high)
     assert force == pytest.approx(np.where(time < kink, low, high), abs=1e-6 * 10e3)
     assert force[round(1e-3 / h)] <= k_s * velocity * 1e-3  # never stiffer than the series spring
-    back = rig.history(Z, np.arange(0.0, 0.5, h), lambda t: 0.0, lambda t: 0.0)
+    back = rig.history(Z, np.arange(0.0, 0.4, h), lambda t: 0.0, lambda t: 0.0)
     # the way down is on the same branches
     assert np.all(np.diff(back) <= 0.0)
     assert 0.0 <= back[-1] < 1e-6 * 10e3
@@ -441,14 +441,13 @@ def test_air_spring_has_its_static_and_its_fast_stiffness():
     held = Rig(**law).history(Z, np.arange(0.0, 5.0, 0.01), lambda t: 0.01, lambda t: 0.0)
     assert held[0] == pytest.approx(0.01 * (area + k1), rel=1e-9)
     assert held[-1] == pytest.approx(0.01 * (area + k1 * k2 / (k1 + k2)), rel=1e-9)
-    for frequency in (0.1, 1.0, 3.0, 10.0, 40.0):
-        steps = 400
+    for frequency, steps in ((0.1, 400), (1.0, 200), (3.0, 100), (10.0, 100), (40.0, 100)):
         d, f = last_period(
             Rig(**law),
             Z,
             harmonic(0.01, frequency),
             frequency,
-            periods=2 + int(frequency),  # 1 s: the transient decays with 57 ms
+            periods=2 + int(0.5 * frequency),  # 0.5 s: the transient decays with 57 ms
             steps=steps,
         )
         s = 2j * np.pi * frequency
