@@ -273,13 +273,17 @@ def test_gas_springs_rise_from_f1_to_their_progression(F1, p, share, temperature
         assert warm / here == pytest.approx(1.0 + 0.0036 * (temperature - 20.0))
 
 
-@FEW
-@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_air_spring_gives_the_pressure_back_that_it_was_given(x, y):
+@pytest.fixture(scope="module")
+def table():
     spring = load_mechanism("atr95").actuators["lift"]
-    table = AirSpringTable(
+    return AirSpringTable(
         np.array(spring.heights), np.array(spring.pressures), np.array(spring.forces)
     )
+
+
+@FEW
+@given(x=st.floats(0.0, 1.0), y=st.floats(0.0, 1.0))
+def test_air_spring_gives_the_pressure_back_that_it_was_given(table, x, y):
     height = 0.070 + x * 0.195
     pressure = 0.2e6 + y * 0.5e6
     force = table.force(height, pressure)
