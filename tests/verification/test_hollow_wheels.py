@@ -27,7 +27,7 @@ FIELD_SIDE = 0.75  # m, beyond it lies the rim of the hollow
 @points(
     ("depth", "inclination", "lateral"),
     [(1.5e-3, 0.05, 3.2e-3), (2.5e-3, 0.025, 0.1e-3), (2.5e-3, 0.05, 2.7e-3), (4e-3, 0.025, 0.0)],
-    always=(0, 1),
+    always=(0,),
 )
 def test_load_moves_across_a_hollow_as_by_boundary_elements(depth, inclination, lateral):
     # the boundary elements know no zones: all patches at once, each in the field of the others
@@ -36,7 +36,7 @@ def test_load_moves_across_a_hollow_as_by_boundary_elements(depth, inclination, 
     shares = []
     for y in lateral + np.array([-0.1e-3, 0.0]):
         found = loaded_contact(table, y, 0.0, LOAD)
-        exact = exact_contact(wheel, rail, y, 0.0, LOAD, inclination=inclination)
+        exact = exact_contact(wheel, rail, y, 0.0, LOAD, inclination=inclination, elements=20)
         rim, exact_rim = (
             sum(p.N_z for p in contact.patches if p.y > FIELD_SIDE) for contact in (found, exact)
         )
