@@ -66,7 +66,7 @@ def test_wing_and_nose_are_two_rails(parts):
 )
 def test_kinematic_path(parts, wheel, y, lowest, where):
     """Lowest point of a wheel that changes from wing to nose, within 0.015 mm and 3 mm."""
-    s = where + np.arange(-0.006, 0.0065, 0.0015)
+    s = where + np.arange(-0.006, 0.0065, 0.003)
     z = [kinematic_height(parts, at, (wheel.y, wheel.r), RADIUS, 1e-3 * y)[0] for at in s]
     k = int(np.argmax(z))
     assert 1e3 * z[k] == pytest.approx(lowest, abs=0.015)
