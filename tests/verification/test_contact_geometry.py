@@ -40,7 +40,10 @@ def test_rail_between_its_nodes_is_the_cubic_of_their_heights_and_slopes():
 
 @pytest.fixture(
     scope="module",
-    params=["60E1 1:40", pytest.param("60E1 1:20", marks=pytest.mark.further), "benchmark"],
+    params=[
+        pytest.param(name, marks=() if name == "60E1 1:40" else pytest.mark.further)
+        for name in PAIRS
+    ],
 )
 def pair(request):
     name, inclination, half_widths = PAIRS[request.param]

@@ -62,7 +62,7 @@ def test_slow_in_a_curve_the_default_step_finds_the_position_of_a_short_one(vehi
     np.testing.assert_allclose(runs[0].Y[-1], runs[1].Y[-1], rtol=0.0, atol=20.0)
 
 
-@pytest.mark.parametrize(("hand", "speed", "friction"), [(1.0, 15.0, 0.4), (-1.0, 18.0, 0.2)])
+@points(("hand", "speed", "friction"), [(1.0, 15.0, 0.4), (-1.0, 18.0, 0.2)], always=(0,))
 def test_the_long_step_on_smooth_rigid_rails_agrees_with_the_reference_scheme(
     hand, speed, friction
 ):

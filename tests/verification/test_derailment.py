@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from selection import points
 
 from railsim.contact.elastic import TableArrays
 from railsim.contact.table import TableGrid, build_contact_table
@@ -52,7 +53,7 @@ def overturning_speed(vehicle, radius, cant, base=1.5):
     return np.sqrt(9.81 * radius * (c * base / 2 + s * h) / (c * h - s * base / 2))
 
 
-@pytest.mark.parametrize("hand", ["right", "left"])
+@points("hand", ["right", "left"], always=(1,))
 def test_vehicle_that_overturns_is_derailed(hand):
     """A verdict "stopped" had left it unassessed."""
     right = load_track("curve_r250")

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from dynamics import load_vehicle
+from selection import points
 
 import railsim
 from railsim.definitions.settings import Settings
@@ -152,13 +153,14 @@ def growth_beyond_the_vehicle(model, at, step):
     return time_step._step_growth(model, *at, "fast", step) - vehicle
 
 
-@pytest.mark.parametrize(
+@points(
     ("name", "radius", "speed", "friction", "growth"),
     [
         ("power_car_china_star", 250.0, 21.5, 0.24, 10.0),
         ("power_car_china_star", 250.0, 20.5, 0.17, 8.0),
         ("power_car_china_star", 300.0, 22.8, 0.22, 8.0),
     ],
+    always=(0,),
 )
 @pytest.mark.usefixtures("small_contact_tables")
 def test_runs_are_stable_where_one_end_of_their_class_does_not_tell(

@@ -7,6 +7,7 @@ Winkler foundation; nothing in it comes from railsim.  Source: see tests/data/SO
 import numpy as np
 import pytest
 from dynamics import Settings, load_any_track, load_track, load_vehicle
+from selection import points
 
 from railsim.simulation import simulate
 
@@ -29,7 +30,7 @@ def limit_cycle(vehicle, speed, y):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("y", [2e-3, 4e-3])
+@points("y", [2e-3, 4e-3], always=(0,))
 def test_hunting_of_the_benchmark_vehicle(y):
     """2 %: the foundation's modulus alone moves the independent model by that much."""
     amplitude, frequency = limit_cycle("benchmark_vehicle1", 80.0, y)
@@ -49,8 +50,11 @@ def remarks(speed, until=800.0, spectrum=None, start=3e-3, **irregularity):
     return simulate(coach, track, speed=speed, until=until, settings=settings).remarks
 
 
-@pytest.mark.parametrize("spectrum", [None, "erri_b176_low"])
-@pytest.mark.parametrize("speed", [44.4, 48.9])
+@points(
+    ("speed", "spectrum"),
+    [(44.4, None), (44.4, "erri_b176_low"), (48.9, None), (48.9, "erri_b176_low")],
+    always=(1, 2),
+)
 def test_hunting_is_said(speed, spectrum):
     """Above the critical speed of 38.5 to 40 m/s, on smooth rails and on those of ERRI B176."""
     first = remarks(speed, spectrum=spectrum)[0]

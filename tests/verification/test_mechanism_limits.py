@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from selection import points
 
 from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
@@ -350,8 +351,10 @@ def test_the_last_value_is_taken_and_the_next_refused(name, change, taken, refus
         load_mechanism(name, change.format(refused).split())
 
 
-@pytest.mark.parametrize(
-    ("temperature", "end"), [(-40.0, -30.0), (24.9, -30.0), (25.1, 80.0), (90.0, 80.0)]
+@points(
+    ("temperature", "end"),
+    [(-40.0, -30.0), (24.9, -30.0), (25.1, 80.0), (90.0, 80.0)],
+    always=(1, 2),
 )
 def test_temperature_of_a_gas_spring_is_held_against_the_nearer_end(temperature, end):
     """In service from -30 to 80 C."""

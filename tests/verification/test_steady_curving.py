@@ -8,6 +8,7 @@ from dynamics import Settings, load_track, load_vehicle, rotation, steady
 from rig import test_vehicle
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
+from selection import points
 
 import railsim
 from railsim.definitions.vehicle.definition import Vehicle
@@ -238,8 +239,11 @@ def test_positions_in_a_curve_are_those_of_the_steady_state():
     assert found.car_roll[0, 0, 0] == pytest.approx(of(["carbody"], 3)[0])
 
 
-@pytest.mark.parametrize("name", ["coach_manchester", "coach_flexicoil"])
-@pytest.mark.parametrize("radius", [250.0, -600.0])
+@points(
+    ("name", "radius"),
+    [(name, r) for name in ("coach_manchester", "coach_flexicoil") for r in (250.0, -600.0)],
+    always=(0, 3),
+)
 def test_newton_finds_the_end_of_a_long_run(name, radius):
     """Q2: 0.3 % of the largest, wheel by wheel; run: 10 s into the curve, then 30 s more."""
     speed, cant = 20.0, np.copysign(0.15, radius)
