@@ -100,6 +100,7 @@ def unique_from(arm):
     return float(grid[min(last[-1] + 2, 2000)]) if last.size else float(grid[0])
 
 
+@settings(max_examples=40)
 @given(
     form=st.sampled_from(["grossi", "energy"]),
     degrees=st.floats(-5.0, 4.0),
@@ -121,6 +122,7 @@ def test_rotation_inverts_load(form, degrees, seat, length, bush):
     assert float(found) == pytest.approx(phi, abs=1e-12)
 
 
+@settings(max_examples=30)
 @given(scale=st.floats(0.2, 5.0))
 def test_larger_suspension_turns_as_much_under_squared_load(scale):
     # lengths times s, stiffness K_V times s (same material, scaled wire): forces times s^2,

@@ -136,8 +136,8 @@ def test_curving_has_what_the_way_leaves_in_friction_elements():
             {"type": "CST", "length": 420.0, "cant": cant},
         ],
     )
-    run = railsim.simulate(wagon, track, speed=float(found.speed[0, 0]), until=500.0)
-    still = run["distance"] > 440.0
+    run = railsim.simulate(wagon, track, speed=float(found.speed[0, 0]), until=400.0)
+    still = run["distance"] > 340.0
     for name, values in (("Q", found.Q), ("Y", found.Y), ("T_gamma", found.T_gamma)):
         size = np.abs(values[0, 0, 0]).max()
         assert run[name][still].mean(axis=0) == pytest.approx(values[0, 0, 0], abs=0.03 * size)
