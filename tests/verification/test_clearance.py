@@ -31,7 +31,7 @@ def test_coach_runs_in_a_curve_with_more_clearance(gauge, back_to_back, widening
     assert result.wheelset_lateral[-1, 0] == pytest.approx(-6.3e-3 - added, abs=1.0e-3)
 
 
-@pytest.mark.parametrize("coach", ["coach_manchester", "coach_flexicoil"])
+@points("coach", ["coach_manchester", "coach_flexicoil"], always=(0,))
 def test_flanging_wheelset_on_elastic_rails_lies_farther_out_by_half_of_what_the_gauge_widens(
     coach,
 ):

@@ -25,7 +25,10 @@ def disturbed(model, state):
     return state
 
 
-@pytest.fixture(scope="module", params=["coach_manchester", "coach_flexicoil"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param("coach_manchester", marks=pytest.mark.further), "coach_flexicoil"],
+)
 def setting(request):
     vehicle = undamped(load_vehicle(request.param))
     track = load_track("straight").replace(**FRICTIONLESS)

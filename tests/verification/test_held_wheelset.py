@@ -8,6 +8,7 @@ import pytest
 from dynamics import load_track
 from held_wheelset import GRAVITY, RADIUS, HeldWheelset
 from scipy.optimize import brentq, root
+from selection import points
 
 from railsim.kernels.contact_columns import C11, C22, C23, C_Y, A, B
 from railsim.linear.circle import circle
@@ -62,7 +63,7 @@ def test_creep_forces_of_contacts_wheelset_a22():
     assert np.max(np.abs(heights)) < 0.04
 
 
-@pytest.mark.parametrize(("friction", "limit"), [(0.3, 1.342), (0.4, 1.118), (0.5, 0.947)])
+@points(("friction", "limit"), [(0.3, 1.342), (0.4, 1.118), (0.5, 0.947)], always=(0, 2))
 def test_flange_climbs_at_nadals_limit(friction, limit):
     """Nadal (1896): (tan 70 - mu)/(1 + mu tan 70), sliding sideways on the flange, 1.5 %.
 

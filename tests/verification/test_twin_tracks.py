@@ -72,7 +72,7 @@ def test_widening_of_one_rail_is_a_wider_track_beside_its_position(coach):
     assert_same(coach, widening(0.005), 5.0)
 
 
-@pytest.mark.parametrize("write", [alignment, cross_level])
+@points("write", [alignment, cross_level], always=(0,))
 def test_chosen_step_and_scheme_find_the_same_too(coach, write):
     """Within 2 %: at 1.25 ms the two differ by 1.3 % of Y on cant, at half of it by 0.5 %."""
     one, two = runs(coach, write(Wave(20.0, 0.004)), SPEED, settings=Settings())

@@ -75,7 +75,7 @@ def test_friction_zero_works(coach):
     assert np.all(result.T_gamma == 0.0)
 
 
-@pytest.fixture(scope="module", params=[20.0, 12.0])
+@pytest.fixture(scope="module", params=[20.0, pytest.param(12.0, marks=pytest.mark.further)])
 def steady_curve(request, coach):
     """State in the middle of a long curve, when everything has settled."""
     speed = request.param
