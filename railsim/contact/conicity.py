@@ -73,12 +73,12 @@ def equivalent_conicity(
     return np.array([_conicity(y, delta_r, potential, float(a)) for a in wanted])
 
 
-def _value(y: Floats, delta_r: Floats, potential: Floats, position: float) -> tuple[float, float]:
-    """Radius difference and potential at a position within the range."""
-    i = min(max(int(np.searchsorted(y, position, side="right")) - 1, 0), y.size - 2)
-    d = position - y[i]
+def _value(y: Floats, delta_r: Floats, potential: Floats, at: Floats | float) -> Floats:
+    """Radius differences and potentials at positions within the range, float64[2, ...]."""
+    i = np.clip(np.searchsorted(y, at, side="right") - 1, 0, y.size - 2)
+    d = at - y[i]
     slope = (delta_r[i + 1] - delta_r[i]) / (y[i + 1] - y[i])
-    return float(delta_r[i] + slope * d), float(potential[i] + d * (delta_r[i] + 0.5 * slope * d))
+    return np.array([delta_r[i] + slope * d, potential[i] + d * (delta_r[i] + 0.5 * slope * d)])
 
 
 def _orbit_centre(y: Floats, delta_r: Floats, potential: Floats, amplitude: float) -> float | None:
@@ -87,13 +87,13 @@ def _orbit_centre(y: Floats, delta_r: Floats, potential: Floats, amplitude: floa
     if lower > upper + 1e-12:
         return None
 
-    def excess(centre: float) -> float:
-        high = _value(y, delta_r, potential, centre + amplitude)[1]
-        return high - _value(y, delta_r, potential, centre - amplitude)[1]
+    def excess(centre: Floats | float) -> Floats:
+        low, high = (_value(y, delta_r, potential, centre + a)[1] for a in (-amplitude, amplitude))
+        return np.asarray(high - low)
 
     # sign changes where the function starts falling to the left of the wheelset's middle
     grid = np.linspace(lower, upper, 401) if upper > lower else np.array([lower])
-    values = np.array([excess(c) for c in grid])
+    values = excess(grid)
     scale = np.max(np.abs(potential)) + 1e-300
     rising = np.flatnonzero((values[:-1] <= 0.0) & (values[1:] > 0.0))
     if rising.size == 0:
