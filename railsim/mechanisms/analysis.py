@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ class Analysis:
     release: FreeMotion | None
     case: str | None = None
     known: dict[str, Extremes] = field(default_factory=dict, repr=False, compare=False)
+    near: dict[bytes, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def equilibria(self) -> tuple[tuple[float, bool], ...]:
@@ -102,20 +104,26 @@ class Analysis:
     def extremes(self, name: str, of: Callable[[Any], Any] = np.asarray) -> Extremes:
         """Least and largest value of a result, also between the positions of `output`."""
         if name not in self.known:
-            motion, values = self._dense(name)
-            ends = [
-                largest(motion, lambda m, k=k: k * of(outputs(m)[name]), k * of(values))  # type: ignore[misc]
-                for k in (-1.0, 1.0)
-            ]
-            self.known[name] = Extremes(-ends[0][1], ends[0][0], ends[1][1], ends[1][0])
+            motion, values = self._dense
+
+            def found(m: Motion) -> Any:
+                # many results have their extremes at an end, the same positions
+                at = m.s.tobytes()
+                self.near[at] = self.near.get(at) or outputs(m)
+                return of(self.near[at][name])
+
+            least, of_least = largest(motion, lambda m: -found(m), -of(values[name]))
+            most, of_most = largest(motion, found, of(values[name]))
+            self.known[name] = Extremes(-of_least, least, of_most, most)
         return self.known[name]
 
-    def _dense(self, name: str) -> tuple[Motion, Floats]:
-        """Positions from which a result is looked up in between, with its values there."""
+    @cached_property
+    def _dense(self) -> tuple[Motion, dict[str, Floats]]:
+        """Positions from which results are looked up in between, with their values there."""
         if len(self.motion.s) >= DENSE:
-            return self.motion, self.output[name]
+            return self.motion, self.output
         motion = solve(self.model, np.linspace(self.model.start, self.model.end, DENSE))
-        return motion, outputs(motion)[name]
+        return motion, outputs(motion)
 
     def at(self, quantity: str, value: float) -> dict[str, float]:
         """All results at the first position where one of them has a value; see `everywhere`."""
@@ -139,7 +147,7 @@ class Analysis:
             There is no such result, or it never has this value.
         """
         self.result(quantity)
-        dense, known = self._dense(quantity)
+        dense, known = self._dense[0], self._dense[1][quantity]
         low, high = np.nanmin(known), np.nanmax(known)
         level = (known[1:] == value) & (known[:-1] == value)
         s = zeros(dense, lambda motion: outputs(motion)[quantity] - value)

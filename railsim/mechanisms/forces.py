@@ -75,18 +75,20 @@ class Mass(NamedTuple):
 
 def masses(motion: Motion) -> list[Mass]:
     """Every mass of bodies and elements."""
+    return motion.once("masses", lambda: [*_masses(motion)])
+
+
+def _masses(motion: Motion) -> Iterator[Mass]:
     model = motion.model
-    found = []
     for name, body in model.definition.bodies.items():
         m, inertia = model.number(body.mass), model.number(body.inertia)
         if np.any(np.real(m) != 0.0) or np.any(np.real(inertia) != 0.0):
             k = model.bodies[name]
-            found.append(Mass(m, motion.at(k, *model.position(body.centre)), inertia, k))
+            yield Mass(m, motion.at(k, *model.position(body.centre)), inertia, k)
     for part in model.definition.elements.values():
         if isinstance(part, parts.PointMass):
             k = model.bodies[body_name(part.point_mass)]
-            found.append(Mass(model.number(part.mass), motion.point(part.point_mass), 0.0, k))
-    return found
+            yield Mass(model.number(part.mass), motion.point(part.point_mass), 0.0, k)
 
 
 def inertia(motion: Motion) -> tuple[Any, Any]:

@@ -72,10 +72,10 @@ class Motion:
         c, s = np.cos(theta), np.sin(theta)
         ax, ay = c * u - s * v, s * u + c * v
         w, w1 = self.q1[..., body, 2], self.q2[..., body, 2]
-        r = np.stack((x + ax, y + ay), axis=-1)
-        r1 = np.stack((self.q1[..., body, 0] - ay * w, self.q1[..., body, 1] + ax * w), axis=-1)
+        x1, y1 = self.q1[..., body, 0], self.q1[..., body, 1]
         x2, y2 = self.q2[..., body, 0], self.q2[..., body, 1]
-        return r, r1, np.stack((x2 - ay * w1 - ax * w * w, y2 + ax * w1 - ay * w * w), axis=-1)
+        r, r1 = _pairs(x + ax, y + ay), _pairs(x1 - ay * w, y1 + ax * w)
+        return r, r1, _pairs(x2 - ay * w1 - ax * w * w, y2 + ax * w1 - ay * w * w)
 
     def length(self, pair: Sequence[str]) -> Triple:
         """Distance of two points with two derivatives, shape (..., position) [m]."""
@@ -99,6 +99,13 @@ class Motion:
         (a, b), (c, d) = (np.moveaxis(line, -1, 0) for line in lines)
         turned = atan2(b * c - a * d, a * c + b * d) + self.model.number(angle.offset)
         return turned - 2.0 * np.pi * np.round(np.real(turned) / (2.0 * np.pi))
+
+
+def _pairs(x: Any, y: Any) -> Any:
+    """Vectors in the last axis, as `np.stack` makes them in three times the time."""
+    found = np.empty((*x.shape, 2), x.dtype)
+    found[..., 0], found[..., 1] = x, y
+    return found
 
 
 def dot(a: Any, b: Any) -> Any:

@@ -5,7 +5,7 @@ imaginary step each (`lanes`): whatever is computed from its numbers then carrie
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -43,10 +43,15 @@ class Model:
     pose: Floats  # where the assembly at the start is looked for, (body, 3)
     start: float  # range of the driver [rad or m]
     end: float
+    known: dict[str, Values] = field(default_factory=dict, repr=False, compare=False)
 
     def number(self, quantity: float | str) -> Values:
-        """Value of a number of the file."""
-        return number(quantity, self.values)
+        """Value of a number of the file; an expression is evaluated once."""
+        if not isinstance(quantity, str):
+            return quantity
+        if quantity not in self.known:
+            self.known[quantity] = number(quantity, self.values)
+        return self.known[quantity]
 
     def position(self, where: Any) -> tuple[Values, Values]:
         """Coordinates of a point of the file in its body's axes [m]."""
@@ -65,7 +70,7 @@ class Model:
         lanes = {n: v for n, v in self.linkage._asdict().items() if np.iscomplexobj(v)}
         arrays: dict[str, Any] = {n: np.ascontiguousarray(v[:1].real) for n, v in lanes.items()}
         values = {name: real(value) for name, value in self.values.items()}
-        return replace(self, values=values, linkage=self.linkage._replace(**arrays))
+        return replace(self, values=values, linkage=self.linkage._replace(**arrays), known={})
 
     def refusal(self, key: str, found: str, allowed: str) -> InputError:
         """The error that refuses the mechanism at a key of its file."""

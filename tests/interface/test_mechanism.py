@@ -1,5 +1,7 @@
 """``railsim mechanism``: keys of --json, exit status, files of --out, every kind of bad input."""
 
+import contextlib
+import io
 import json
 import re
 from html.parser import HTMLParser
@@ -19,6 +21,7 @@ from railsim.plot.mechanisms import angles_figure
 from railsim.report.mechanisms import GIF_FRAMES
 
 FEW = ["--set", "sampling.points=51"]
+BASE = [*FEW, "--set", "cases={}"]
 FOUR_BAR = """
 format = "railsim-mechanism/1"
 [parameters]
@@ -71,6 +74,23 @@ def answer(capsys, *arguments):
     return json.loads(out)
 
 
+def answered(*arguments):
+    """The same for several tests."""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert cli.main(["mechanism", *arguments, "--json"]) == 0
+    return json.loads(out.getvalue())
+
+
+@pytest.fixture(scope="module")
+def lift():
+    return answered("atr95_lift_5", *FEW)
+
+
+@pytest.fixture(scope="module")
+def tilting():
+    return answered("tilting_one_spring", *BASE)
+
+
 def refused(capsys, *arguments):
     """Lines on stderr of a command that ends with status 2 and prints nothing else."""
     assert cli.main(["mechanism", *arguments]) == 2
@@ -93,8 +113,8 @@ def test_every_shipped_mechanism_is_valid_and_listed(capsys):
             assert mechanism.provenance_of(parameter) != "not stated"
 
 
-def test_json_of_a_lift_has_the_promised_keys(capsys):
-    data = answer(capsys, "atr95_lift_5", *FEW)
+def test_json_of_a_lift_has_the_promised_keys(lift):
+    data = lift
     keys = "parameters travel stroke length_start length_end max_force max_force_at force_zeros"
     keys += " min_transmission_angles output zone motion contact reactions cases selection checks"
     assert set(keys.split()) <= set(data)
@@ -115,7 +135,8 @@ def test_json_of_a_lift_has_the_promised_keys(capsys):
 
 
 def test_json_of_the_tilting_machine_has_springs_and_cases(capsys):
-    data = answer(capsys, "tilting_two_springs", *FEW)
+    case = "--set", "cases={bordolese_5000={m_bottle=2.950,x_bottle=-0.011,y_bottle=0.221}}"
+    data = answer(capsys, "tilting_two_springs", *FEW, *case)
     assert {"travel", "force", "front_length", "rear_length", "front_force"} <= set(data["output"])
     assert data["output"]["travel"][0] == pytest.approx(np.radians(-35.0))
     heavy = data["cases"]["bordolese_5000"]
@@ -279,7 +300,8 @@ def test_search_without_a_solution_gives_the_least_broken_compromise(capsys):
         ("atr95", ["actuators.lift.heights=[0.1,0.2]"], "actuators.lift", "rows of 'forces'"),
         ("atr95_lift_5", ["optimise.objective=constant"], "optimise.target", "needs one"),
         ("tilting_one_spring", ["parameters.release_at=2.0"], "release.start", "114.59"),
-        ("tilting_one_spring", ["release.until=1.2"], "release: it swings past the end of",
+        ("tilting_one_spring", ["release.until=1.2", "release.duration=1"],
+         "release: it swings past the end of",
          "the travel at -35.0000 deg; a release that reaches 68.7549 deg"),
         ("watt_axlebox_guide", ["parameters.lift=0.5"], "joints.", "cannot be assembled"),
         ("atr95_lift_5", ["parameters.travel=-1.2"], "joints.rod", "from here on"),
@@ -398,7 +420,7 @@ def test_actuator_through_its_dead_point(capsys, write):
 
 
 def test_catalogue_without_a_fit_is_a_result_with_reasons(capsys):
-    data = answer(capsys, "tilting_one_spring", "--set", "parameters.front_F1=5000", *FEW)
+    data = answer(capsys, "tilting_one_spring", "--set", "parameters.front_F1=5000", *BASE)
     rows = [row for row in data["selection"] if row["catalogue"] == "vapsint"]
     assert rows
     assert not any(row["fits"] for row in rows)
@@ -408,7 +430,7 @@ def test_catalogue_without_a_fit_is_a_result_with_reasons(capsys):
 def test_lid_formula_is_a_rule_of_thumb_and_service_temperature_a_check(capsys):
     # 20 kg at 400 mm, two springs at 150 mm, factor 1.1: 287.467 N (B8)
     lid = "lid={element='front',mass=20,centre=0.4,lever=0.15,springs=2,factor=1.1}"
-    changes = ["--set", lid, "--set", "parameters.temperature=90", *FEW]
+    changes = ["--set", lid, "--set", "parameters.temperature=90", *BASE]
     data = answer(capsys, "tilting_one_spring", *changes)
     checks = {c["name"]: c for c in data["checks"]}
     assert checks["lid_front"]["limit"] == pytest.approx(287.467, abs=1e-3)
@@ -418,13 +440,13 @@ def test_lid_formula_is_a_rule_of_thumb_and_service_temperature_a_check(capsys):
     assert (checks["front_temperature"]["limit"], checks["front_temperature"]["ok"]) == (80, False)
 
 
-def test_joint_friction_parts_the_pressures_that_raise_and_lower(capsys):
-    rub = ["--set", "elements.rub={joint_friction='boom',moment=60}"]
-    plain, rubbed = (answer(capsys, "atr95_lift_5", *FEW, *more) for more in ([], rub))
-    rate = np.array(plain["output"]["rate"])
+def test_joint_friction_parts_the_pressures_that_raise_and_lower(capsys, lift):
+    rub = "elements.rub={joint_friction='boom',moment=60}"
+    rubbed = answer(capsys, "atr95_lift_5", *FEW, "--set", rub)
+    rate = np.array(lift["output"]["rate"])
     area = 0.25 * np.pi * 0.16**2
     for name, sign in (("pressure", 1), ("pressure_back", -1)):
-        found = np.array(rubbed["output"][name]) - plain["output"]["pressure"]
+        found = np.array(rubbed["output"][name]) - lift["output"]["pressure"]
         assert found == pytest.approx(sign * 60.0 / rate / area, rel=1e-9)
 
 
@@ -435,22 +457,21 @@ def test_changes_of_arcs_are_told(capsys):
     assert "cam: from arc 1 to 2 at 9.156" in capsys.readouterr().out
 
 
-def test_pressure_in_a_gas_spring_is_its_force_over_its_rod(capsys):
-    output = answer(capsys, "tilting_one_spring", *FEW)["output"]
+def test_pressure_in_a_gas_spring_is_its_force_over_its_rod(tilting):
+    output = tilting["output"]
     area = 0.25 * np.pi * 0.006**2
     assert output["front_pressure"] == pytest.approx(np.array(output["front_force"]) / area)
 
 
 def test_a_case_that_cannot_be_computed_is_named(capsys):
     """The spring's bracket at 200 mm is out of its stroke; the base itself is right."""
-    bad = "cases.bad={r_E=0.2}"
+    bad = "cases={bad={r_E=0.2}}"
     (line,) = refused(capsys, "tilting_one_spring", "--set", bad, *FEW)
     assert "elements.front: case 'bad': driver at -35" in line
 
 
-def test_scatter_says_which_dimension_matters(capsys):
-    data = answer(capsys, "atr95_lift_5", *FEW)
-    stroke = next(one for one in data["scatter"] if one["name"] == "stroke")
+def test_scatter_says_which_dimension_matters(capsys, lift):
+    stroke = next(one for one in lift["scatter"] if one["name"] == "stroke")
     assert 0.0 < stroke["random"] < stroke["worst"]
     assert stroke["worst"] == pytest.approx(sum(abs(v) for v in stroke["single"].values()))
     assert cli.main(["mechanism", "atr95_lift_5", *FEW]) == 0
@@ -545,12 +566,11 @@ def test_a_motion_is_written_with_every_link_and_actuator(tmp_path, capsys):
     assert set(data["motion"]["actuators"]["piston"]) == {"length", "speed", "acceleration"}
 
 
-def test_equal_reasons_of_a_catalogue_are_one_row_on_the_terminal_only(capsys):
-    assert cli.main(["mechanism", "tilting_one_spring", *FEW]) == 0
+def test_equal_reasons_of_a_catalogue_are_one_row_on_the_terminal_only(capsys, tilting):
+    assert cli.main(["mechanism", "tilting_one_spring", *BASE]) == 0
     out = capsys.readouterr().out
     assert "front: 3ML p 30 % ... front: 4SL p 100 % (30 rows)" in out
-    rows = answer(capsys, "tilting_one_spring", *FEW)["selection"]
-    assert sum(row["catalogue"] == "rigid_lock" for row in rows) == 30
+    assert sum(row["catalogue"] == "rigid_lock" for row in tilting["selection"]) == 30
 
 
 def test_limit_in_the_picture_of_angles_names_those_that_it_limits():
