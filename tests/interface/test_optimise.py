@@ -50,6 +50,14 @@ def written(folder, text=STUDY):
     return str(file)
 
 
+@pytest.fixture(autouse=True)
+def undrawn():
+    """Pictures are half of the time; those of `found` are made before, and looked at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("railsim.plot.style.save", lambda *_, **__: None)
+        yield
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """An optimisation of six designs, and its file."""

@@ -301,7 +301,7 @@ def test_default_picture_is_beside_the_result_and_not_overwritten(file, capsys):
     assert main(["plot", str(file)]) == 0
     assert main(["plot", str(file)]) == 2
     assert "--overwrite" in capsys.readouterr().err
-    assert main(["plot", str(file), "--overwrite", "--json"]) == 0
+    assert main(["plot", str(file), "Y", "--overwrite", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"file": str(file.with_suffix(".png"))}
 
 

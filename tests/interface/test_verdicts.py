@@ -16,7 +16,7 @@ from railsim.report.limits import assessed
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
-ON_ZONE_4 = track(*curve(300.0, 800.0), cant=0.12)
+ON_ZONE_4 = track(*curve(300.0, 400.0), cant=0.12)
 
 
 def random(seed, spectrum="erri_b176_low"):
@@ -135,12 +135,6 @@ def test_what_was_not_measured_is_no_pass(method, without, words):
 
 def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
     run = made(track(STRAIGHT), FAST, lateral=lambda t: 4.0 * np.sin(2 * np.pi * t))
-    (found,) = assess(run)
-    assert {n: v.value for n, v in found.verdicts.items()} == {
-        "safety": "incomplete", "loading": "incomplete", "ride": "fail"
-    }  # fmt: skip
-    assert found.verdict == "incomplete"
-    assert assess(run, "uic518")[0].verdict == "fail"
     path = str(run.to_hdf5(tmp_path / "run.h5"))
     assert main(["assess", path, "--fail"]) == 0
     assert "ride (for information): fail" in capsys.readouterr().out
@@ -149,7 +143,9 @@ def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
     assert main(["assess", path, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)[0]
     assert data["verdict"] == "incomplete"
-    assert data["verdicts"]["ride"]["verdict"] == "fail"
+    assert {name: one["verdict"] for name, one in data["verdicts"].items()} == {
+        "safety": "incomplete", "loading": "incomplete", "ride": "fail"
+    }  # fmt: skip
     assert "lateral body acceleration" in data["verdicts"]["ride"]["reasons"][0]
 
 
@@ -205,7 +201,7 @@ def test_results_on_low_and_high_irregularities_are_not_pooled():
 def test_sections_outside_the_conditions_are_no_pass_even_if_asked_for():
     """30 sections of zone 1 at 20 m/s where 36.7 are required: enough only by number."""
     on = track({"type": "STR", "length": 7700.0})
-    slow, right = (made(on, speed, rate=200.0) for speed in (20.0, FAST))
+    slow, right = (made(on, speed, rate=100.0) for speed in (20.0, FAST))
     for run, state in ((slow, "not met"), (right, "met")):
         (found,) = assess(run, coarse=True, all_sections=True)
         about = condition(found, "number of sections", "zone 1")
@@ -220,8 +216,9 @@ def test_the_same_irregularities_twice_are_not_independent():
         return condition(found, "independent sections")
 
     assert pair(4).state == "met"
-    assert pair(3).state == "not met"
-    assert pair(3).found.startswith("6 of 12")
+    again = pair(3)
+    assert again.state == "not met"
+    assert again.found.startswith("6 of 12")
 
 
 def test_sections_that_overlap_on_the_same_irregularities_are_not_independent():
