@@ -40,14 +40,18 @@ def rows_of(assessment, zone, name):
     return {row.place: row for row in report.rows if row.criterion.name == name}
 
 
-@pytest.fixture(scope="module")
-def hunting():
+def hunts(rate):
     """30 kN at 5 Hz on straight track, 0.2 m/s2 of the body at 1 Hz."""
     return made(
         track(STRAIGHT), FAST,
         Y=lambda t, s: both_sides(30e3 * np.sin(2 * np.pi * 5.0 * t)[:, None] + 0.0 * s),
-        lateral=lambda t: 0.2 * np.sin(2 * np.pi * t), rate=400.0,
+        lateral=lambda t: 0.2 * np.sin(2 * np.pi * t), rate=rate,
     )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def hunting():
+    return hunts(200.0)
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +60,8 @@ def hunting_file(hunting, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def of_hunting(hunting):
-    (found,) = assess(hunting)
+def of_hunting():
+    (found,) = assess(hunts(400.0))
     return found
 
 
@@ -118,7 +122,7 @@ def steady(turn):
         inner = 25e3 if turn > 0 else 40e3
         return np.stack([np.full(s.shape, -outer), np.full(s.shape, inner)], axis=-1)
 
-    on = track(*curve(300.0 * turn, 800.0), cant=0.12 * turn)
+    on = track(*curve(300.0 * turn, 400.0), cant=0.12 * turn)
     return made(on, 23.0, Y=Y, lateral=lambda t: turn * (1.0 + 9.81 * 0.08) + 0.0 * t)
 
 

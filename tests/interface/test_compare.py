@@ -15,11 +15,12 @@ from railsim.result import Result
 from railsim.result.export import selected
 
 
-@pytest.fixture
-def files(tmp_path):
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
     return [
-        str(example_result().to_hdf5(tmp_path / "base.h5")),
-        str(example_result(gain=0.9).to_hdf5(tmp_path / "lower.h5")),
+        str(example_result().to_hdf5(folder / "base.h5")),
+        str(example_result(gain=0.9).to_hdf5(folder / "lower.h5")),
     ]
 
 
@@ -116,9 +117,17 @@ def test_a_result_that_ended_early_is_said_to_have(files, tmp_path, capsys):
     assert status == {"base": "complete", "short": "stopped"}
 
 
-def test_folder_holds_table_record_and_picture(files, tmp_path):
+def test_folder_holds_table_record_and_picture_and_is_kept_without_overwrite(
+    files, tmp_path, capsys
+):
     folder = tmp_path / "comparison"
-    assert main(["compare", *files, "--out", str(folder)]) == 0
+    folder.mkdir()
+    (folder / "differences.png").write_text("mine")
+    given = ["compare", *files, "--out", str(folder)]
+    assert main(given) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert [path.read_text() for path in folder.iterdir()] == ["mine"]
+    assert main([*given, "--overwrite"]) == 0
     assert sorted(path.name for path in folder.iterdir()) == [
         "compare.csv",
         "compare.json",
@@ -129,6 +138,7 @@ def test_folder_holds_table_record_and_picture(files, tmp_path):
     assert float(rows[0]["difference"]) == 0.0
     assert {row["result"] for row in rows} == {"base", "lower"}
     assert json.loads((folder / "compare.json").read_text())["results"] == ["base", "lower"]
+    assert (folder / "differences.png").stat().st_size > 5000
 
 
 def test_results_that_keep_few_quantities_are_drawn_by_what_all_have(tmp_path):
@@ -140,14 +150,6 @@ def test_results_that_keep_few_quantities_are_drawn_by_what_all_have(tmp_path):
         paths.append(str(run.to_hdf5(tmp_path / f"{name}.h5")))
     assert main(["compare", *paths, "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "compare.png").stat().st_size > 0
-
-
-def test_existing_comparison_is_kept_without_overwrite(files, tmp_path, capsys):
-    given = ["compare", *files, "--out", str(tmp_path / "comparison")]
-    assert main(given) == 0
-    assert main(given) == 2
-    assert "--overwrite" in capsys.readouterr().err
-    assert main([*given, "--overwrite"]) == 0
 
 
 def test_json_is_all_that_stdout_holds(files, capsys):

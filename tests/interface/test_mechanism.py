@@ -495,9 +495,8 @@ def test_every_axis_of_every_picture_says_its_unit():
     )
     full = analyse(load_mechanism("tilting_two_springs", ["sampling.points=51"]), "bordolese_5000")
     collections = [
-        Collected([one, cam], {}, None),
+        Collected([cam, one], {}, None),
         Collected([two], {"base": two, "bordolese_5000": full}),
-        Collected([cam], {}),
     ]
     seen = set()
     for collected in collections:

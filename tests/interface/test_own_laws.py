@@ -100,7 +100,7 @@ def test_a_law_is_the_built_in_element(coach, track):
 def test_states_of_a_law_are_integrated(coach, track):
     """A Maxwell damper by its differential equation; the reference scheme, order 4."""
     laws.allow()
-    way = WAY | {"settings": SETTINGS.with_values({"scheme": "rk4"}), "until": 4.0}
+    way = WAY | {"settings": SETTINGS.with_values({"scheme": "rk4"}), "until": 2.0}
     own = railsim.simulate(with_element(coach, law("maxwell", c=30e3, k=3e6)), track, **way)
     element = {"kind": "spring_damper", "damping": 30e3, "series_stiffness": 3e6}
     built_in = railsim.simulate(with_element(coach, element), track, **way)

@@ -171,7 +171,9 @@ def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
     assert len(near) > 10
 
 
-def test_picture_of_a_short_wagon_in_a_curve_has_its_whole_title():
+def test_picture_of_a_short_wagon_in_a_curve_has_its_whole_title(monkeypatch):
+    monkeypatch.setattr(curving, "SETTLING", 1.0)  # whatever the state
+    monkeypatch.setattr(curving, "SAMPLED", 0.1)
     figure = railsim.curving(railsim.load_vehicle("wagon_uic_link"), radius=[300.0]).plot()
     figure.draw_without_rendering()
     for axes in figure.get_axes():
