@@ -128,6 +128,15 @@ def test_cant_of_a_left_hand_curve_is_negative(capsys, cant, told):
     assert ("cant on the wrong side" in "".join(capsys.readouterr())) == told
 
 
+@pytest.fixture
+def undrawn():
+    """Without the picture beside an animation."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("railsim.plot.style.save", lambda *_, **__: None)
+        yield
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_mode_is_animated(capsys, tmp_path):
     folder = tmp_path / "modes"
     arguments = [
@@ -147,6 +156,7 @@ def test_a_mode_is_animated(capsys, tmp_path):
     assert "front hunting" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_all_modes_of_one_speed_are_animated_and_named_after_what_moves(capsys, tmp_path):
     out = ["--speed", "30", "--quiet", "--out", str(tmp_path)]
     assert main(["modes", "wagon_y25", *out, "--overwrite"]) == 0

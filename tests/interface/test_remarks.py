@@ -60,7 +60,8 @@ def test_index_and_table_of_a_study_repeat_them(tmp_path):
     assert [row["remarks"] for row in rows] == [" ".join(REMARKS), "", ""]
 
 
-def test_comparison_names_the_result_that_they_belong_to(files, tmp_path, capsys):
+def test_comparison_names_the_result_that_they_belong_to(files, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("railsim.plot.style.save", lambda *_, **__: None)
     assert main(["compare", *files, "--out", str(tmp_path / "both")]) == 0
     printed = capsys.readouterr().out
     for remark in REMARKS:
