@@ -112,9 +112,10 @@ def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Mo
     complex_values = any(np.iscomplexobj(v) for v in values.values())
     arrays = _Arrays(definition, values, lanes, complex if complex_values else float)
     driver = definition.driver
-    ends = (real(number(end, values)) for end in (driver.start, driver.end))
+    start, end = (real(number(end, values)) for end in (driver.start, driver.end))
     pose = _pose(definition, values, arrays)
-    return Model(definition, values, arrays.linkage(), arrays.points, arrays.bodies, pose, *ends)
+    numbers = arrays.linkage(), arrays.points, arrays.bodies, pose, start, end
+    return Model(definition, values, *numbers)
 
 
 def with_lanes(values: Mapping[str, float]) -> dict[str, Complexes]:
