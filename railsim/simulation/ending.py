@@ -91,7 +91,7 @@ def verdict(run: Run) -> dict[str, str]:
             cause = "the step is too long or the model is unstable"
             return {"status": "stopped", "status_reason": f"{where} {why}: {cause}"}
         if run.status != DERAILED and not thrown:
-            why = "lifted a wheel higher above its rail than its flange reaches"
+            why = "rolled until one of its wheels left its rail by more than its flange reaches"
             return {"status": "derailed", "status_reason": f"{where} {why}"}
     return {
         "status": STATUS[run.status][0],
@@ -101,7 +101,7 @@ def verdict(run: Run) -> dict[str, str]:
 
 
 def stands_above_rail(run: Run) -> bool:
-    """Whether the run ended with a wheel higher above its rail than its flange reaches."""
+    """Whether the run ended with a wheel above or below its rail by more than its flange reaches."""
     if run.status != ROLL_RANGE:
         return run.status == WHEEL_LIFT
     system = run.prepared.model.system
