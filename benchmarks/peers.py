@@ -17,7 +17,7 @@ curve's track is smooth and straight, which steps of variable length cross in no
 Of each peer the fastest setting counts whose error against the converged solution is within what
 railsim's default run is allowed, or within railsim's own error where that is larger.  CPU times of
 the integration alone, of one core; all candidates of a peer run once, the best one and railsim
-three times, the least time counts.  `--small` runs 20 m with one setting of each peer, to see that
+three times, the least time counts.  `--small` runs 2 m with one setting of each peer, to see that
 the script works.
 """
 
@@ -231,9 +231,9 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", default="peers.json")
     parser.add_argument("--until", type=float, default=420.0, help="end of the Exudyn run (m)")
-    parser.add_argument("--small", action="store_true", help="20 m and one setting of each peer")
+    parser.add_argument("--small", action="store_true", help="2 m and one setting of each peer")
     options = parser.parse_args()
-    extent = Extent(20.0, 20.0, 1, 1) if options.small else Extent(None, options.until, None, 3)
+    extent = Extent(2.0, 2.0, 1, 1) if options.small else Extent(None, options.until, None, 3)
     found: dict[str, Any] = {"hardware": hardware(), "versions": versions(("exudyn",))}
     if not options.small:
         found["fastsim"] = measure_fastsim()

@@ -9,6 +9,7 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from runpy import run_path
 
 import pytest
 from selection import points
@@ -29,6 +30,8 @@ SMALL = {
                       "--speeds", "1", "--frictions", "2", "--duration", "1", "--workers", "1"],
     "whole.py": ["--small"],
 }  # fmt: skip
+# the threads of a process, its memory, another program's solvers
+OWN_PROCESS = {"growth.py", "peers.py", "study_cost.py"}
 IMPORTED = {"commands.py", "cores.py", "exudyn_coach.py", "exudyn_contact.py",
             "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py"}  # fmt: skip
 WRITES_THE_MANUAL = {"tables.py"}  # from the figures in `benchmarks/results`
@@ -68,9 +71,18 @@ def test_figures_of_the_manual_are_those_of_the_results(monkeypatch, tmp_path):
     assert f"{smooth} times faster than real time through that curve, {rough} times on" in readme
 
 
-@pytest.mark.parametrize("script", SMALL)
-def test_script_runs_in_its_small_form(script, tmp_path):
+@pytest.mark.parametrize("script", sorted({*SMALL} - OWN_PROCESS))
+def test_script_runs_in_its_small_form(script, tmp_path, monkeypatch, capsys):
     (tmp_path / "small.toml").write_text(STUDY)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [script, *SMALL[script]])
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    run_path(str(BENCHMARKS / script), run_name="__main__")
+    assert capsys.readouterr().out
+
+
+@pytest.mark.parametrize("script", sorted(OWN_PROCESS))
+def test_script_runs_in_its_small_form_and_a_process_of_its_own(script, tmp_path):
     done = subprocess.run(
         [sys.executable, str(BENCHMARKS / script), *SMALL[script]],
         cwd=tmp_path,
