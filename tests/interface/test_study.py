@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 import h5py
+import numba
 import numpy as np
 import pytest
 from example_result import ROOT, feed
@@ -26,6 +27,9 @@ import railsim
 import railsim.studies.run
 from railsim.cli import main
 from railsim.errors import InputError, ModelError
+from railsim.kernels import FASTMATH
+from railsim.kernels.compiler import compiled_by
+from railsim.simulation import first_start
 from railsim.studies import execute
 from railsim.studies.case import load_case
 from railsim.studies.journal import Journal
@@ -556,9 +560,8 @@ def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
     monkeypatch.setattr(execute, "WorkerPool", Pool)
     monkeypatch.setattr(execute, "is_compiled", lambda: compiled)
     show = lambda fraction: events.append("progress" if fraction > 0.0 else "nothing yet")  # noqa: E731
-    outcome = railsim.study(
-        [COACH], [STRAIGHT], [15.0, 20.0, 25.0], out=tmp_path, workers=2, progress=show
-    )
+    how = {"until": 300.0, "workers": 2, "progress": show}
+    outcome = railsim.study([COACH], [STRAIGHT], [15.0, 20.0, 25.0], out=tmp_path, **how)
     assert [record["status"] for record in outcome.records] == ["complete"] * 3
     begins = [index for index, event in enumerate(events) if event.startswith("begin")]
     assert [events[index] for index in begins] == ["begin 0", "begin 1", "begin 2"]
@@ -588,29 +591,22 @@ def test_cost_of_a_run_does_not_grow_with_their_number(tmp_path, monkeypatch):
     assert np.diff([0.0, *shown, 1.0]).min() > -1e-9
 
 
-@pytest.mark.slow
-def test_compiled_code_is_seen(tmp_path):
-    """An empty cache folder and a full one, each in a process of its own."""
-    look = "from railsim.simulation.first_start import is_compiled; print(is_compiled())"
-    compile_it = (
-        "import railsim; railsim.simulate(railsim.load_vehicle('coach_manchester'),"
-        "railsim.load_track('straight'), speed=20.0, until=1.0);"
-    )
+def test_compiled_code_is_seen(tmp_path, monkeypatch):
+    """A full cache folder and an empty one, none at all, and no compiler."""
 
-    def seen(before="", **variables):
-        environment = os.environ | variables
-        return subprocess.run(
-            [sys.executable, "-c", before + look],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.strip()
+    def time_loop():
+        pass
 
-    assert seen(compile_it) == "True"
-    assert seen(RAILSIM_CACHE_DIR=str(tmp_path)) == "False"
-    assert seen(RAILSIM_CACHE_DIR="/dev/null/none") == "True"  # every process compiles for itself
-    assert seen(NUMBA_DISABLE_JIT="1") == "True"
+    def seen(folder):
+        monkeypatch.setattr(first_start, "time_loop", compiled_by(time_loop, folder, FASTMATH))
+        return first_start.is_compiled()
+
+    railsim.simulate(railsim.load_vehicle(COACH), railsim.load_track(STRAIGHT), speed=20.0, until=1)
+    assert first_start.is_compiled()
+    assert not seen(tmp_path)
+    assert seen(None)  # every process compiles for itself
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
+    assert seen(tmp_path)
 
 
 def begun(folder):
@@ -619,8 +615,8 @@ def begun(folder):
     given += ["--set", "settings.scheme=rk4", "--set", "settings.step=1e-4", "--workers", "2"]
     process = started(given)
     while len(list(folder.glob(".*.partial"))) < 2:
-        time.sleep(0.2)
-    time.sleep(1.0)
+        time.sleep(0.05)
+    time.sleep(0.2)
     return process
 
 
@@ -667,7 +663,7 @@ def test_processes_end_after_a_study_that_was_killed(tmp_path):
         "study.journal"
     }
     # what the killed processes have left goes when the study goes on
-    assert main([*arguments(tmp_path, 20)[:-2], "--resume", "--until", "10"]) == 0
+    assert main([*arguments(tmp_path, 20), "--resume", "--until", "10"]) == 0
     assert set(os.listdir(tmp_path)) == {f"{COACH}_{CURVE}_20.h5", *LEFT}
 
 
