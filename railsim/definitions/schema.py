@@ -5,6 +5,7 @@
 ``<!-- end of keys -->``, where NAME is a definition's class.
 """
 
+import functools
 import json
 import re
 import sys
@@ -49,6 +50,9 @@ def json_schema(format_name: str) -> dict[str, Any]:
         "else": {"$ref": f"#/$defs/{model.__name__}"},
         "$defs": {**definitions, model.__name__: full},
     }
+
+
+_of_tables = functools.cache(json_schema)  # a page has some forty of one format
 
 
 class _Generator(GenerateJsonSchema):
@@ -99,7 +103,7 @@ def schema_name(format_name: str) -> str:
 
 def key_table(format_name: str, name: str) -> str:
     """Return the markdown table of a definition's keys: type, default, meaning with unit."""
-    schema = json_schema(format_name)["$defs"][name]
+    schema = _of_tables(format_name)["$defs"][name]
     required = schema.get("required", [])
     lines = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
     for key, value in schema["properties"].items():

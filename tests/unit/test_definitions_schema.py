@@ -14,6 +14,7 @@ from railsim.files import sources
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"assess.md", "vehicle_file.md", "track_file.md", "settings.md"}
+schema_of = functools.cache(json_schema)
 MENDED_BY = "python -m railsim.definitions.schema docs"
 SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.shipped_names(kind)]
 
@@ -21,12 +22,12 @@ SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.shipped_
 @pytest.mark.parametrize("format_name", FORMATS)
 def test_schema_file_is_up_to_date(format_name):
     written = json.loads((DOCS / "schema" / schema_name(format_name)).read_text())
-    assert written == json_schema(format_name), MENDED_BY
+    assert written == schema_of(format_name), MENDED_BY
 
 
 @pytest.mark.parametrize("format_name", FORMATS)
 def test_schema_is_a_schema(format_name):
-    jsonschema.Draft202012Validator.check_schema(json_schema(format_name))
+    jsonschema.Draft202012Validator.check_schema(schema_of(format_name))
 
 
 @pytest.mark.parametrize("page", sorted(PAGES))
@@ -40,13 +41,13 @@ def test_key_tables_of_the_manual_are_up_to_date(page):
 def test_manual_shows_every_definition_of_a_format(format_name):
     kind = definition_of(format_name).KIND
     text = (DOCS / "user" / f"{kind}_file.md").read_text()
-    for name in json_schema(format_name)["$defs"]:
+    for name in schema_of(format_name)["$defs"]:
         assert f"<!-- keys: {format_name} {name} -->" in text
 
 
 @functools.cache
 def validator_of(format_name):
-    schema = json_schema(format_name)
+    schema = schema_of(format_name)
     return jsonschema.validators.validator_for(schema)(schema)
 
 
@@ -64,11 +65,11 @@ def test_shipped_file_satisfies_its_schema_as_written_and_resolved(kind, name):
 )
 def test_schema_refuses_what_the_model_refuses(key, value):
     data = load_vehicle("coach_manchester").model_dump(mode="json", exclude_none=True)
-    schema = json_schema("railsim-vehicle/1")
-    jsonschema.validate(data, schema)
+    validator = validator_of("railsim-vehicle/1")
+    validator.validate(data)
     data["bodies"]["carbody"][key] = value
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(data, schema)
+        validator.validate(data)
 
 
 @pytest.mark.parametrize("page", sorted(PAGES - {"assess.md"}))  # that one shows parts only
