@@ -2,8 +2,6 @@
 
 import re
 import shlex
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import pytest
 from generators import GENERATORS
 from PIL import Image
 
+from railsim.cli import main
 from railsim.cli import railsim as command_line
 from railsim.definitions.schema import check_markers
 
@@ -121,13 +120,15 @@ def test_commands_of_the_manual_have_their_options(arguments):
 
 
 @pytest.mark.slow
-def test_main_job_of_the_readme_runs_and_computes_nothing_twice(tmp_path):
+def test_main_job_of_the_readme_runs_and_computes_nothing_twice(tmp_path, monkeypatch, capsys):
     (line,) = re.findall(r"railsim (study .*)", (ROOT / "README.md").read_text("utf-8"))
-    command = [sys.executable, "-m", "railsim", *shlex.split(line)]
-    first, second = (
-        subprocess.run(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=True).stdout
-        for _ in range(2)
-    )
+    monkeypatch.chdir(tmp_path)
+
+    def said():
+        assert main(shlex.split(line)) == 0
+        return capsys.readouterr().out
+
+    first, second = said(), said()
     assert "4 of 4 runs computed" in first
     assert "0 of 4 runs computed" in second
     assert len(list((tmp_path / "results").glob("*.h5"))) == 4
