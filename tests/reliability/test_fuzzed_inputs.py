@@ -221,7 +221,7 @@ def test_results_made_up_by_others(result, tmp_path, capsys):
         for command in commands:
             outcome(command, capsys, what)
 
-    tried(56, case)
+    tried(28, case)
 
 
 def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):

@@ -100,8 +100,9 @@ def test_unforeseen_error_is_a_line_with_a_report(monkeypatch, capsys, tmp_path)
 def test_names_are_shown_literally(tmp_path, capsys):
     """In terminal, picture, page and table; each as its characters, doing nothing."""
     vehicle, name = tmp_path / "coach.toml", "$x^$ \x1b[31m <b>=1+1</b> \u202e %s {0}"
+    wagon = ROOT / "tests" / "data" / "vehicles" / "two_axle_wagon.toml"
     vehicle.write_text(
-        f'extends = "coach_manchester"\nformat = "railsim-vehicle/1"\nname = "{HOSTILE_NAME}"\n'
+        f'extends = "{wagon}"\nformat = "railsim-vehicle/1"\nname = "{HOSTILE_NAME}"\n'
     )
     assert main(["info", str(vehicle), "--draw", str(tmp_path / "coach.svg")]) == 0
     printed = capsys.readouterr().out
