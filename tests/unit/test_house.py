@@ -38,7 +38,15 @@ def modules():
 
 @cache
 def nodes():
-    return [(name, node) for name, tree in modules().items() for node in ast.walk(tree)]
+    return [(name, node) for name, tree in modules().items() for node in statements(tree)]
+
+
+def statements(node):
+    """All statements within a node, without the expressions in them, which are most of a tree."""
+    for part in ("body", "orelse", "handlers", "finalbody", "cases"):
+        for inner in getattr(node, part, ()):
+            yield inner
+            yield from statements(inner)
 
 
 def functions():
