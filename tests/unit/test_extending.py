@@ -15,11 +15,15 @@ PAGE = (ROOT / "docs" / "extending.md").read_text("utf-8")
 BLOCK = re.compile(r'^```(python|diff) title="(.*?)"\n(.*?)^```', re.MULTILINE | re.DOTALL)
 ELEMENT = """
 import numpy as np, railsim
-from railsim.definitions.loading import load_vehicle
+from railsim.definitions import Settings
+from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.schema import json_schema, key_table
 from railsim.errors import InputError
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.kernels.rhs import right_hand_side
+from railsim.model.assembly import assemble
 from railsim.model.element_arrays import ElementArrays
+from railsim.model.work import work_arrays
 
 key = "assemblies.bogie.assemblies.axle.elements.primary"
 coach = load_vehicle("coach_manchester")
@@ -46,8 +50,18 @@ try:
     coach.with_values({key: {**common, "kind": "hydraulic_bosh"}})
 except InputError as error:
     assert "did you mean 'hydraulic_bush'?" in str(error), error
-from railsim.model.statics import static_loads
-np.testing.assert_allclose(static_loads(bush).Q0.sum(), coach.mass * 9.81, rtol=1e-3)
+
+def rates(vehicle):
+    model = assemble(vehicle, load_track("straight"), Settings())
+    state, found = np.zeros(model.n_state), np.zeros(model.n_state)
+    state[-2:] = 10.0, 20.0  # m, m/s
+    state[:-3] += np.random.default_rng(1).normal(0.0, 1e-4, model.n_state - 3)
+    assert right_hand_side(model.system, work_arrays(model.system), state, found)[0] == 0
+    return found
+
+accelerations = rates(bush)
+assert np.max(np.abs(accelerations)) > 1.0
+np.testing.assert_array_equal(accelerations, rates(same))
 """
 EXCITATION = """
 import numpy as np
@@ -104,7 +118,7 @@ def changed(text, difference):
 def copy(tmp_path_factory):
     """The program with all examples of the page, as plain Python."""
     folder = tmp_path_factory.mktemp("copy")
-    shutil.copytree(ROOT / "railsim", folder / "railsim", ignore=shutil.ignore_patterns("*.pyc"))
+    shutil.copytree(ROOT / "railsim", folder / "railsim")  # with what Python compiled
     for kind in ("vehicles", "tracks", "limits", "scenarios", "published", "studies"):
         if (ROOT / kind).is_dir():
             (folder / kind).symlink_to(ROOT / kind)
