@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from selection import points
 
 MODULES = ("fcntl", "resource", "termios", "tty", "pwd", "grp")
 OS = (
@@ -34,7 +34,7 @@ ROUTE = ["coach_manchester", "straight"]
 MANY = ["--vehicles", "coach_manchester", "--tracks", "straight", "--speeds", "20", "30"]
 
 
-@pytest.mark.parametrize(
+@points(
     ("files", "command"),
     [
         ("open", ["list"]),
@@ -42,6 +42,7 @@ MANY = ["--vehicles", "coach_manchester", "--tracks", "straight", "--speeds", "2
         ("closed", ["run", *ROUTE, "--speed", "20", "--until", "2", "--out", "run.h5"]),
         ("closed", ["study", *MANY, "--until", "2", "--workers", "1", "--out", "all"]),
     ],
+    always=(0, 1, 3),  # a study writes a run's result, too
     ids=["list", "bench", "run", "study"],
 )
 def test_command_works_without_what_posix_has(files, command, tmp_path):
