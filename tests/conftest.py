@@ -51,16 +51,23 @@ def solutions_of_session(tmp_path_factory):
 def stored_solutions(request, solutions_of_session):
     """Equilibria and steps are found once a session: of six files of runs a fifth less time.
 
-    They are found anew in a test that replaces something: it may be what finds them.
+    They are found anew in a test that has replaced something, the folder it works in and arguments
+    of a command apart: it may be what finds them.
     """
     folder = solutions_of_session
-    if "monkeypatch" in request.fixturenames:
-        folder = None
-    elif any(name.startswith("small_contact_tables") for name in request.fixturenames):
+    if any(name.startswith("small_contact_tables") for name in request.fixturenames):
         folder = folder / "of_small_tables"  # which are no part of a solution's key
         folder.mkdir(exist_ok=True)
+
+    def folder_now(_):
+        if "monkeypatch" not in request.fixturenames:
+            return folder
+        patch = request.node.funcargs.get("monkeypatch")  # None: a fixture is at work
+        unknown = patch is None or patch._setitem or any(at is not sys for at, *_ in patch._setattr)
+        return None if unknown else folder
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(railsim.model.solutions, "solutions_folder", lambda _: folder)
+        patch.setattr(railsim.model.solutions, "solutions_folder", folder_now)
         patch.setattr(railsim.model.solutions, "MOST_NEW", sys.maxsize)
         patch.setattr(railsim.model.solutions, "MOST_STORED", sys.maxsize)
         yield
