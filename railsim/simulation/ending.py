@@ -83,7 +83,7 @@ def verdict(run: Run) -> dict[str, str]:
     model, Q0 = run.prepared.model, run.prepared.balance.Q0
     if run.stopped:
         return {"status": "stopped", "status_reason": run.stopped}
-    if run.status == DERAILED or stands_above_rail(run):
+    if run.status == DERAILED or is_off_a_rail(run):
         where = model.index.wheelsets[run.where]
         thrown = beyond_experience(run_extremes(run.extremes, Q0), Q0, model.index.wheelsets)
         if run.status == DERAILED and thrown:
@@ -91,7 +91,7 @@ def verdict(run: Run) -> dict[str, str]:
             cause = "the step is too long or the model is unstable"
             return {"status": "stopped", "status_reason": f"{where} {why}: {cause}"}
         if run.status != DERAILED and not thrown:
-            why = "rolled until one of its wheels left its rail by more than its flange reaches"
+            why = "left a rail by more than its flange reaches"
             return {"status": "derailed", "status_reason": f"{where} {why}"}
     return {
         "status": STATUS[run.status][0],
@@ -100,7 +100,7 @@ def verdict(run: Run) -> dict[str, str]:
     }
 
 
-def stands_above_rail(run: Run) -> bool:
+def is_off_a_rail(run: Run) -> bool:
     """Whether the run ended with a wheel above or below its rail by more than its flange reaches."""
     if run.status != ROLL_RANGE:
         return run.status == WHEEL_LIFT
