@@ -101,7 +101,7 @@ def verdict(run: Run) -> dict[str, str]:
 
 
 def is_off_a_rail(run: Run) -> bool:
-    """Whether the run ended with a wheel above or below its rail by more than its flange reaches."""
+    """Whether the run ended with a wheel further off its rail than its flange reaches."""
     if run.status != ROLL_RANGE:
         return run.status == WHEEL_LIFT
     system = run.prepared.model.system
