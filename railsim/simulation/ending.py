@@ -9,7 +9,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.state import TIME
 from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, ROLL_RANGE, STATUS, WHEEL_LIFT
 from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS
-from railsim.notation import ROLL
+from railsim.notation import ROLL, Z
 from railsim.result import Result
 from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run
@@ -91,7 +91,9 @@ def verdict(run: Run) -> dict[str, str]:
             cause = "the step is too long or the model is unstable"
             return {"status": "stopped", "status_reason": f"{where} {why}: {cause}"}
         if run.status != DERAILED and not thrown:
-            why = "left a rail by more than its flange reaches"
+            below = run.state[6 * model.system.contact.body[run.where] + Z] > 0.0
+            way = "let a wheel down deeper below" if below else "lifted a wheel higher above"
+            why = f"{way} its rail than its flange reaches"
             return {"status": "derailed", "status_reason": f"{where} {why}"}
     return {
         "status": STATUS[run.status][0],

@@ -114,6 +114,7 @@ def test_an_amplitude_of_the_tangent_is_refused_in_python():
         railsim.modes(railsim.load_vehicle("coach_manchester"), speed=20.0, amplitude=1e-3)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_a_vehicle_of_which_all_is_held_has_no_modes(capsys):
     wheelset = Path(__file__).parents[1] / "data" / "vehicles" / "single_wheelset.toml"
     assert main(["modes", str(wheelset), "--held"]) == 2
