@@ -4,6 +4,6 @@ machine.py    hardware and versions
 scenarios.py  the runs that are timed
 runs.py       speed of the time loop, each with its error against RK4 at 0.125 ms
 
-Times are CPU times of the process.  Parts of a step, many runs in one call, two cores, whole
-commands and other programs are measured by the scripts in `benchmarks/`.
+Times are CPU times of the process.  Parts of a step, two cores, whole commands and other programs
+are measured by the scripts in `benchmarks/`.
 """
