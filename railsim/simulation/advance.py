@@ -20,9 +20,8 @@ from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import AGAIN, N_PARTS
+from railsim.kernels.system import AGAIN
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.kernels.vibration import VIBRATION
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
@@ -88,19 +87,8 @@ class Run:
     prepared: Preparation
     plan: OutputPlan
     sink: Sink
-    state: Floats  # where it is, float64[n_state]
-    fresh: bool = True  # whether nothing was before `state`
-    due: bool = True  # whether `state` is to be recorded
     status: int = RUNNING  # how it ended, see `railsim.kernels.status`
     where: int = 0  # likewise
-    # loaded contact patches so far, and those out of the creep law's range; look-ups beyond the yaw
-    # of the contact table
-    events: Integers = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    # counts of steps and evaluations, see `railsim.kernels.system`
-    parts: Integers = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
-    again: int = 0  # how often the contact of one wheelset alone was evaluated again
-    # of the wheel loads, see `railsim.kernels.vibration`; empty at its begin
-    vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
     cpu_time: float = 0.0  # what the time loop took [s]
     wall_time: float = 0.0  # what all of the run took [s]
     error: Exception | None = None  # in writing its output, or why it cannot begin
@@ -109,6 +97,17 @@ class Run:
     remarks: list[str] = field(default_factory=list)
     # what shows whether it hunts, see `railsim.result.hunting`
     swings: MemorySink = field(default_factory=lambda: MemorySink(only=SEEN))
+
+    # from its end on
+    state: Floats = field(init=False)  # where it is, float64[n_state]
+    memory: Floats = field(init=False)  # of laws, commands and samples there
+    # loaded contact patches, and those out of the creep law's range; look-ups beyond the yaw of the
+    # contact table
+    events: Integers = field(init=False)
+    parts: Integers = field(init=False)  # counts of steps, see `railsim.kernels.system`
+    again: int = field(init=False)  # how often the contact of one wheelset was evaluated again
+    unloaded: Floats = field(init=False)  # s in which each wheel carried nothing
+    vibration: Floats = field(init=False)  # of the wheel loads, see `railsim.kernels.vibration`
 
     @property
     def ended(self) -> bool:
@@ -120,8 +119,6 @@ class Run:
         # largest and smallest values so far, see `railsim.kernels.extremes`
         self.extremes: Floats = no_extremes(wheelsets)
         self.evaluated: Floats = no_extremes(wheelsets)  # since the evaluation began
-        self.unloaded: Floats = np.zeros((wheelsets, 2))  # s in which each wheel carried nothing
-        self.memory: Floats = self.prepared.memory.copy()
         self.swings.begin(self.plan.coordinates)
 
 
@@ -130,20 +127,19 @@ class TimeLoop:
 
     def __init__(self, run: Run, settings: Settings) -> None:
         self._run = run
-        model = run.prepared.model
+        prepared, model = run.prepared, run.prepared.model
         self.scheme = SCHEMES[settings.scheme]
         self.recorder = run.plan.recorder(ROWS)
         self.system = rolling(model.system, model.wheels, model.check, model.rails)
         self.work = work_arrays(self.system)
-        self.state = run.state.copy()
-        if len(run.vibration):
-            self.work.vibration[:] = run.vibration
-        self.work.memory[:] = run.memory
+        self.state = prepared.state.copy()
+        self.work.memory[:] = prepared.memory
         self.derivative = np.zeros_like(self.state)
         self.stages = np.zeros((3, len(self.state)))
-        self.fresh, self.due = run.fresh, run.due
-        self.evaluates = self.state[TIME] >= run.prepared.evaluation - ROUND_OFF
-        self.varies = run.prepared.steps.varies
+        # whether nothing was before the state, and whether it is to be recorded
+        self.fresh, self.due = prepared.fresh, True
+        self.evaluates = self.state[TIME] >= prepared.evaluation - ROUND_OFF
+        self.varies = prepared.steps.varies
         # equal steps of distance while the speed changes: the last step of an interval ends there
         self.spacing = settings.output_spacing if self.varies else None
         self._entries: dict[object, Any] = {}
@@ -305,17 +301,13 @@ class TimeLoop:
     def give_back(self) -> None:
         """Let the run have its state and counts."""
         run, work = self._run, self.work
-        run.state = self.state.copy()
-        run.fresh, run.due = self.fresh, self.due
-        run.events += work.events[:, [0, 1, 4]].sum(axis=0)
+        run.state, run.memory = self.state, work.memory
+        run.events = work.events[:, [0, 1, 4]].sum(axis=0)
+        run.again = int(work.events[:, AGAIN].sum())
+        run.parts, run.unloaded, run.vibration = work.parts, work.unloaded, work.vibration
         take_extremes(run.extremes, work.extremes)
         if self.evaluates:
             take_extremes(run.evaluated, work.extremes)
-        run.unloaded += work.unloaded
-        run.parts += work.parts
-        run.again += int(work.events[:, AGAIN].sum())
-        run.vibration = work.vibration.copy()
-        run.memory = work.memory.copy()
 
 
 def take_extremes(before: Floats, later: Floats) -> None:

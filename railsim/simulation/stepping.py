@@ -115,7 +115,7 @@ class Simulation:
         self._vehicle, self._inputs, self._before, self._run = vehicle, inputs, before, run
         self._records = record is not False
         self._loop = TimeLoop(run, settings)
-        self._whole = max(run.prepared.left(run.state), SHORTEST)
+        self._whole = max(run.prepared.left(run.prepared.state), SHORTEST)
         self._phase, self._missing, self._behind, self._rows = 0, 0.0, 0.0, 0
         self._written = -math.inf
         self._length, self._every, self._goal = 0.0, 1, 0.0
@@ -167,6 +167,7 @@ class Simulation:
         run = copy(self._run)
         run.extremes = run.extremes.copy()
         if self._closed is None:
+            run.state = self._loop.state
             take_extremes(run.extremes, self._loop.work.extremes)
         return verdict(run)
 
