@@ -1,4 +1,4 @@
-"""What the runs of one call have in common, checked: speed, start, end, the state to go on from."""
+"""The inputs of a run beside its vehicle, checked: speed, start, end, the state to go on from."""
 
 import math
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ class TakenUp(NamedTuple):
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the runs of one call have in common."""
+    """The inputs of a run beside its vehicle."""
 
     track: Track
     settings: Settings
