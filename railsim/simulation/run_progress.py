@@ -26,6 +26,7 @@ class RunProgress:
         self._judged = self._run_in = 0.0  # simulated before it [s]
         self._on_its_way = False
         self._fraction = 0.0
+        self._tell(0.0)
 
     def of_judgement(self, done: float, whole: float) -> None:
         """Take the time that has been simulated to judge a step, and all of it [s]."""

@@ -150,7 +150,7 @@ def test_bar_says_what_comes_before_a_run(monkeypatch):
         "a run",
     ]
     assert fractions == sorted(fractions)
-    assert 0.0 < fractions[2] < 0.5
+    assert 0.0 < fractions[3] < 0.5
     assert fractions[-1] == 1.0
 
 

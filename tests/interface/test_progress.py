@@ -94,7 +94,7 @@ def test_finished_fraction_is_that_of_the_simulated_time():
     for done in (0.0, 0.6, 1.0 - 1e-13):
         course.of_run(done)
     # what was told is not taken back
-    expected = [5.0 / 15.0, 9.0 / 25.0, 15.0 / 25.0, 15.0 / 25.0, 21.0 / 25.0, 1.0]
+    expected = [0.0, 5.0 / 15.0, 9.0 / 25.0, 15.0 / 25.0, 15.0 / 25.0, 21.0 / 25.0, 1.0]
     assert told == pytest.approx(expected, abs=1e-12)
     assert told[-1] == 1.0
     for short in (SimpleNamespace(**{**vars(inputs), "until": 100.0}),
