@@ -165,19 +165,27 @@ class Stability:
         """Longest step that accuracy allows [s]."""
         system, state = self._straight
         speed = float(state[SPEED])
-        elastic, longest = system.support.elastic, LONGEST_STEP_ELASTIC
-        if not elastic:
-            longest = LONGEST_STEP_SMOOTH if self._smooth else LONGEST_STEP
-        most = longest[self._scheme]
+        elastic, scheme = system.support.elastic, self._scheme
+        most = (LONGEST_STEP_ELASTIC if elastic else LONGEST_STEP)[scheme]
+        smooth = LONGEST_STEP_SMOOTH[scheme]
+        if self._smooth and not elastic and smooth > most and self._is_stable(smooth):
+            most = smooth
         if (system.internal.kind == PAD).any():
             most = min(most, LONGEST_STEP_FRICTION)
         if not elastic:
             return min(most, LONGEST_TRAVEL / speed)
-        usual, stable = LONGEST_TRAVEL_ELASTIC / speed, LONGEST_TRAVEL_STABLE / speed
-        if usual < most:
-            growth = _step_growth(self._model, system, state, self._scheme, usual)
-            usual = stable if growth < NEUTRAL else usual
+        usual = LONGEST_TRAVEL_ELASTIC / speed
+        if usual < most and self._is_stable(usual):
+            usual = LONGEST_TRAVEL_STABLE / speed
         return min(most, usual)
+
+    def _is_stable(self, h: float) -> bool:
+        """Whether the vehicle is below its critical speed: long steps widen the swings of others.
+
+        Hollow treads, 30 m/s on smooth rigid rails: 6 % at 1.67 ms, 1.6 % at 1.25 ms.
+        """
+        how = self._model, *self._straight, self._scheme, h
+        return _step_growth(*how, implicit=_implicit_share(h)) < NEUTRAL
 
     @property
     def margin(self) -> float:
