@@ -229,8 +229,9 @@ def _rounds(
     problem: _Problem, u: Floats, here: Judgement, effort: Effort
 ) -> tuple[Floats, Judgement]:
     """Rounds of the search until nothing improves."""
+    steps = effort.steps
     for _ in range(effort.rounds):
-        new = _round(problem, u, here, effort.steps)
+        new = _round(problem, u, here, steps)
         after = problem(new)
         if after is None:
             break
@@ -239,10 +240,12 @@ def _rounds(
         worse = after.violation > max(here.violation, FEASIBLE)
         gain = here.objective - after.objective
         if worse or (here.violation <= FEASIBLE and gain <= 0.0):
-            break
+            if (steps := steps // 4) == 0:
+                break
+            continue  # not as far: a curved way may have led off the limits
         small = gain <= effort.gain * abs(here.objective) + 1e-14
         settled = small and here.violation - after.violation <= FEASIBLE
-        u, here = new, after
+        u, here, steps = new, after, effort.steps
         if settled:
             break
     if here.violation > FEASIBLE:
