@@ -209,10 +209,8 @@ def _contact_sentences(contact: Contact) -> list[str]:
 
 def comparison_table(results: Sequence[Analysis]) -> Table:
     """Return one row for each mechanism; the first is the reference of the error."""
-    unknown, unit = (
-        {column.name: np.nan for column in COMPARISON},
-        force_units(r.definition for r in results),
-    )
+    unknown = {column.name: np.nan for column in COMPARISON}
+    unit = force_units(one.definition for one in results)
     columns = [replace(one, unit=unit) if one.unit == "N" else one for one in COMPARISON]
     return Table(columns, [{**unknown, **row} for row in compare(results)])
 

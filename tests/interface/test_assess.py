@@ -892,6 +892,11 @@ def test_climb_of_a_wheel_is_that_above_its_rail_with_its_friction(side):
     nadal = (slope - friction[side]) / (1.0 + friction[side] * slope)
     assert wheel.limit == pytest.approx(nadal)
     assert wheel.rise == pytest.approx((1.0 + 2.0 * on.rail_base / 2.0 + 0.5) * 1e-3, rel=0.03)
+    # as peaks, without what was before the evaluation
+    late = {**run.attributes, "evaluation_start": float(run.time[run.distance > 180.0][0])}
+    after = Result(arrays, quantities, run.coordinates, late, run.profiles)
+    (report,) = assess(after, "safety")[0].safety.values()
+    assert report.wheels[side].climb_distance == 0.0
 
 
 def test_limit_of_each_wheel_is_that_of_its_own_flange():
