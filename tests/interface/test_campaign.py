@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from example_result import feed
 from made_record import made
+from selection import points
 
 import railsim
 import railsim.studies.run
@@ -25,7 +26,7 @@ from railsim.profiles import load_profile
 from railsim.studies.campaign import campaign, counting_sections, part_speed, scenario_cases
 
 
-@pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
+@points("vehicle", ["coach_manchester", "coach_flexicoil"], always=(0,))
 def test_campaign_meets_the_conditions_of_the_standard(vehicle):
     """Sections, seeds, quality of the track, profiles, loads and hands, in each condition."""
     limits = load_running_limits("en14363")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import tried
+from selection import points
 
 from railsim.cli import main
 from railsim.errors import InputError
@@ -69,13 +70,14 @@ def test_full_disk_leaves_no_half_result(small_disk):
     assert set(tried(40, case)) == {True, False}
 
 
-@pytest.mark.parametrize(
+@points(
     ("command", "room"),
     [
         *product(["plot", "compare"], [0, 4 * KB, 60 * KB]),
         ("info", 4 * KB),  # a picture, as by plot
         ("modes", 4 * KB),
     ],
+    always=(1, 2, 3, 7),
 )
 def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
     a, b = (str(example_result(duration=2.0).to_hdf5(tmp_path / f"{n}.h5")) for n in "ab")

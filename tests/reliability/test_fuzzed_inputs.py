@@ -221,7 +221,7 @@ def test_results_made_up_by_others(result, tmp_path, capsys):
         for command in commands:
             outcome(command, capsys, what)
 
-    tried(28, case)
+    tried(14, case)
 
 
 def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
@@ -258,7 +258,7 @@ def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
             index = json.loads((folder / "study.json").read_text())
             assert index["status"] == "complete"
 
-    tried(50, case)
+    tried(24, case)
 
 
 def journal_changed(data, rng):

@@ -126,9 +126,9 @@ def test_killed_runs_and_studies(whole, tmp_path):
         moment = np.random.default_rng(seed).uniform(0.1, 1.05)
         folder = tmp_path / str(seed)
         folder.mkdir()
-        (study if seed // len(SIGNALS) % 4 == 3 or seed == 4 else run)(folder, kind, moment)
+        (study if seed // len(SIGNALS) % 4 == 3 or seed == 2 else run)(folder, kind, moment)
 
-    tried(5, case)
+    tried(3, case)
     if MORE:
         print(f"\nslowest end after a signal: {max(ends):.2f} s", file=sys.__stderr__)
 

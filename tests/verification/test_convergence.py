@@ -34,7 +34,7 @@ def peaks(result):
     return {name: np.nanmax(np.abs(result[name])) for name in QUANTITIES}
 
 
-@pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
+@points("vehicle", ["coach_manchester", "coach_flexicoil"], always=(0,))
 def test_slow_in_a_curve_the_default_step_finds_the_position_of_a_short_one(vehicle):
     """120 mm of cant excess at 5 m/s.
 

@@ -412,7 +412,7 @@ def test_an_offset_of_a_sensor_is_outside_the_band(found):
     assert other.factors == pytest.approx(same.factors, rel=1e-6)
 
 
-@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@points("loss", ["huber", "cauchy"], always=(1,))
 def test_a_channel_that_a_robust_loss_leaves_out_does_not_widen_the_intervals(found, loss):
     """One spike of 50 m/s2 in the channel of the body: its coefficients are 900 times the noise."""
     whole, path, _ = found
