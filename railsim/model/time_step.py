@@ -72,8 +72,8 @@ GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
 NEUTRAL = 1e-3
 _NEVER = 1 << 40
 # of a map before the norms of its powers are looked at, of these, and the least norm of a square
-# that is no round-off; squarings from which on n^(1/m) is 1 within 1 %
-_BALANCING, _SQUARINGS, _LEFT, _SURE = 3, 16, 1e-20, 10
+# that is no round-off; squarings from which on a lower bound need not be ln 2 to be taken
+_BALANCING, _SQUARINGS, _LEFT, _SURE = 3, 16, 1e-20, 8
 
 
 def empty_recorder(
@@ -234,10 +234,15 @@ class Stability:
         more, implicit = GROWTH_IN_FLANGE if number else GROWTH, _implicit_share(h)
         h *= margin
         growth = _step_growth(self._model, system, state, self._scheme, h, more, implicit)
+        if growth * h > math.log(2.0):  # whatever the vehicle does, such a step does not follow it
+            return False
         if growth > more and number not in self._allowed:  # for most the question does not arise
             vehicle_growth = _vehicle_growth(self._model, system, state)
             self._allowed[number] = max(0.0, vehicle_growth) + more
-        if growth <= self._allowed.get(number, more):
+        allowed = self._allowed.get(number, more)
+        if SLIGHT / h < growth <= allowed:  # perhaps of a lower bound only
+            growth = _step_growth(self._model, system, state, self._scheme, h, 0.0, implicit)
+        if growth <= allowed:
             return True
         return growth * h < SLIGHT and not self._helped_by_halving(system, state, h, growth)
 
@@ -280,7 +285,7 @@ def _step_growth(
     """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails.
 
     Where `enough` is given, that is returned instead of what surely is smaller, and a lower bound
-    of what more than doubles a mode in each step.  `implicit`: see `Work.watch`.
+    of what surely is larger and more than `SLIGHT` in a step.  `implicit`: see `Work.watch`.
     """
     if scheme == "fast":
         system, state = _after_step(system, state, h)
@@ -336,7 +341,8 @@ def _bound(matrix: Floats, limit: float) -> float:
     `limit` where that is an upper one: |lambda|^m <= ||A^m||, and squaring A takes a third of the
     time of its eigenvalues.  Row and column k times and over a factor leave these as they are and
     make the norm small.  Half of the limit is left for round-off: of the logarithm of a norm over
-    m, single precision is enough.  A lower one where it is above ln 2: |tr A^m| <= n |lambda|^m.
+    m, single precision is enough.  A lower one where that is above the limit and `SLIGHT`:
+    |tr A^m| <= n |lambda|^m.
     """
     coupled = matrix != 0.0
     np.fill_diagonal(coupled, False)
@@ -362,7 +368,7 @@ def _bound(matrix: Floats, limit: float) -> float:
         power = (power / norm).astype(np.float32)
         trace = abs(float(np.trace(power))) / len(power)
         least = (logarithm + math.log(trace)) / 2.0**doubled if trace > _LEFT else 0.0
-        if doubled >= _SURE and least > math.log(2.0):
+        if least > (max(2.0 * limit, SLIGHT) if doubled >= _SURE else math.log(2.0)):
             return least
         power = power @ power
         logarithm *= 2.0
