@@ -55,6 +55,7 @@ def command(study: str, output: cli.Output, **how: Any) -> None:
 
 
 def _lines(found: "Optimisation") -> "list[str | Table]":
+    from railsim.studies.optimise import NEAR_BOUND
     from railsim.table import Table
 
     if found.chosen is None:
@@ -74,7 +75,7 @@ def _lines(found: "Optimisation") -> "list[str | Table]":
     number = f"front of {len(found.front)} in {len(found.designs)} designs"
     lines: list[str | Table] = [number, "", table, ""]
     lines += [f"remark: {found.chosen.remark}"] * bool(found.chosen.remark)
-    lines += [f"active: {words}" for words in found.active]
+    lines += [f"active (within {NEAR_BOUND:.0%}): {words}" for words in found.active]
     for one in found.sensitivities:
         shares = sorted(one.total.items(), key=lambda item: -item[1])
         words = ", ".join(f"{p.removeprefix('vehicle.')} {100.0 * s:.0f} %" for p, s in shares)

@@ -353,6 +353,19 @@ def test_bounds_and_limits_are_told_with_all_their_digits():
     )
 
 
+@pytest.mark.parametrize(("share", "reached"), [(0.015, True), (0.025, False), (0.985, True)])
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_bounds_count_as_reached_within_2_per_cent_of_the_range(share, reached, scale):
+    value = 1e6 * 100.0**share if scale == "log" else 1e6 + 99e6 * share
+    wanted = Optimise.model_validate(
+        {
+            "variables": {X: {"low": 1e6, "high": 1e8, "scale": scale}},
+            "objectives": [{"quantity": "curve.T_gamma"}],
+        }
+    )
+    assert bool(_active(wanted, Design(1, {X: value}, (0.0,), (), feasible=True))) is reached
+
+
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
     command = ["study", written(tmp_path), "--out", str(tmp_path / "s"), "--workers", "1"]
     assert main(command) == 0
