@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from railsim.definitions.mechanism.faults import bounds_remarks
+from railsim.definitions.mechanism.faults import bounds_of, bounds_remarks
 from railsim.design_checks import shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.comparison import compare
@@ -22,6 +22,8 @@ from railsim.table import Amount, Column, Table
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
 
+NEAR_BOUND = 0.02
+"""Share of a parameter's range within which a bound is near the optimum, active or not."""
 COMPARISON = [
     Column("name", "mechanism"),
     Column("stroke", "", "mm", ".4f"),
@@ -230,6 +232,11 @@ def optimum_sentences(optimum: "Optimum") -> list[str]:
         f"{len(optimum.starts) - len(assembled)} could not be assembled",
         *(f"{remark.key}: {remark.text}" for remark in bounds_remarks(written)),
     ]
+    for name, low, high in bounds_of(written):
+        end = optimum.parameters[name]
+        share = min(end - low, high - end) / (high - low)
+        if share <= NEAR_BOUND and name not in (active.name for active in optimum.active):
+            found.append(f"{name} ends {share:.1%} of its range from a bound that does not hold it")
     if not optimum.feasible:
         angles = optimum.after.min_angles
         breaches = ", ".join(

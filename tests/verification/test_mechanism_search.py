@@ -275,6 +275,20 @@ def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
     assert f"mu by {np.degrees(best.breaches['mu']):.6g} deg" in optimum_sentences(best)[-1]
 
 
+@pytest.mark.parametrize("high", [0.195, 0.2])
+def test_a_bound_within_2_per_cent_of_the_range_is_told_though_a_limit_holds_the_optimum(
+    tmp_path, high
+):
+    """The least angle of 40 degrees ends the arm at 0.3 sin(40) m, below its bound."""
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM.replace("d = [0.05, 0.25]", f"d = [0.05, {high}]"))
+    best = optimise(load_mechanism(path))
+    share = (high - 0.3 * np.sin(np.radians(40.0))) / (high - 0.05)
+    words = f"d ends {share:.1%} of its range from a bound that does not hold it"
+    assert [active.name for active in best.active] == ["mu"]
+    assert (words in optimum_sentences(best)) == (share <= 0.02)
+
+
 def test_before_is_the_file_also_where_it_is_out_of_bounds_or_breaks_a_constraint(tmp_path):
     path = tmp_path / "arm.toml"
     for bounds, low, limits in (

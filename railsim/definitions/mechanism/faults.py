@@ -60,16 +60,19 @@ def mechanism_remarks(mechanism: Mechanism) -> Iterator[Remark]:
 def bounds_remarks(mechanism: Mechanism) -> Iterator[Remark]:
     """Remarks on bounds of a search that exclude the file's own values."""
     values = parameter_values(mechanism)
-    for name, bounds in _bounds(mechanism):
-        low, high = (number(quantity, values) for quantity in bounds)
+    for name, low, high in bounds_of(mechanism):
         if not low <= values[name] <= high:
             text = f"{low:.6g} to {high:.6g} exclude the file's own {values[name]:.6g}"
             end = "the first start begins at the nearer bound"
             yield Remark(f"optimise.bounds.{name}", f"{text}; {end}")
 
 
-def _bounds(mechanism: Mechanism) -> Iterable[tuple[str, tuple[float | str, float | str]]]:
-    return mechanism.optimise.bounds.items() if mechanism.optimise is not None else ()
+def bounds_of(mechanism: Mechanism) -> Iterator[tuple[str, float, float]]:
+    """Name, lower and upper bound of each parameter of a search."""
+    if mechanism.optimise is not None:
+        values = parameter_values(mechanism)
+        for name, (low, high) in mechanism.optimise.bounds.items():
+            yield name, number(low, values), number(high, values)
 
 
 def _fault(key: str, found: str, allowed: str) -> Fault:
@@ -240,8 +243,7 @@ def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
     for name, tolerance in mechanism.tolerances.items():
         if not (value := number(tolerance, values)) >= 0.0:
             yield _fault(f"tolerances.{name}", f"{value:g}", "0 or greater: it is plus and minus")
-    for name, bounds in _bounds(mechanism):
-        low, high = (number(q, values) for q in bounds)
+    for name, low, high in bounds_of(mechanism):
         if not low < high:
             found, allowed = f"{low:g}, {high:g}", "the second above the first"
             yield _fault(f"optimise.bounds.{name}", found, allowed)
