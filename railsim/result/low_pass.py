@@ -101,7 +101,11 @@ class LowPassSink(SinkBefore):
 
 
 class _Symmetric:
-    """Symmetric filter over a stream; at both ends it goes on as its odd mirror image."""
+    """Symmetric filter over a stream; at both ends it goes on as its odd mirror image.
+
+    About the first and the last value: these two pass as they are, whatever their frequency, and
+    what is slow keeps its level and slope (an even image would bend it: a third at 3/4 f_p).
+    """
 
     def __init__(self, rate: float, end_of_pass: float, begin_of_stop: float, every: int) -> None:
         from scipy import signal  # with scipy.stats, a second to import; few runs need it

@@ -47,7 +47,8 @@ def low_pass_remark(settings: Settings) -> str:
         return ""
     if asked.phase == "causal":
         return f"Values are low-passed by a causal Butterworth filter, {asked.frequency:g} Hz."
-    return f"Values are zero-phase low-pass filtered, flat to {asked.frequency:g} Hz."
+    words = f"zero-phase low-pass filtered, flat to {asked.frequency:g} Hz"
+    return f"Values are {words}; the first and the last instant are as computed."
 
 
 def output_words(settings: Settings) -> str:

@@ -10,7 +10,7 @@ from railsim.errors import InputError
 from railsim.notation import QUANTITIES
 from railsim.result import MemorySink
 from railsim.result.low_pass import LowPassSink
-from railsim.simulation.sampling import instants_for_each, sampled
+from railsim.simulation.sampling import instants_for_each, low_pass_remark, sampled
 
 NAMES = ("time", "distance", "Q", "Y", "Y_over_Q")
 COORDINATES = {"wheelset": ("only",), "body": ()}
@@ -44,6 +44,16 @@ def test_what_would_be_folded_back_is_gone(f):
     found = passed(lambda t: 1e3 * np.sin(2 * np.pi * f * t + 0.3))
     inner = (found.time > 0.2) & (found.time < 9.8)
     assert np.max(np.abs(found.Y[inner])) < 0.2
+
+
+def test_the_first_and_the_last_instant_are_stored_as_computed_and_the_remark_says_so():
+    """The odd mirror image about x_0: sum h_k (x_k + 2 x_0 - x_k) = x_0 for every symmetric h."""
+    found = passed(lambda t: 1e3 + 500.0 * np.cos(2 * np.pi * 340.0 * t)).Y[:, 0, 0] - 1e3
+    np.testing.assert_allclose(found[[0, -1]], 500.0, rtol=1e-9)
+    assert np.max(np.abs(found[1:-1])) < 0.2 * 500.0
+    assert np.max(np.abs(found[6:-6])) < 0.02 * 500.0
+    remark = low_pass_remark(Settings(outputs={"low_pass": {"frequency": 80.0}}))
+    assert "the first and the last instant are as computed" in remark
 
 
 @pytest.mark.parametrize("causal", [False, True])
