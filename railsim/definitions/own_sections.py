@@ -3,13 +3,18 @@
 from itertools import combinations
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from railsim.definitions.base import Definition, NonNegative, Positive, Text
 from railsim.definitions.file_definition import FileDefinition
 from railsim.errors import Fault
 
 SHORTEST = 5.0  # m
+Zone = Annotated[
+    Literal["1", "2", "3", "4"],
+    BeforeValidator(str),  # a number too
+    WithJsonSchema({"enum": ["1", "2", "3", "4", 1, 2, 3, 4]}),
+]
 
 
 class OwnSection(Definition):
@@ -19,7 +24,7 @@ class OwnSection(Definition):
     """Arc length of its beginning [m]"""
     end: Positive
     """Arc length of its end [m]"""
-    zone: Literal["1", "2", "3", "4"] | None = None
+    zone: Zone | None = None
     """Test zone, instead of that of its radius and cant deficiency"""
     track: Text | None = None
     """Name of its track; without it on the tracks of all runs"""

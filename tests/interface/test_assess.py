@@ -238,7 +238,7 @@ def own_sections(folder, *rows):
 
 def test_own_sections_take_the_place_of_those_of_the_program(tmp_path):
     """Medians of a force that is linear along the track are those of the middles: 345 and 445 m."""
-    rows = "{begin = 410, end = 480}", "{begin = 310, end = 380, zone = '4'}"
+    rows = "{begin = 410, end = 480}", "{begin = 310, end = 380, zone = 4}"
     (found,) = assess(linear(), sections=own_sections(tmp_path, *rows))
     row = rows_of(found, "4", "Y_qst")["wheelset 1 outer"]
     assert (row.estimate.N, [s.section.begin for s in found.sections]) == (2, [310.0, 410.0])
@@ -271,6 +271,8 @@ def test_own_sections_of_other_lengths_and_places_are_told(tmp_path):
     (["{begin = 310, end = 'x'}"], "sections.0.end: "),
     (["{begin = 310, end = 380, track = 'made'}"], "sections.0.track: 'made'"),
     (["{begin = 310, end = 380, zone = '5'}"], "zone: '5'; must be '1', '2', '3' or '4'"),
+    (["{begin = 310, end = 380, zone = 0}"], "zone: '0'; must be '1', '2', '3' or '4'"),
+    (["{begin = 310, end = 380, zone = true}"], "zone: 'True'; must be '1', '2', '3' or '4'"),
     (["{begin = 10, end = 80}"], "sections.0: 10 to 80 m; within 8"),
     ([], "sections: "),
 ])  # fmt: skip
