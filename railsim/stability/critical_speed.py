@@ -41,6 +41,7 @@ Progress = Callable[[float], None]
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation")
 AMPLITUDE_LIMIT = 3e-3  # m
+POINTS = 16  # speeds of a diagram
 LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
 NEAR = (0.8, 1.25)  # times the linear critical speed: where most speeds of a diagram stand ...
@@ -62,7 +63,7 @@ def critical_speed(
     methods: str | Sequence[str] = ("linear", "ramp"),
     low: float | str = 5.0,
     high: float | str = 120.0,
-    points: int = 16,
+    points: int = POINTS,
     linearisation: str = "tangent",
     amplitude: float = AMPLITUDE,
     conicity: float | None = None,
@@ -85,7 +86,7 @@ def critical_speed(
     low, high : float or str
         Range of the search [m/s], or with units: ``"400 km/h"``.
     points : int
-        Speeds of a bifurcation diagram.
+        Speeds of a bifurcation diagram; refused where there is none.
     linearisation, amplitude, conicity
         Of the linear critical speed, as in `railsim.modes`; given cones hold for all methods.
     excitations : sequence of float
@@ -165,16 +166,14 @@ def checked(
     methods: Sequence[str],
     low: float | str,
     high: float | str,
-    points: int = 16,
+    points: int = POINTS,
     excitations: Sequence[float] = EXCITATIONS,
 ) -> tuple[float, float]:
     """Return lowest and highest speed [m/s]; raise InputError with all faults of the arguments."""
     slowest, fastest = map(speed_in_si, (low, high))
     faults = Faults()
-    unknown = next((method for method in methods if method not in METHODS), None)
-    faults.require(
-        unknown is None, "methods", f"found '{unknown}'", " or ".join(METHODS), "--method"
-    )
+    odd = next((one for one in methods if one not in METHODS), None)
+    faults.require(odd is None, "methods", f"found '{odd}'", " or ".join(METHODS), "--method")
     least, most = SPEED_RANGE
     for name, option, value in (("low", "--from", slowest), ("high", "--to", fastest)):
         inside = isinstance(value, Real) and least <= float(value) <= most
@@ -187,6 +186,10 @@ def checked(
     words = f"found {wrong[0]:g} m" if wrong else "no size"
     allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(excitations) and not wrong
     faults.require(fine, "excitations", words, allowed, "--excitation")
+    used = "bifurcation" in methods or points == POINTS
+    faults.require(used, "points", "has no effect", "only with the method bifurcation")
+    used = "bifurcation" in methods or "ramp" in methods or tuple(excitations) == EXCITATIONS
+    faults.require(used, "excitations", "has no effect", "only with ramp or bifurcation")
     faults += contact.faults()
     faults.check()
     return float(slowest), float(fastest)
@@ -473,13 +476,11 @@ def _conclude(
     force = _unstable_force(vehicle, prepared.Q0)
     # a ramp passes the end of a branch late
     branches = [branch for branch in found.branches if branch.direction != "ramp"]
-    only_ramp = not branches
-    if only_ramp:
+    if only_ramp := not branches:
         kept = [[p for p in one.points if p.speed >= one.end] for one in found.branches]
         branches = [Branch("ramp", points) for points in kept]
-    top = found.searched_to
-    found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", top)
-    found.instability_limit = first_beyond(branches, force, "sum_Y_rms", top)
+    found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.searched_to)
+    found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.searched_to)
     if only_ramp and lowest is not None:
         found.remarks.append(
             "limits: on the falling ramp alone; at constant speed they are exceeded from up to "

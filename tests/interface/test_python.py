@@ -171,6 +171,20 @@ def test_speeds_are_taken_with_their_unit(coach):
                 call(coach, track, speed=wrong)
 
 
+@pytest.mark.parametrize(("methods", "useless"), [
+    ("linear", {"points", "excitations"}),
+    (("ramp", "continuation"), {"points"}),
+    ("bifurcation", {"high"}),
+])  # fmt: skip
+def test_arguments_that_a_method_does_not_use_are_refused(coach, methods, useless):
+    """The range is wrong, too, where all are used: nothing is computed."""
+    arguments = {"points": 30, "excitations": [2e-3], "high": 120.0}
+    arguments |= {"high": 1e6} if "high" in useless else {}
+    with pytest.raises(InputError) as caught:
+        railsim.critical_speed(coach, methods=methods, **arguments)
+    assert {fault.file or fault.key for fault in caught.value.faults} == useless
+
+
 def test_analyses_say_what_they_are_of_and_draw_themselves(coach):
     found = railsim.modes(coach)
     assert repr(found).startswith(f"<Modes: {coach.name}: 20 m/s")
