@@ -28,9 +28,9 @@ def command(files: tuple[str, ...], title: str | None, curves: int, output: cli.
     """Write one self-contained page about results, studies, comparisons with tests.
 
     Inputs, peaks, values against limits, curves to zoom, spread over the varied parameters of a
-    study, comparison with published values, failures and remarks; folders that `validate-model`
-    and `identify` have written are sections of it.  The page needs no network; it can be sent and
-    printed.
+    study, comparison with published values, failures and remarks; folders that `validate-model`,
+    `identify`, `wear` and `rail-wear` have written are sections of it.  The page needs no network;
+    it can be sent and printed.
 
     \b
     Example:
@@ -50,7 +50,7 @@ def write_report(
     curves: int = 8,
     assessments: "Sequence[Assessment]" = (),
 ) -> None:
-    """Write the page about result files, folders of studies, and comparisons with tests.
+    """Write the page about result files, folders of studies, comparisons with tests and wear.
 
     `assessments` are those of a scenario.
     """

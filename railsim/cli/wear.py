@@ -3,13 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from railsim.cli import common as cli
 from railsim.errors import Fault, Faults, RailsimError, input_error
-from railsim.notation import SIDES
+from railsim.report.wear import RAILS, WHEELS, Rows, Worn, shares_of, wear_tables
 
 if TYPE_CHECKING:
     from railsim.definitions import Track
@@ -21,7 +21,6 @@ MOST_STEPS = 1000
 
 Mix = tuple[tuple[str, float, float], ...]
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
-Rows = Mapping[str, list[dict[str, float | None]]]
 
 
 def mix_option(name: str, what: str, amount: str) -> Decorator:
@@ -132,22 +131,6 @@ def _remark_on_straights(tracks: "Sequence[Track]", output: cli.Output) -> None:
             output.remark(f"{track.name}: {words}.")
 
 
-class Worn(NamedTuple):
-    """What wears: by what amount it is told, and how it is shown."""
-
-    amount: str  # distance or tonnage: the option and the column
-    unit: str
-    scale: float  # of the unit, to SI
-    note: str  # what is averaged, and where y begins
-    sides: tuple[str, ...]  # names of its profiles
-
-
-OF_WHEELS = "mean of all wheels; y from the nominal rolling circle, negative towards the flange"
-OF_RAILS = "both rails; y from the middle of the rail, negative towards the gauge side"
-WHEELS = Worn("distance", "km", 1e3, OF_WHEELS, ("wheel",))
-RAILS = Worn("tonnage", "Mt", 1e9, OF_RAILS, SIDES)
-
-
 def _carry_out(
     of: Worn,
     given: Mapping[str, Any],
@@ -235,26 +218,8 @@ def _number_of_steps(of: Worn, distance: float, step: float) -> int:
 
 
 def _parts(of: Worn, given: Mapping[str, Any], source: str, rows: Rows) -> "list[str | Table]":
-    from railsim.table import Column, Table
-
     worn, runs = given.values()
-    total = sum(run["share"] for run in runs)
-    shares = ", ".join(
-        f"{share / total:.0%} {name} at {v:g} m/s" for name, v, share in map(dict.values, runs)
-    )
-    parts: list[str | Table] = [worn, f"  {shares}", f"  {source}, {of.note}"]
-    columns = [
-        Column("distance", of.amount, of.unit, "g"),
-        Column("area", "worn area", "mm2", ".2f"),
-        Column("deepest", "", "mm", ".3f"),
-        Column("deepest_y", "at y", "mm", ".1f"),
-        Column("equivalent_conicity", "conicity at 3 mm", "", ".3f"),
-        Column("flange_thickness", "flange thickness", "mm", ".2f"),
-        Column("flange_height", "flange height", "mm", ".2f"),
-        Column("hollow", "hollow", "mm", ".2f"),
-    ]
-    for side, of_side in rows.items():
-        shown = [row if row["area"] else row | {"deepest_y": None} for row in of_side]
-        known = [column for column in columns if column.name in shown[0]]
-        parts += ["", Table(known, shown, "" if side == "rows" else f"{side} rail")]
+    parts: list[str | Table] = [worn, f"  {shares_of(runs)}", f"  {source}, {of.note}"]
+    for table in wear_tables(of, rows):
+        parts += ["", table]
     return parts

@@ -2,6 +2,7 @@
 
 ===============  =======================================================================
 `runs.py`        runs and studies: inputs, comparison with limits, curves, spread
+`measured.py`    comparisons with tests, identifications, wear: from their records
 `springs.py`     a trailing-arm suspension: inputs, load cases, checks, pictures
 `mechanisms.py`  a planar linkage: player, results, search, pictures, animation
 ===============  =======================================================================

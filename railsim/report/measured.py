@@ -1,4 +1,4 @@
-"""Pages about a model against a test, and about an identification."""
+"""Pages about a model against a test, an identification, wear over distance or tonnage."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -21,8 +21,9 @@ from railsim.identification.identified import (
 )
 from railsim.plot import validation as plots
 from railsim.report.document import Drawing, Section, as_png, document, of_values, pictures
+from railsim.report.wear import RAILS, WHEELS, shares_of, wear_tables
 
-RECORDS = ("model_validation.json", "identified.json")
+RECORDS = ("model_validation.json", "identified.json", "wear.json")
 LARGEST_RECORD, LARGEST_PICTURE = 200_000_000, 20_000_000  # bytes
 PNG = b"\x89PNG\r\n\x1a\n"
 CAPTIONS = {
@@ -33,6 +34,7 @@ CAPTIONS = {
     "spectra": "Power spectral densities.",
     "fits": "Measured, with the values of the file, and with the identified ones; means are drawn "
     "but not compared.",
+    "wear": "Profiles, new and worn, with the depth of wear.",
     "residuals": "Cumulative periodograms of the residuals: a straight line where they are white.",
 }
 VALIDATION = (
@@ -51,7 +53,7 @@ IDENTIFICATION = (
 
 @dataclass(frozen=True)
 class Part:
-    """What a page says about one comparison or identification."""
+    """What a page says about one comparison, identification or calculation of wear."""
 
     title: str
     verdict: str
@@ -62,7 +64,7 @@ class Part:
 
 
 def measured_page(parts: Sequence[Part], title: str | None = None) -> str:
-    """Return the page about comparisons of models with tests, and identifications."""
+    """Return the page about comparisons of models with tests, identifications and wear."""
     alone = len(parts) == 1
     sections = []
     for part in parts:
@@ -144,8 +146,28 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
     return Part(title, text, good, remarks, sections, IDENTIFICATION)
 
 
+def of_wear(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
+    """Return what a page says about the wear of wheels or rails, by its record."""
+    rails = "track" in record
+    of, sides = (RAILS, RAILS.sides) if rails else (WHEELS, ("rows",))
+    runs, step = record["traffic" if rails else "routes"], record["step"] / of.scale
+    tables, ended = wear_tables(of, {side: record[side] for side in sides}), record["ended"]
+    last = f"{record[sides[0]][-1]['distance'] / of.scale:g} {of.unit}"
+    text = f"Ended after {last}: {ended}" if ended else f"Computed to {last}."
+    steps = f"Profiles are written every {step:g} {of.unit}."
+    sections = [
+        Section("Wear", [shares_of(runs), steps], tables),
+        Section("Pictures", [], [], figures),
+    ]
+    title = (
+        f"{record['track' if rails else 'vehicle']}: wear of the {'rails' if rails else 'wheels'}"
+    )
+    method = f"Law of wear {record['law']}, {of.note}."
+    return Part(title, text, not ended, record["remarks"], sections, [method])
+
+
 def is_measured(file: str | Path) -> bool:
-    """Return whether a file or folder is one of `railsim validate-model` or `identify`."""
+    """Return whether `railsim validate-model`, `identify`, `wear` or `rail-wear` wrote it."""
     return _record_of(Path(file)) is not None
 
 
@@ -156,7 +178,7 @@ def _record_of(path: Path) -> Path | None:
 
 
 def read_part(file: str | Path) -> Part:
-    """Return what was found by `railsim validate-model` or `identify`, by the folder it wrote.
+    """Return what was found by one of these commands, by the folder it wrote.
 
     Raises InputError: a record that cannot be read, or is none.
     """
@@ -167,10 +189,12 @@ def read_part(file: str | Path) -> Part:
         record = json.loads(read_bytes(path, LARGEST_RECORD))
         if path.name == RECORDS[0]:
             return of_validation(ModelValidation.of(record), _pictures(path.parent, "overlays"))
-        return of_identification(record, _pictures(path.parent, "fits", "residuals"))
-    except (ValueError, KeyError, TypeError) as error:
+        if path.name == RECORDS[1]:
+            return of_identification(record, _pictures(path.parent, "fits", "residuals"))
+        return of_wear(record, _pictures(path.parent, "wear"))
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
         words = f"{type(error).__name__}: {error}"[:100]
-        allowed = "the file as `validate-model` or `identify` has written it"
+        allowed = "the file as its command has written it"
         raise input_error(str(path), words, allowed) from None
 
 

@@ -61,6 +61,17 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys,
     y = np.linspace(-0.06, 0.05, 5001)
     lost = np.interp(y, wheel.y, wheel.z) - np.interp(y, worn.y, worn.z)
     assert np.trapezoid(lost - lost.min(), y) == pytest.approx(twice["area"], rel=0.1)
+    # a page about the folder; one that is damaged is refused
+    page = tmp_path / "page.html"
+    assert main(["report", str(folder), "--out", str(page)]) == 0
+    told = page.read_text()
+    assert f"<td>{1e6 * twice['area']:.2f}</td>" in told.replace('<td class="number">', "<td>")
+    assert "Computed to 200 km." in told
+    assert "data:image/png;base64," in told
+    (folder / "wear.json").write_text('{"vehicle": "", "routes": []}')
+    assert main(["report", str(folder), "--out", str(page), "--overwrite"]) == 2
+    assert f"{folder / 'wear.json'}: " in capsys.readouterr().err
+    assert page.read_text() == told
     # damage: told and computed again
     kept.write_bytes(content.replace(b"0", b"1", 3))
     assert main([*command, "--distance", "200", "--overwrite"]) == 0
@@ -183,6 +194,10 @@ def test_command_draws_the_wear_of_both_rails(tmp_path, monkeypatch):
     ]
     expected = [{"0.1 Mt": 0.1, "0.2 Mt": 0.2}, {"0.1 Mt": 0.02, "0.2 Mt": 0.05}]
     assert depths == [pytest.approx(one) for one in expected]
+    page = tmp_path / "page.html"
+    assert main(["report", str(tmp_path / "w"), "--out", str(page)]) == 0
+    for words in ("wear of the rails", "left rail", "right rail", "0.200", "0.050"):
+        assert words in page.read_text()
 
 
 def test_all_that_is_wrong_is_told_at_once_by_its_option(capsys):

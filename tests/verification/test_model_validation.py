@@ -195,7 +195,7 @@ def test_the_command_writes_its_files_and_fails_on_request(tmp_path, right):
         assert words in both
     (tmp_path / "out" / "model_validation.json").write_text('{"vehicle": "none"}')
     again = CliRunner().invoke(command_line, [*more, "--overwrite"], standalone_mode=False)
-    assert "as `validate-model` or `identify` has written it" in str(again.exception)
+    assert "as its command has written it" in str(again.exception)
 
 
 def test_a_study_gives_the_result_on_the_same_track_in_the_same_load(measured, right, tmp_path):
