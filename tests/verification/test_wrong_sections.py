@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.loading import load_settings, load_track, load_track_text, load_vehicle
 from railsim.errors import InputError
 from railsim.model.assembly import assemble
 
@@ -17,11 +17,11 @@ def rows(y=Y, z=TOP):
     return [(s, y, z) if k == 10 else (s, Y, TOP) for k, s in enumerate(PLACES)]
 
 
-def loaded(tmp_path, sections):
-    """Track with these sections, from a file."""
+def loaded(tmp_path, sections, more=""):
+    """Track with these sections, from a file; `more` keys of the range."""
     lines = [f"{s},{y},{z}" for s, ys, zs in sections for y, z in zip(ys, zs, strict=True)]
     (tmp_path / "list.csv").write_text("s,y,z\n" + "\n".join(lines) + "\n")
-    part = 'rail = "right"\nfile = "list.csv"\nshift = 50.0\nbegin = 50.2\nend = 51.8\n'
+    part = 'rail = "right"\nfile = "list.csv"\nshift = 50.0\nbegin = 50.2\nend = 51.8\n' + more
     head = 'format = "railsim-track/1"\nname = "x"\ngauge = 1.435\nrail = "60E1"\n'
     plan = 'inclination = 0.025\nfriction = 0.3\nplan = [{ type = "STR", length = 100.0 }]\n'
     file = tmp_path / "track.toml"
@@ -69,3 +69,19 @@ def test_first_section_without_a_gauge_face_is_named(tmp_path):
     track = loaded(tmp_path, rows())
     with pytest.raises(InputError, match="gauge_face: the gauge side ends 12"):
         assemble(load_vehicle("coach_manchester"), track, load_settings())
+
+
+def test_a_trailing_list_is_passed_from_its_end(tmp_path):
+    """The flatter section at s = -1.5 m of the list is at 50 + 1.5 m of the track."""
+    listed = [(s, Y, TOP * (0.9 if s == -1.5 else 1.0)) for s in np.round(PLACES - 2.0, 9)]
+    (found,) = loaded(tmp_path, listed, "trailing = true\n").sections
+    places = [one.s for one in found.contours]
+    assert places == sorted(places)
+    flatter = [one.s + found.shift for one in found.contours if one.z[0] < 0.95 * TOP[0]]
+    assert flatter == [51.5]
+    again = loaded(tmp_path, listed, "trailing = true\n")
+    assert load_track_text(again.to_toml()).sections == again.sections  # not turned once more
+    with pytest.raises(InputError, match="'trailing' turns the list of a 'file'"):
+        again.replace(sections=[{**found.model_dump(exclude_none=True), "trailing": True}])
+    with pytest.raises(InputError, match=r"sections.0.trailing: .*a valid boolean"):
+        loaded(tmp_path, listed, 'trailing = "yes"\n')

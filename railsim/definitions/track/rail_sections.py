@@ -67,6 +67,9 @@ class RailSections(Definition):
     """What was read, by rising arc length"""
     shift: Finite = 0.0
     """Added to the arc lengths of the list [m]"""
+    trailing: Annotated[bool, Field(strict=True)] = False
+    """Whether the list of a `file` is passed from its end to its beginning: its arc lengths change
+    their sign before `shift` is added"""
     gauge_face: Annotated[Finite, Field(ge=-0.1, le=0.1)] | None = None
     """Lateral position of the gauge face of the plain rail in the coordinates of the list, 14 mm
     below the top [m]; by default that of the first section that is kept"""
@@ -79,6 +82,8 @@ class RailSections(Definition):
     def _range(self) -> None:
         if (self.file is None) == (self.contours is None):
             raise ValueError("either 'file' or 'contours' is needed")
+        if self.trailing and self.file is None:
+            raise ValueError("'trailing' turns the list of a 'file' round, 'contours' are in order")
         if self.end < self.begin + 0.1:
             raise ValueError("'end' must lie 0.1 m behind 'begin' at least")
         for before, after in pairwise(self.contours or ()):
@@ -131,10 +136,13 @@ def embed_rail_sections(data: dict[str, Any]) -> list[Fault]:
 def _embed(_: str, table: dict[str, Any]) -> None:
     found = read_sections(table["file"], "rail")
     del table["file"]
+    if turn := table.get("trailing") is True:
+        del table["trailing"]
+    positions = (-found.positions[::-1] if turn else found.positions).tolist()
     table["contours"] = [
         {"s": round(s, 6), "y": _written(points[0]), "z": _written(points[1])}
-        for s, points in zip(found.positions.tolist(), found.points, strict=True)
-        if _needed(s, found.positions.tolist(), table)
+        for s, points in zip(positions, found.points[:: -1 if turn else 1], strict=True)
+        if _needed(s, positions, table)
     ]
 
 
