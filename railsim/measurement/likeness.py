@@ -20,6 +20,7 @@ SURE = 0.8  # correlation from which a shift in time is trusted
 PARTS = 5  # of a record, for the drift
 APART = 2.0  # of a sampling step
 LONGEST = 1.0  # s
+SHARED = 0.25  # of the energy, below which what both have at a lag is too little
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,8 @@ def likeness(measured: Floats, simulated: Floats, step: float) -> Likeness:
     energy = float(np.sqrt(np.sum(a**2))), float(np.sqrt(np.sum(b**2)))
     if known.sum() < 10 or not all(energy):
         return Likeness(np.nan, np.nan, np.nan, np.nan)
-    a, b = (np.where(known, one - one[known].mean(), 0.0) for one in (measured, simulated))
-    correlation, lag = _best(a, b, step)
-    return Likeness(correlation, energy[0] / energy[1], lag, _drift(a, b, step))
+    correlation, lag = _best(measured, simulated, step)
+    return Likeness(correlation, energy[0] / energy[1], lag, _drift(measured, simulated, step))
 
 
 def _drift(a: Floats, b: Floats, step: float) -> float:
@@ -78,13 +78,27 @@ def _drift(a: Floats, b: Floats, step: float) -> float:
 
 
 def _best(a: Floats, b: Floats, step: float) -> tuple[float, float]:
-    a, b = a - a.mean(), b - b.mean()  # a wheel load is alike at any shift but for its changes
+    """Correlation and lag where its magnitude is largest, each over what both have at that lag.
+
+    Sums over all instants would shrink with every gap that meets a value, least without a lag: an
+    estimate of the lag between gaps would be drawn to zero (Padfield 2012, masked correlation).
+    """
     size = 2 * len(a)
-    product = np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
     reach = min(int(LONGEST / step), len(a) // 4)
     lags = np.arange(-reach, reach + 1)
-    scale = float(np.sqrt(np.sum(a**2) * np.sum(b**2))) or 1.0
-    values = product[lags] / scale
+
+    def products(x: Floats, y: Floats) -> Floats:
+        found = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return np.asarray(found[lags])
+
+    here, there = np.isfinite(a), np.isfinite(b)
+    # a wheel load is alike at any shift but for its changes
+    a, b = (
+        np.where(k, x - (x[k].mean() if k.any() else 0.0), 0.0) for k, x in ((here, a), (there, b))
+    )
+    values = products(a, b)
+    for energy in (products(a**2, 1.0 * there), products(1.0 * here, b**2)):
+        values /= np.sqrt(np.maximum(energy, max(SHARED * float(energy.max()), 1e-300)))
     k = int(np.argmax(np.abs(values)))
     return float(values[k]), float(lags[k] * step)
 

@@ -99,6 +99,21 @@ def test_likeness_is_the_lag_the_ratio_and_the_correlation(sign, late, drift):
         assert found.correlation == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize(("every", "gap"), [(1.0, 0.2), (0.5, 0.1), (0.3, 0.15)])
+def test_gaps_draw_no_lag_to_zero(every, gap):
+    """Sums over all instants would give 60, 40 and 0 ms between these gaps, not 80 ms."""
+    step, late, t = 0.01, 0.08, 0.01 * np.arange(6000)
+    rng = np.random.default_rng(0)
+    f, phase = np.linspace(0.5, 2.0, 60), rng.uniform(0.0, 2.0 * np.pi, 60)
+    simulated, measured = (
+        np.cos(2.0 * np.pi * np.outer(t - shift, f) + phase).sum(axis=1) for shift in (0.0, late)
+    )
+    measured[(t % every) < gap] = np.nan
+    found = likeness(measured, simulated, step)
+    assert found.lag == pytest.approx(late)
+    assert found.correlation == pytest.approx(1.0, abs=5e-3)
+
+
 def test_a_wheel_load_lags_by_what_its_changes_do():
     """Its mean is alike at any shift: without taking it off the best one would be none."""
     step, late = 0.02, 17
