@@ -138,11 +138,11 @@ class MemorySink(Sink):
         groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`."""
-        arrays = {
-            name: np.concatenate(chunks) if chunks else np.zeros((0, *self._shape(name)))
-            for name, chunks in self._chunks.items()
-        }
-        arrays |= {name: statics[name] for name in self._quantities if name not in self._chunks}
+        arrays = {}
+        for name in [*self._chunks]:
+            chunks = self._chunks.pop(name)  # one after the other: not everything twice
+            arrays[name] = np.concatenate(chunks) if chunks else np.zeros((0, *self._shape(name)))
+        arrays |= {name: statics[name] for name in self._quantities if name not in arrays}
         facts = root_attributes(self._attributes, attributes)
         return Result(arrays, self._quantities, self._coordinates, facts, profiles, groups)
 

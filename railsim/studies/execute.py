@@ -62,8 +62,8 @@ class Job:
 
     @property
     def whole(self) -> bool:
-        """Whether its file holds everything, as the run itself writes it."""
-        return self.keep == EVERYTHING and self.storage == PLAIN
+        """Whether its file holds everything, with all digits: the run itself writes it."""
+        return self.keep == EVERYTHING and not self.storage.single
 
 
 class Stopped(Exception):
@@ -83,7 +83,8 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
     only = EVERYTHING if wants_all else {*OF_FACTS, *ALWAYS_KEPT, *job.keep}
     file = job.path if job.whole else None
     try:
-        return _record(job, run_case(case, file, overwrite=True, progress=progress, only=only))
+        how: dict[str, Any] = {"progress": progress, "only": only, "storage": job.storage}
+        return _record(job, run_case(case, file, overwrite=True, **how))
     except Stopped:
         raise
     except Exception as error:
