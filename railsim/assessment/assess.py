@@ -4,7 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from railsim.assessment.assessment import Assessment
-from railsim.assessment.comfort_report import caused_by_hunting, comfort_report, short_of_blocks
+from railsim.assessment.comfort_report import (
+    caused_by_hunting,
+    comfort_report,
+    short_of_blocks,
+    underestimated,
+)
 from railsim.assessment.record import RUNNING, Record
 from railsim.assessment.running import assess_running, by_vehicle, running_limits
 from railsim.assessment.safety import safety_report
@@ -150,7 +155,8 @@ def _by_runs(
     classes = load_comfort_limits(limits or "comfort")
     comfort = {name: comfort_report(record) for name, record in records.items()}
     for name, points in comfort.items():
-        said = short_of_blocks(points), caused_by_hunting(records[name], points)
+        said = [short_of_blocks(points), underestimated(points)]
+        said += [caused_by_hunting(records[name], points)]
         remarks += [f"{name}: {sentence}" for sentence in said if sentence]
     if not classes.mean_comfort.checked:
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")

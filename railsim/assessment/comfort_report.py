@@ -16,6 +16,8 @@ from railsim.errors import input_error
 from railsim.result.filters import band_passed
 
 NEAR = (0.85, 1.15)  # band around the frequency of hunting, over this frequency
+SHOCKS = {"MTVV/a_w": 1.5, "VDV/(a_w T^1/4)": 1.75}
+QUARTER = 0.25
 MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz of the weightings
 
 
@@ -34,6 +36,7 @@ class PointComfort:
     events: dict[str, float]  # largest P_DE by posture [%]
     # its share in the mean square of the weighted lateral acceleration; 0: none
     hunting: float = 0.0
+    duration: float = np.nan  # of what counts [s]
 
     def record(self, limits: ComfortLimits) -> dict[str, object]:
         """Return the values as plain numbers and strings, SI, percentages in per cent."""
@@ -99,6 +102,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
             {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
             tuple(transitions[number]), into.events,
             float(into.hunting / into.iso[1]) if frequency else 0.0,
+            into.count / record.rate,
         )
         for number, (name, into) in enumerate(zip(names, gathered, strict=True))
     ]  # fmt: skip
@@ -181,6 +185,27 @@ def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
         f"{100.0 * most.hunting:.0f} % of the mean square of the weighted lateral acceleration at "
         f"{most.sensor}"
     )
+
+
+def underestimated(points: list[PointComfort]) -> str:
+    """Sentence where the rms underestimates shocks, by the criteria of ISO 2631-1:1997, 6.3.3.
+
+    MTVV/a_w > 1.5 or VDV/(a_w T^(1/4)) > 1.75, from memory; the largest of all points and axes but
+    those along which MTVV or VDV is less than a quarter of that along another one.
+    """
+    said = []
+    for name, limit in SHOCKS.items():
+        ratios = []
+        for p in points:
+            most, time = (p.MTVV, 1.0) if name == "MTVV/a_w" else (p.VDV, p.duration**0.25)
+            for axis, value, rms in zip("xyz", most, p.iso_rms, strict=True):
+                if rms > 0.0 and value >= QUARTER * np.max(most):
+                    ratios.append((float(value / rms / time), f"along {axis} at {p.sensor}"))
+        ratio, place = max(ratios, default=(0.0, ""))
+        if ratio > limit:
+            said.append(f"{name} {ratio:.2f} > {limit:g} {place}")
+    end = "the rms of ISO 2631-1 underestimates the shocks: judge by MTVV and VDV"
+    return f"{', '.join(said)}: {end}" if said else ""
 
 
 def short_of_blocks(points: list[PointComfort]) -> str:

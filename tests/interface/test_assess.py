@@ -469,6 +469,8 @@ def test_comfort_of_known_vibration():
     middle = next(p for p in points if p.sensor == "floor_middle")
     assert pytest.approx(6.0 * 0.14250, rel=0.01) == middle.mean.N_MV
     assert any("60" in remark for remark in found.remarks)
+    # of a sine MTVV is a_w, and VDV 1.11 a_w T^(1/4)
+    assert not any("underestimates" in remark for remark in found.remarks)
 
 
 def test_shock_in_two_parts_of_a_run_is_in_the_values_of_iso_2631():
@@ -492,6 +494,14 @@ def test_shock_in_two_parts_of_a_run_is_in_the_values_of_iso_2631():
     assert middle.record(load_comfort_limits("comfort"))["iso2631_VDV"][2] == middle.VDV[2]
     (table,) = tables(found)
     assert {"MTVV", "VDV"} <= {column.name for column in table.columns}
+    # a_w^2 = 1.039^2 (1 + 0.01 (T - 1))/(2 T)
+    (said,) = (remark for remark in found.remarks if "underestimates the shocks" in remark)
+    T = middle.duration
+    a_w = 1.039 * math.sqrt((1.0 + 0.01 * (T - 1.0)) / (2.0 * T))
+    ratios = middle.MTVV[2] / middle.iso_rms[2], middle.VDV[2] / middle.iso_rms[2] / T**0.25
+    assert ratios == pytest.approx((1.039 / math.sqrt(2.0) / a_w, dose / a_w / T**0.25), rel=0.03)
+    assert f"MTVV/a_w {ratios[0]:.2f} > 1.5 along z" in said
+    assert f"VDV/(a_w T^1/4) {ratios[1]:.2f} > 1.75 along z" in said
 
 
 def test_wear_of_a_known_wear_number():
