@@ -25,7 +25,7 @@ WHEELS = Worn("distance", "km", 1e3, OF_WHEELS, ("wheel",))
 RAILS = Worn("tonnage", "Mt", 1e9, OF_RAILS, SIDES)
 
 
-def shares_of(runs: Sequence[Mapping[str, Any]]) -> str:
+def shares_of(runs: Sequence[dict[str, Any]]) -> str:
     """Return in words what runs at what speed, with its share of the amount."""
     total = sum(run["share"] for run in runs)
     return ", ".join(
