@@ -148,21 +148,15 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
 
 def of_wear(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about the wear of wheels or rails, by its record."""
-    rails = "track" in record
-    of, sides = (RAILS, RAILS.sides) if rails else (WHEELS, ("rows",))
-    runs, step = record["traffic" if rails else "routes"], record["step"] / of.scale
-    tables, ended = wear_tables(of, {side: record[side] for side in sides}), record["ended"]
-    last = f"{record[sides[0]][-1]['distance'] / of.scale:g} {of.unit}"
-    text = f"Ended after {last}: {ended}" if ended else f"Computed to {last}."
-    steps = f"Profiles are written every {step:g} {of.unit}."
-    sections = [
-        Section("Wear", [shares_of(runs), steps], tables),
-        Section("Pictures", [], [], figures),
-    ]
-    title = (
-        f"{record['track' if rails else 'vehicle']}: wear of the {'rails' if rails else 'wheels'}"
-    )
-    method = f"Law of wear {record['law']}, {of.note}."
+    what, of = ("rails", RAILS) if "track" in record else ("wheels", WHEELS)
+    worn, runs, *_ = record.values()
+    rows = {side: record[side] for side in (RAILS.sides if of is RAILS else ("rows",))}
+    last, ended = next(iter(rows.values()))[-1]["distance"] / of.scale, record["ended"]
+    text = f"{'Ended after' if ended else 'Computed to'} {last:g} {of.unit}"
+    text += f": {ended}" if ended else "."
+    tables, method = wear_tables(of, rows), f"Law of wear {record['law']}, {of.note}."
+    sections = [Section("Wear", [shares_of(runs)], tables), Section("Pictures", drawings=figures)]
+    title = f"{worn}: wear of the {what}"
     return Part(title, text, not ended, record["remarks"], sections, [method])
 
 
