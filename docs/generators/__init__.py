@@ -5,6 +5,7 @@
 
 GENERATORS = {
     "tables": "quantities, curving study, first picture (the default; seconds)",
+    "keys": "schemas of the files and tables of their keys (seconds)",
     "examples": "gallery of examples; parts: names; part `pages`: texts only (minutes)",
     "vehicles": "pages of the library; parts: names; part `data`: from the files only (minutes)",
     "stability": "pictures of modes, critical speeds, curving; parts: names (ten minutes)",

@@ -4,9 +4,22 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from railsim.definitions.schema import check_markers
-
 TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_MARKERS = re.compile(r"<!-- (keys: .*?|generated: .*?|end|end of keys) -->")
+
+
+def check_markers(text: str) -> None:
+    """Raise ValueError where a begin and an end of a filled table of a page do not alternate."""
+    opened = ""
+    for match in _MARKERS.finditer(text):
+        ends = match[1].startswith("end")
+        if ends != bool(opened) or (ends and opened.startswith("keys:") != (match[1] != "end")):
+            raise ValueError(
+                f"line {text.count(chr(10), 0, match.start()) + 1}: {match[0]} has no partner"
+            )
+        opened = "" if ends else match[1]
+    if opened:
+        raise ValueError(f"<!-- {opened} --> has no end")
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---:") -> str:

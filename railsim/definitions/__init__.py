@@ -27,7 +27,6 @@ limits, wear_law, published  limit values, laws of wear, published results, each
 mirror         mirror images of vehicles and tracks
 creep_law      the creep laws: names, numbers, labels
 loading        files to definitions
-schema         JSON Schemas and the manual's key tables
 =============  ==================================================================================
 """
 

@@ -5,11 +5,11 @@ import subprocess
 import sys
 
 import pytest
+from generators.keys import json_schema
 
 import railsim
 from railsim import laws
 from railsim.cli import main
-from railsim.definitions.schema import json_schema
 from railsim.errors import InputError
 
 LAW = '''"""A damper of somebody else.

@@ -8,11 +8,11 @@ from pathlib import Path
 import click
 import pytest
 from generators import GENERATORS
+from generators.filling import check_markers
 from PIL import Image
 
 from railsim.cli import main
 from railsim.cli import railsim as command_line
-from railsim.definitions.schema import check_markers
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from generators.keys import filled, json_schema, schema_name
 
 from railsim.definitions.loading import FORMATS, definition_of, load_any, load_vehicle
-from railsim.definitions.schema import filled, json_schema, schema_name
 from railsim.files import sources
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"assess.md", "vehicle_file.md", "track_file.md", "settings.md"}
 schema_of = functools.cache(json_schema)
-MENDED_BY = "python -m railsim.definitions.schema docs"
+MENDED_BY = "python docs/generate.py keys"
 SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.shipped_names(kind)]
 
 

@@ -17,7 +17,7 @@ ELEMENT = """
 import numpy as np, railsim
 from railsim.definitions import Settings
 from railsim.definitions.loading import load_track, load_vehicle
-from railsim.definitions.schema import json_schema, key_table
+from generators.keys import json_schema, key_table
 from railsim.errors import InputError
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.kernels.rhs import right_hand_side
@@ -66,8 +66,8 @@ np.testing.assert_array_equal(accelerations, rates(same))
 EXCITATION = """
 import numpy as np
 from railsim.definitions.loading import load_track
+from generators.keys import key_table
 from railsim.definitions.mirror import mirrored_track
-from railsim.definitions.schema import key_table
 from railsim.track.irregularity import displacement
 
 joints = {"type": "joints", "spacing": 20.0, "depth": 4e-3, "begin": 10.0, "end": 95.0}
@@ -143,7 +143,11 @@ def test_blocks_of_the_page_stand_in_the_examples():
     ids=["element", "excitation", "output", "creep"],
 )
 def test_example_works_in_a_copy_of_the_program(copy, program):
-    environment = {**os.environ, "PYTHONPATH": str(copy), "NUMBA_DISABLE_JIT": "1"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": f"{copy}{os.pathsep}{ROOT / 'docs'}",
+        "NUMBA_DISABLE_JIT": "1",
+    }
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=copy, env=environment, capture_output=True, text=True
     )

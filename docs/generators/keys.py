@@ -1,22 +1,25 @@
 """JSON Schemas of the file formats and the key tables of the manual, both made from the models.
 
-``python -m railsim.definitions.schema docs`` writes ``docs/schema/*.json`` and fills every table in
-``docs/user/*.md`` that stands between the lines ``<!-- keys: FORMAT NAME -->`` and
-``<!-- end of keys -->``, where NAME is a definition's class.
+``docs/schema/*.json`` are written, and every table in ``docs/user/*.md`` is filled that stands
+between the lines ``<!-- keys: FORMAT NAME -->`` and ``<!-- end of keys -->``, where NAME is a
+definition's class.
 """
 
 import functools
 import json
 import re
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
+from generators.filling import check_markers
 from railsim.definitions.base import meanings
 from railsim.definitions.loading import FORMATS, definition_of
 
+DOCS = Path(__file__).parents[1]
+PARTS: tuple[str, ...] = ()
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _BEGIN = r"<!-- keys: (?P<format>\S+) (?P<name>\w+) -->\n"
 TABLE = re.compile(_BEGIN + r".*?<!-- end of keys -->", re.DOTALL)
@@ -170,23 +173,6 @@ def _limited(schema: dict[str, Any]) -> str:
     return " ".join([names.get(schema["type"], schema["type"]), *limits])
 
 
-_MARKERS = re.compile(r"<!-- (keys: .*?|generated: .*?|end|end of keys) -->")
-
-
-def check_markers(text: str) -> None:
-    """Raise ValueError where a begin and an end of a filled table of a page do not alternate."""
-    opened = ""
-    for match in _MARKERS.finditer(text):
-        ends = match[1].startswith("end")
-        if ends != bool(opened) or (ends and opened.startswith("keys:") != (match[1] != "end")):
-            raise ValueError(
-                f"line {text.count(chr(10), 0, match.start()) + 1}: {match[0]} has no partner"
-            )
-        opened = "" if ends else match[1]
-    if opened:
-        raise ValueError(f"<!-- {opened} --> has no end")
-
-
 def filled(text: str) -> str:
     """Return a page of the manual with its key tables filled."""
     check_markers(text)
@@ -198,17 +184,12 @@ def filled(text: str) -> str:
     return TABLE.sub(table, text)
 
 
-def write(docs: Path) -> None:
-    """Write all schemas and fill all key tables under the manual's folder."""
-    (docs / "schema").mkdir(parents=True, exist_ok=True)
+def make(parts: Sequence[str]) -> None:
+    """Write all schemas and fill all key tables."""
     for format_name in FORMATS:
         text = json.dumps(json_schema(format_name), indent=1) + "\n"
-        (docs / "schema" / schema_name(format_name)).write_text(text, encoding="utf-8")
-    for page in sorted((docs / "user").glob("*.md")):
+        (DOCS / "schema" / schema_name(format_name)).write_text(text, encoding="utf-8")
+    for page in sorted((DOCS / "user").glob("*.md")):
         text = page.read_text(encoding="utf-8")
         if filled(text) != text:
             page.write_text(filled(text), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    write(Path(sys.argv[1]))
