@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, print_json, show
-from railsim.errors import Fault, Faults, InputError, changed_faults, input_error
+from railsim.errors import Fault, Faults, changed_faults, input_error
 from railsim.files import access
 from railsim.files.sources import OVERRIDE, find_file, library_files, read_source, shipped_names
 from railsim.text import plain
@@ -217,24 +217,21 @@ linearisation_options = together(
 )
 
 
-@contextmanager
-def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
+def faults_in(file: str, kind: str, name: str) -> AbstractContextManager[None]:
     """Let faults that computing finds name the file of their key, as those of loading do.
 
     `file`: as given on the command line: a path, or the name of a shipped file; `kind`: what it
     holds: spring, mechanism; `name`: the definition's own name, which faults found by computing
     bear.
     """
-    try:
-        yield
-    except InputError as error:
+
+    def located(fault: Fault) -> Fault:
+        if fault.file not in ("", name):
+            return fault
         source = read_source(find_file(file, kind), kind)
-        raise InputError(
-            source.fault(fault.key, fault.found, fault.allowed)
-            if fault.file in ("", name)
-            else fault
-            for fault in error.faults
-        ) from None
+        return source.fault(fault.key, fault.found, fault.allowed)
+
+    return changed_faults(located)
 
 
 MOST_VALUES = 2000

@@ -14,7 +14,7 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -25,7 +25,15 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.study.analyses import Analysis, AssessAnalysis, needs_run
 from railsim.definitions.study.definition import Study, value_texts
 from railsim.definitions.study.design import Optimise, Value
-from railsim.errors import Fault, Faults, InputError, argument_error, input_error, nearest
+from railsim.errors import (
+    Fault,
+    Faults,
+    InputError,
+    argument_error,
+    changed_faults,
+    input_error,
+    nearest,
+)
 from railsim.files import sources
 from railsim.files.access import TABLE_BYTES, is_file, read_bytes
 from railsim.result.extremes import BY_SIGN, FACTS, PEAK_QUANTITIES
@@ -286,21 +294,16 @@ def _check_quantities(study: Study, wanted: Optimise) -> None:
     ).check()  # fmt: skip
 
 
-@contextmanager
-def faults_of_file(file: str, *, assignments: bool = True) -> Iterator[None]:
+def faults_of_file(file: str, *, assignments: bool = True) -> AbstractContextManager[None]:
     """Let faults of what an option would give name the study file that gives it.
 
     `assignments`: all of them are the file's.
     """
     names = [*OF_FILE, "optimise", "analyses", *(["set"] if assignments else [])]
     options = {f"--{name}" for name in names}
-    try:
-        yield
-    except InputError as error:
-        raise InputError(
-            replace(fault, file=file, option="") if fault.option in options else fault
-            for fault in error.faults
-        ) from None
+    return changed_faults(
+        lambda fault: replace(fault, file=file, option="") if fault.option in options else fault
+    )
 
 
 def check_number(number: int, cores: int, seconds: Callable[[], float]) -> None:

@@ -32,10 +32,11 @@ def run_case(
         facts["inputs_hash"] = case.key
     else:
         facts["continues"] = str(resume.attributes.get("run", "another run"))
-    sink: Hdf5Sink | MemorySink = MemorySink(facts, only)
-    if path is not None:
-        sink = Hdf5Sink(path, overwrite=overwrite, attributes=facts, storage=storage)
-    with sink:
+    with (
+        MemorySink(facts, only)
+        if path is None
+        else Hdf5Sink(path, overwrite=overwrite, attributes=facts, storage=storage)
+    ) as sink:
         return simulate(
             case.vehicle, case.track, **case.conditions, sink=sink, progress=progress, resume=resume
         )

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import Definition, Finite, Name, NonNegative, Positive, Text
+from railsim.definitions.base import Definition, Finite, NonNegative, Positive, Text
 
 # units of the numbers, by what stands behind the analysis' name
 UNITS = {
@@ -81,13 +81,6 @@ Analysis = Annotated[
     RunAnalysis | AssessAnalysis | ModesAnalysis | CriticalSpeedAnalysis | CurvingAnalysis,
     Field(discriminator="kind"),
 ]
-
-
-class Analyses(Definition):
-    """Analyses by names of one's own."""
-
-    analyses: dict[Name, Analysis]
-    """What is done at each point"""
 
 
 def unit_of_number(name: str) -> str:
