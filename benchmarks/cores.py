@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from railsim.bench.scenarios import STUDY, Scenario
+from timed_runs import STUDY
+
+from railsim.bench.scenarios import Scenario
 from railsim.processes import workers_begin
 
 SPIN = 2_000_000  # additions: about a tenth of a second

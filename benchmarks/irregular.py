@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from timed_runs import IRREGULAR
 
-from railsim.bench.scenarios import IRREGULAR, Scenario
+from railsim.bench.scenarios import Scenario
 from railsim.result import Result
 
 COUNTS = ("steps", "steps_divided", "evaluations", "contacts_evaluated_again")

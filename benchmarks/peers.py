@@ -34,11 +34,12 @@ from scipy_peer import Peer
 
 from railsim import simulate
 from railsim.bench.machine import hardware, versions
-from railsim.bench.runs import ALLOWED
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 
 TRACK, SPEED, MIDDLE = "curve_r250", 20.0, 390.0
+# What a default run may be off from RK4 at 0.125 ms: unloading [1], Y [N], yaw [1].
+ALLOWED = {"dQ_over_Q0": 1e-4, "Y": 50.0, "Y_mid_curve": 50.0, "yaw": 1e-3}
 SCIPY = (
     ("RK23", 1e-2),
     ("RK45", 1e-2),

@@ -16,9 +16,9 @@ from typing import Any
 from commands import commands
 from cores import SPIN, two_cores
 from parts import GRIDS, REPETITIONS, fastsim_grids, right_hand_side_parts
+from timed_runs import OTHERS, STUDY
 
 from railsim.bench.runs import benchmark, table
-from railsim.bench.scenarios import OTHERS, STUDY
 
 Rows = tuple[list[str], list[list[str]]]
 

@@ -8,16 +8,12 @@ from typing import Any
 import numpy as np
 
 from railsim.bench.machine import hardware, vector_instructions, versions
-from railsim.bench.scenarios import IRREGULAR, STUDY, Scenario
+from railsim.bench.scenarios import RUNS, Scenario
 from railsim.result import Result, mid_curves
 from railsim.result.extremes import peak
 from railsim.table import Column, Table
 
 RELATIVE = ("Q", "Y", "sum_Y", "wheelset_lateral", "wheelset_yaw", "Y_over_Q")
-# What a default run may be off from RK4 at 0.125 ms: unloading [1], Y [N], yaw [1].
-ALLOWED = {"dQ_over_Q0": 1e-4, "Y": 50.0, "Y_mid_curve": 50.0, "yaw": 1e-3}
-RUNS = (STUDY[0], STUDY[2], IRREGULAR[0])
-"""Two coaches through a curve, and one on irregular rails; all on elastic ones."""
 
 
 def benchmark(

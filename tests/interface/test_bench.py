@@ -6,13 +6,13 @@ from dataclasses import replace
 import pytest
 
 from railsim.bench import runs
-from railsim.bench.scenarios import STUDY
+from railsim.bench.scenarios import RUNS
 from railsim.cli import main
 
 
 @pytest.fixture(scope="module")
 def found():
-    return runs.benchmark([replace(STUDY[0], until=10.0)], 2)
+    return runs.benchmark([replace(RUNS[0], until=10.0)], 2)
 
 
 @pytest.mark.further
@@ -28,7 +28,7 @@ def test_a_run_is_timed_and_compared_with_the_reference(found):
 
 
 def test_the_reference_has_no_error_against_itself():
-    reference = replace(STUDY[0], until=2.0).reference()
+    reference = replace(RUNS[0], until=2.0).reference()
     assert set(runs.error(reference, reference).values()) == {0.0}
 
 
@@ -41,5 +41,5 @@ def test_json_and_table_hold_what_was_found(found, monkeypatch, capsys):
     assert data["versions"]["numba"] != "not installed"
     assert main(["bench", "--quiet"]) == 0
     shown = capsys.readouterr().out
-    assert STUDY[0].name in shown
+    assert RUNS[0].name in shown
     assert "x real time" in shown

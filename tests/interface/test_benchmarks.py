@@ -33,7 +33,8 @@ SMALL = {
 # the threads of a process, its memory, another program's solvers
 OWN_PROCESS = {"growth.py", "peers.py", "study_cost.py"}
 IMPORTED = {"commands.py", "cores.py", "exudyn_coach.py", "exudyn_contact.py",
-            "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py"}  # fmt: skip
+            "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py",
+            "timed_runs.py"}  # fmt: skip
 WRITES_THE_MANUAL = {"tables.py"}  # from the figures in `benchmarks/results`
 STUDY = """
 format = "railsim-study/1"

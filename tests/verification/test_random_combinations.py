@@ -23,7 +23,7 @@ from mirrored_state import image
 from test_lateral_ramp import ramp
 
 import railsim
-from railsim.bench.scenarios import IRREGULAR
+from railsim.bench.scenarios import Scenario
 from railsim.definitions.excitations.single import Kink
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
@@ -223,8 +223,16 @@ def test_random_combination(seed):
 
 def test_a_step_that_is_too_long_is_remarked_upon():
     """Flanges that strike rigid rails; not a two-axle wagon whose wheels slide along the track."""
-    hunts = next(run for run in IRREGULAR if "hunts" in run.name)
-    found = dataclasses.replace(hunts, support="rigid", until=100.0).run()
+    hunts = Scenario(
+        "hunts",
+        "coach_manchester",
+        "straight",
+        60.0,
+        irregularity="erri_b176_low",
+        support="rigid",
+        until=100.0,
+    )
+    found = hunts.run()
     assert any("alternates from step to step" in remark for remark in found.remarks)
     case = drawn(15)
     for settings in ({}, {"step": 1.0 / 1200.0}):
