@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,15 +90,8 @@ def published_table(result: Analysis) -> Table:
 
 def selection_table(choices: Sequence[Choice]) -> Table:
     """Return a row for each row of a catalogue; neighbours that fail for one reason share one."""
-    groups: list[list[Choice]] = []
-    for choice in choices:
-        same = bool(groups) and not choice.fits and not groups[-1][0].fits
-        if same and vars(groups[-1][0]) == {**vars(choice), "name": groups[-1][0].name}:
-            groups[-1].append(choice)
-        else:
-            groups.append([choice])
     rows = []
-    for first, *others in groups:
+    for _, (first, *others) in groupby(choices, lambda c: id(c) if c.fits else replace(c, name="")):
         v, name = first.values, first.name
         if others:
             name = f"{name} ... {others[-1].name} ({len(others) + 1} rows)"
