@@ -32,13 +32,11 @@ def sperling_gain(f: Floats, direction: Direction) -> Floats:
     return np.asarray(FACTOR[direction] * np.sqrt(above / below))
 
 
-def sperling_index(a: Floats, rate: float, direction: Direction) -> float:
-    """Ride index Wz from 0.5 to 30 Hz [1] of accelerations [m/s2] at a rate [1/s]."""
-    return index_of_rms(float(np.sqrt(np.mean(sperling_weighted(a, rate, direction) ** 2))))
-
-
 def sperling_weighted(a: Floats, rate: float, direction: Direction) -> Floats:
-    """Weighted accelerations from 0.5 to 30 Hz, as if a curve at an end went on [m/s2]."""
+    """Weighted accelerations from 0.5 to 30 Hz, as if a curve at an end went on [m/s2].
+
+    `a`: accelerations at a `rate` [1/s].
+    """
 
     def response(f: Floats) -> Floats:
         f = np.asarray(f, dtype=np.float64)

@@ -29,7 +29,6 @@ Q1 = 1.0 / math.sqrt(2.0)
 class Weighting:
     """A weighting: from acceleration to velocity at f3 and f4, upward step from f5 to f6."""
 
-    name: str  # wb, Wc, Wd or Wk
     f1: float  # lower band limit [Hz]
     f2: float  # upper band limit [Hz]
     f3: float  # [Hz]
@@ -66,11 +65,9 @@ class Weighting:
         return filtered(a, rate, self.response, 4.0 / self.f1)
 
 
-WB = Weighting("Wb", 0.4, 100.0, 16.0, 16.0, 0.63, 2.5, 0.8, 4.0, 0.8, 0.4)
-WC = Weighting("Wc", 0.4, 100.0, 8.0, 8.0, 0.63)
-WD = Weighting("Wd", 0.4, 100.0, 2.0, 2.0, 0.63)
-WK = Weighting("Wk", 0.4, 100.0, 12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91, (2.37 / 3.35) ** 2)
-WF = Weighting(
-    "Wf", 0.08, 0.63, 1e6, 0.25, 0.86, 0.0625, 0.8, 0.1, 0.8, (0.0625 / 0.1) ** 2
-)  # motion sickness: ISO 2631-1, annex D
-WEIGHTINGS = {weighting.name: weighting for weighting in (WB, WC, WD, WK)}
+WB = Weighting(0.4, 100.0, 16.0, 16.0, 0.63, 2.5, 0.8, 4.0, 0.8, 0.4)
+WC = Weighting(0.4, 100.0, 8.0, 8.0, 0.63)
+WD = Weighting(0.4, 100.0, 2.0, 2.0, 0.63)
+WK = Weighting(0.4, 100.0, 12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91, (2.37 / 3.35) ** 2)
+# motion sickness: ISO 2631-1, annex D
+WF = Weighting(0.08, 0.63, 1e6, 0.25, 0.86, 0.0625, 0.8, 0.1, 0.8, (0.0625 / 0.1) ** 2)

@@ -34,7 +34,7 @@ from railsim.assessment.safety import (
     nadal,
     overturning,
 )
-from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
+from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_weighted
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
 from railsim.assessment.track_quality import D1, D2, D3, TrackQuality, defect_class, quality_class
 from railsim.assessment.wear import (
@@ -46,7 +46,7 @@ from railsim.assessment.wear import (
     wear_law,
 )
 from railsim.assessment.wear_report import _patches
-from railsim.assessment.weighting import WEIGHTINGS
+from railsim.assessment.weighting import WB, WC, WD, WK
 from railsim.contact.geometry import contact_geometry
 from railsim.definitions.loading import load_comfort_limits
 from railsim.errors import InputError
@@ -279,6 +279,7 @@ def test_values_of_left_hand_curves_are_those_of_their_mirror_images():
 
 # weightings and comfort ---------------------------------------------------------------------------
 
+WEIGHTINGS = {"Wb": WB, "Wc": WC, "Wd": WD, "Wk": WK}
 BANDS = (0.5, 1, 2, 4, 5, 8, 10, 16, 20, 40, 80)
 GAINS = {  # x 1000; the printed Wd at 10 Hz, 212, is a misprint
     "Wk": (418, 482, 531, 967, 1039, 1036, 988, 768, 636, 314, 132),
@@ -425,6 +426,10 @@ def test_event_of_a_slow_swing():
     waves = np.sin(phases[:, None] + window)
     expected = max(p_de(np.ptp(w), abs(w.mean()), "standing") for w in waves)
     assert found["standing"] == pytest.approx(expected, abs=0.05)
+
+
+def sperling_index(a, rate, direction):
+    return index_of_rms(np.sqrt(np.mean(sperling_weighted(a, rate, direction) ** 2)))
 
 
 @pytest.mark.parametrize(("tones", "Wz"), [
