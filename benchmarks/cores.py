@@ -9,7 +9,7 @@ from typing import Any
 
 from timed_runs import STUDY
 
-from railsim.bench.scenarios import Scenario
+from railsim.bench.runs import Scenario
 from railsim.processes import workers_begin
 
 SPIN = 2_000_000  # additions: about a tenth of a second

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from timed_runs import IRREGULAR
 
-from railsim.bench.scenarios import Scenario
+from railsim.bench.runs import Scenario
 from railsim.result import Result
 
 COUNTS = ("steps", "steps_divided", "evaluations", "contacts_evaluated_again")

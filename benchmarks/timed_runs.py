@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from railsim.bench.scenarios import RUNS, Scenario
+from railsim.bench.runs import RUNS, Scenario
 
 STUDY = (
     RUNS[0],

@@ -63,7 +63,7 @@ def recognised_profile(work: Points, kind: Kind | None = None) -> Profile:
     _check_steps(work, kind)
     y, z = smoothed_points(work)
     _check_overhang(work, kind, y, z)
-    level = float(np.interp(0.0, *_function_part(y, z, 0.0)) if kind == "wheel" else z.min())
+    level = float(np.interp(0.0, *_function_part(y, z)) if kind == "wheel" else z.min())
     smoothed = y is not work.y
     return Profile(
         work.name,
@@ -257,17 +257,17 @@ def _shift_wheel(work: Points) -> None:
             f"covers y from {1e3 * work.y.min():.1f} to {1e3 * work.y.max():.1f} mm only",
             "the tread is needed from the flange to 20 mm outside of the nominal rolling circle",
         )
-    y, z = _function_part(work.y, work.z, 0.0)
+    y, z = _function_part(work.y, work.z)
     level = float(np.interp(0.0, y, z))
     if abs(level) > 1e-5:
         work.notes.append(f"z moved by {-1e3 * level:.3f} mm: zero at the nominal rolling circle")
     work.z = work.z - level
 
 
-def _function_part(y: Floats, z: Floats, position: float) -> tuple[Floats, Floats]:
-    """Run of increasing y around the outermost point near a lateral position."""
-    near = np.flatnonzero(np.abs(y - position) < 5e-3)
-    start = int(near[np.argmax(z[near])]) if near.size else int(np.argmin(np.abs(y - position)))
+def _function_part(y: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """Run of increasing y around the outermost point near the nominal rolling circle, y = 0."""
+    near = np.flatnonzero(np.abs(y) < 5e-3)
+    start = int(near[np.argmax(z[near])]) if near.size else int(np.argmin(np.abs(y)))
     first = last = start
     while first > 0 and y[first - 1] < y[first]:
         first -= 1

@@ -134,7 +134,7 @@ def _standing(model: Model, balance: Equilibrium, track: Track, s: float) -> Equ
     """Return the balance on rails supported as at `s`: softer ones are pressed down further."""
     if not len(model.system.support.variation):
         return balance
-    system = _supported(model.system, s, POSITION)._replace(track=track_tables(circle(track)))
+    system = _supported(model.system, s)._replace(track=track_tables(circle(track)))
     speed = float(balance.state[SPEED])
     try:
         state = SteadyRolling(model, system).solve(placed(balance.state), speed)
@@ -144,9 +144,9 @@ def _standing(model: Model, balance: Equilibrium, track: Track, s: float) -> Equ
     return replace(balance, state=state)
 
 
-def _supported(system: System, s: float, there: float) -> System:
-    """Return the system with the support of the rails at `s` moved to another place `there`."""
-    moved = system.support.variation + np.array([there - s, 0.0, 0.0])
+def _supported(system: System, s: float) -> System:
+    """Return the system with the support of the rails at `s` moved to `POSITION`."""
+    moved = system.support.variation + np.array([POSITION - s, 0.0, 0.0])
     return system._replace(support=system.support._replace(variation=moved))
 
 
@@ -283,7 +283,7 @@ def _steady(
         )
         return None
     speed, friction = float(balance.state[SPEED]), _friction(track, start)
-    level = _guided(_supported(model.system, start, POSITION), standing_at(model.check, start))
+    level = _guided(_supported(model.system, start), standing_at(model.check, start))
 
     def along(share: float) -> tuple[System, float]:
         part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)

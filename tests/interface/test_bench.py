@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from railsim.bench import runs
-from railsim.bench.scenarios import RUNS
+from railsim.bench.runs import RUNS
 from railsim.cli import main
 
 

@@ -23,7 +23,7 @@ from mirrored_state import image
 from test_lateral_ramp import ramp
 
 import railsim
-from railsim.bench.scenarios import Scenario
+from railsim.bench.runs import Scenario
 from railsim.definitions.excitations.single import Kink
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
