@@ -204,16 +204,20 @@ class ModelError(RailsimError):
     """A model was asked for something outside its range of validity."""
 
 
+class PackageMissing(InputError, ImportError):
+    """A package that something needs is not installed."""
+
+
 def optional_package(name: str, method: str, install: str) -> Any:
     """Return a package that a method needs and that may not be installed.
 
-    Raises ImportError: it is not; with the command that installs it.
+    Raises PackageMissing: it is not; with the command that installs it.
     """
     try:
         return import_module(name)
     except ImportError:
-        words = f"{method} needs {name}; install it with: pip install {install}"
-        raise ImportError(words) from None
+        found, allowed = f"needs the package '{name}'", f"install it with: pip install {install}"
+        raise PackageMissing([Fault(method, "", found, allowed)]) from None
 
 
 LONGEST_NAME = 200

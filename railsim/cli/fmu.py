@@ -5,7 +5,6 @@ from typing import Any
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import argument_error
 
 
 @click.command()
@@ -46,8 +45,4 @@ def command(
     named = {"inputs": inputs, "outputs": outputs}
     how: dict[str, Any] = {n: text.split(",") for n, text in named.items() if text is not None}
     how |= {"speed": case.speed, "settings": case.settings, **extent}
-    try:
-        path = fmu(case.vehicle, case.track, out, overwrite=output.overwrite, **how)
-    except ImportError as error:
-        raise argument_error("fmu", str(error)) from None
-    output.wrote(path)
+    output.wrote(fmu(case.vehicle, case.track, out, overwrite=output.overwrite, **how))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.errors import Faults, argument_error, argument_fault, nearest
+from railsim.errors import Faults, argument_error, argument_fault, nearest, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.result.data import Result
 from railsim.result.filters import even_step, low_passed, outward_quotient
@@ -182,13 +182,8 @@ def _matlab(result: Result, path: Path) -> None:
 
 
 def _parquet(found: Columns, path: Path) -> None:
-    try:
-        import pandas
-        import pyarrow  # noqa: F401 - what writes it
-    except ImportError as error:
-        words = f"the package '{error.name}' is not installed"
-        allowed = "install it with: pip install pandas pyarrow"
-        raise argument_error("path", words, allowed, option="--out") from None
+    pandas = optional_package("pandas", "Parquet", "pandas pyarrow")
+    optional_package("pyarrow", "Parquet", "pandas pyarrow")  # what writes it
     frame = pandas.DataFrame({name: values for name, _, values in found})
     frame.attrs = {"units": {name: unit for name, unit, _ in found}}
     with open(path, "wb") as file:

@@ -23,7 +23,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from railsim.definitions.loading import load_track, load_vehicle
-from railsim.errors import ModelError, RailsimError, argument_error
+from railsim.errors import ModelError, RailsimError, argument_error, optional_package
 from railsim.files.access import remove_partial_files, sweep, whole_file
 from railsim.processes import WorkerPool, begin_worker, worker_context
 from railsim.result import Result, open_result
@@ -233,14 +233,9 @@ class _Pool:
 
 def cluster(address: str) -> Any:
     """Return a client of a dask scheduler; raises InputError: no dask, or none that answers."""
+    distributed = optional_package("distributed", "scheduler", "'railsim[distributed]'")
     try:
-        from distributed import Client
-    except ImportError:
-        found = "the package 'distributed' is not installed"
-        allowed = "install it with: pip install 'railsim[distributed]'"
-        raise argument_error("scheduler", found, allowed) from None
-    try:
-        return Client(address)
+        return distributed.Client(address)
     except (OSError, ValueError) as error:
         found = f"no scheduler answers at {address} ({error})"
         raise argument_error("scheduler", found, "such as tcp://host:8786") from None

@@ -15,7 +15,7 @@ import numpy as np
 
 from railsim.arrays import Flags, Floats
 from railsim.definitions.study.design import FEWEST_EVOLVED
-from railsim.errors import input_error
+from railsim.errors import optional_package
 
 CANDIDATES = 512  # candidates for a batch, from Sobol's sequence
 NEAR = 256  # further candidates about members of the front, at each distance
@@ -199,14 +199,12 @@ class Surrogate:
 
 def _nsga2(task: Task) -> None:
     """Genetic algorithm of Deb et al. (2002), by pymoo; the batch is its population."""
-    try:
-        from pymoo.algorithms.moo.nsga2 import NSGA2
-        from pymoo.core.problem import Problem
-        from pymoo.core.termination import NoTermination
-    except ImportError:
-        found = "the package 'pymoo' is not installed"
-        allowed = "install it with: pip install 'railsim[optimise]'; or method = \"surrogate\""
-        raise input_error("optimise.method", found, allowed, key="nsga2") from None
+    install = "'railsim[optimise]'; or method = \"surrogate\""
+    optional_package("pymoo", "optimise.method: nsga2", install)
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem
+    from pymoo.core.termination import NoTermination
+
     problem = Problem(
         n_var=task.variables, n_obj=task.objectives, n_ieq_constr=task.constraints, xl=0.0, xu=1.0
     )

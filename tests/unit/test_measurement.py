@@ -1,6 +1,7 @@
 """Measured runs: what files say becomes channels in SI, or one clear fault."""
 
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -89,6 +90,14 @@ def test_parquet_in_pieces(tmp_path):
     run = railsim.load_measurement(path, [f"file={tmp_path / 'a.parquet'}"])
     assert np.flatnonzero(np.isnan(run["box"])).tolist() == [10]
     assert run["load"] == pytest.approx(LOAD)
+
+
+@pytest.mark.parametrize("kind", [railsim.InputError, ImportError])
+def test_what_parquet_needs_is_named(tmp_path, monkeypatch, kind):
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    (tmp_path / "a.parquet").touch()
+    with pytest.raises(kind, match=re.escape("pip install 'railsim[parquet]'")):
+        railsim.load_measurement(written(tmp_path), [f"file={tmp_path / 'a.parquet'}"])
 
 
 def test_matlab_structures_are_not_opened(tmp_path):
