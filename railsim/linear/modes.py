@@ -12,7 +12,7 @@ import numpy as np
 from railsim.arrays import Complexes
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import load_track
-from railsim.errors import argument_error, nearest
+from railsim.errors import argument_error, nearest, optional_package
 from railsim.linear.eigenmodes import (
     SEARCHED,
     SLOWEST,
@@ -197,8 +197,7 @@ class RootLocus(Plottable):
 
     def to_xarray(self) -> Any:
         """Return eigenvalues, frequencies and damping as an `xarray.Dataset`; needs xarray."""
-        import xarray
-
+        xarray = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         values = self.eigenvalues
         size = np.abs(values)
         dims = (self.key, "mode")

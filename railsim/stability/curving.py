@@ -21,7 +21,7 @@ from railsim.arrays import Floats, Integers
 from railsim.cant import curve_speed
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.loading import check_types, load_track
-from railsim.errors import Faults, ModelError
+from railsim.errors import Faults, ModelError, optional_package
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.state import ARC_LENGTH, SPEED
@@ -170,8 +170,7 @@ class Curving(Plottable):
 
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset`; needs xarray."""
-        import xarray
-
+        xarray = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         coords = {
             **{name: getattr(self, name) for name in self.DIMS},
             "wheelset": list(self.wheelsets),

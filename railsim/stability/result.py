@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from railsim.errors import optional_package
 from railsim.linear.vehicle import Contact
 from railsim.plottable import Plottable
 from railsim.stability.branches import COLUMNS, Branch, Jump, Limit, Point
@@ -163,8 +164,7 @@ class CriticalSpeed(Plottable):
 
         Branches of fewer points than the longest are filled with NaN.
         """
-        import xarray
-
+        xarray = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         most = max((len(branch.points) for branch in self.branches), default=0)
         filled = {name: np.full((len(self.branches), most), np.nan) for name in COLUMNS}
         for row, branch in enumerate(self.branches):
