@@ -1,12 +1,12 @@
 """Track of constant curvature and cant, on which a vehicle can roll steadily."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions import Settings, Track, Vehicle
+from railsim.definitions.track.layout import even_line
 from railsim.kernels.state import ARC_LENGTH
 from railsim.model.assembly import Model
 
@@ -58,10 +58,6 @@ def circle(
     rail over the right one, on 1.5 m [m]; `friction`: coefficient of friction; by default that of
     `track`; `at`: arc length at which support and friction are taken, by default its beginning [m].
     """
-    radius = 1.0 / curvature if curvature else math.inf
-    element = {"type": "CIR", "length": LENGTH, "radius": radius}
-    if not curvature:
-        element = {"type": "STR", "length": LENGTH}
     if friction is None:
         friction = tuple(track.friction_at(at).tolist())
     both = (friction, friction) if isinstance(friction, float | int) else tuple(friction)
@@ -70,8 +66,7 @@ def circle(
         places, *factors = np.transpose(track.support.variation)
         support["variation"] = [[0.0, *(float(np.interp(at, places, f)) for f in factors)]]
     return track.replace(
-        plan=[element],
-        cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
+        **even_line(LENGTH, curvature, cant),
         vertical=[],
         irregularities=[],
         gauge_widening=None,

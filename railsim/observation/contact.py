@@ -24,6 +24,7 @@ import numpy as np
 from railsim.arrays import Complexes, Floats, Integers
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
+from railsim.definitions.track.layout import even_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError
 from railsim.linear.circle import circle
@@ -75,11 +76,8 @@ def in_the_mean(
     `curve`: Curvature and cant of the run [1/m, m]; what moves about its mean is fitted.
     Raises ModelError: The vehicle does not complete the run.
     """
-    curvature, cant = curve
-    element = {"type": "CIR", "radius": 1.0 / curvature} if curvature else {"type": "STR"}
     rough = circle(track, at=linear.at).replace(
-        plan=[{**element, "length": LENGTH}],
-        cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
+        **even_line(LENGTH, *curve),
         irregularities=[{**irregularity, "type": "random", "seed": SEED}],
     )
     result = simulate(vehicle, rough, speed=tangent.speed, settings=Settings(output_rate=RATE))

@@ -10,7 +10,7 @@ import numpy as np
 from railsim.arrays import Complexes, Floats, stretches
 from railsim.definitions.excitations.recording import ORDER
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.layout import is_uniform
+from railsim.definitions.track.layout import even_line, is_uniform
 from railsim.files.access import make_folder, whole_file, write_text
 from railsim.linear.track_response import QUANTITIES
 from railsim.observation.pieces import STEP, Piece
@@ -188,9 +188,7 @@ class Irregularity(Estimated):
         """Return the track that was run over, with the recording for its irregularities."""
         changes: dict[str, Any] = {"name": f"Track under {self.vehicle}", "irregularities": []}
         if is_uniform(self.track):
-            length = float(np.ceil(self.s[-1]))
-            changes["plan"] = [{"type": "STR", "length": length}]
-            changes["cant"] = [{"type": "CST", "length": length, "cant": 0.0}]
+            changes |= even_line(float(np.ceil(self.s[-1])))
         recording = f'irregularities = [{{ type = "measured", file = "{FILES[0]}" }}]\n'
         return self.track.replace(**changes).to_toml().replace("irregularities = []\n", recording)
 

@@ -23,7 +23,7 @@ from railsim.arrays import Flags, Floats
 from railsim.definitions.measurement import Channel
 from railsim.definitions.settings import Drive, Settings
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.layout import is_uniform
+from railsim.definitions.track.layout import even_line, is_uniform
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.linear.track_response import RAILS
 from railsim.measurement.counterpart import amplified
@@ -109,8 +109,7 @@ class SimulatedRun:
         changes: dict[str, Any] = {"irregularities": [irregularity]}
         end = float(s[-1]) + 0.5 * AFTER
         if self._uniform:
-            changes["plan"] = [{"type": "STR", "length": end + AFTER}]
-            changes["cant"] = [{"type": "CST", "length": end + AFTER, "cant": 0.0}]
+            changes |= even_line(end + AFTER)
         else:
             end = min(end, self._track.length)
         with silent():

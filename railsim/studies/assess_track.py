@@ -25,7 +25,7 @@ from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.limits import Situation
 from railsim.definitions.loading import load_running_limits, load_track, load_vehicle
-from railsim.definitions.track.layout import is_uniform
+from railsim.definitions.track.layout import even_line, is_uniform
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, argument_error, input_error
@@ -254,10 +254,7 @@ def recorded(recording: str | Path) -> Track:
         Faults(embed_measured(data)).check()
         length = float(data["irregularities"][0]["rows"][-1][0])
         return load_track("straight").replace(
-            name=Path(recording).stem,
-            plan=[{"type": "STR", "length": length}],
-            cant=[{"type": "CST", "length": length, "cant": 0.0}],
-            irregularities=data["irregularities"],
+            name=Path(recording).stem, **even_line(length), irregularities=data["irregularities"]
         )
     track = load_track(recording)
     if not any(isinstance(part, Measured) for part in track.irregularities):
@@ -322,9 +319,7 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
             parts.append(part)
     changes: dict[str, Any] = {"irregularities": [p.model_dump(exclude_none=True) for p in parts]}
     if uniform:
-        length = min(high, track.length) - moved
-        changes["plan"] = [{"type": "STR", "length": length}]
-        changes["cant"] = [{"type": "CST", "length": length, "cant": 0.0}]
+        changes |= even_line(min(high, track.length) - moved)
     return track.replace(**changes), moved
 
 

@@ -64,6 +64,13 @@ def is_uniform(track: "Track") -> bool:
     return is_straight_and_level(track) and not any(tables)
 
 
+def even_line(length: float, curvature: float = 0.0, cant: float = 0.0) -> dict[str, Any]:
+    """Return plan and cant of a line that is the same everywhere [m, 1/m, m]."""
+    curve = {"type": "CIR", "radius": 1.0 / curvature} if curvature else {"type": "STR"}
+    level = {"type": "CST", "length": length, "cant": cant}
+    return {"plan": [{**curve, "length": length}], "cant": [level]}
+
+
 def track_faults(track: "Track") -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
     _, faults = _sections("plan", track.plan)
