@@ -131,8 +131,8 @@ def _study_figure(
         varied, key=lambda n: (n in seeds, not varied[n].numeric, -len(varied[n].different))
     )
     x = against or next((name for name in order if name != family), None)
+    ordered = x and (against or family or (varied[x].numeric and x not in seeds))
     family = family or next((name for name in order if name != x), None)
-    ordered = x and varied[x].numeric and (against or x not in seeds)
     kind = kind or ("curves" if ordered else "ranking")
     early = [record["status"] != "complete" for record in records]
     if kind == "ranking" or x is None:

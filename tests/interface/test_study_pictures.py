@@ -63,6 +63,21 @@ def test_seeds_are_no_axis(speeds, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
+    ("chosen", "across"), [(["vehicle", None], "vehicle"), ([None, "vehicle"], "seed")]
+)
+def test_words_and_seeds_are_axes_if_asked_for(chosen, across, tmp_path, monkeypatch):
+    """Though they have no order: no ranking of the runs takes the place of what was asked for."""
+    monkeypatch.setattr(
+        railsim.studies.run, "simulate", lambda *_, speed, sink, **how: feed(sink, speed=speed)
+    )
+    rails = 'track.irregularities=[{type="random", spectrum="erri_b176_low"}]'
+    railsim.study([COACH, "coach_flexicoil"], CURVE, 10.0, out=tmp_path, workers=1,
+                  assignments=[rails], grid={"track.irregularities.0.seed": [1, 2]})  # fmt: skip
+    figure = _study_figure(str(tmp_path), ("Q_peak",), *chosen, None)
+    assert {axes.get_xlabel() for axes in figure.axes} == {across}
+
+
+@pytest.mark.parametrize(
     ("chosen", "words"),
     [
         (["Y_over_Q_ab"], "did you mean 'Y_over_Q_abs'"),
