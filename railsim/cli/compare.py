@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 FILES = ("compare.csv", "compare.json", "compare.png", "differences.png")
 MOST = 8  # results in one picture
+SEEDS = (
+    "the irregularities are random: peaks differ from seed to seed too, often by more than those "
+    "of vehicles; runs with several values of track.irregularities.0.seed show by how much"
+)
 
 Group = dict[str, "Result"]
 
@@ -46,6 +50,10 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     cli.goes_with("--out", output.folder, "over")
     groups = _groups(files, output)
     output.reserve(*(_named(name, title) for title in groups for name in FILES))
+    tracks = [result.track() for results in groups.values() for result in results.values()]
+    random = any(one.type == "random" for track in tracks for one in track.irregularities)
+    if random and not output.quiet:
+        output.remark(SEEDS)
     records, parts = [], list[Any]()
     for title, results in groups.items():
         rows = compare(results)

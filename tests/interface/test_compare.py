@@ -108,6 +108,16 @@ def test_remarks_are_printed_unless_quiet(files, capsys, monkeypatch):
     assert "remark" not in capsys.readouterr().out
 
 
+def test_peaks_on_random_irregularities_are_said_to_be_of_one_seed(tmp_path, capsys):
+    random = '[[irregularities]]\ntype = "random"\nspectrum = "erri_b176_low"\n'
+    base = example_result(duration=2.0)
+    uneven = changed(base, {"track_toml": base.attributes["track_toml"] + random})
+    pair = [str(r.to_hdf5(tmp_path / f"{k}.h5")) for k, r in enumerate((base, uneven))]
+    for quiet in ([], ["--quiet"]):
+        assert main(["compare", *pair, *quiet]) == 0
+        assert ("from seed to seed" in capsys.readouterr().err) == (not quiet)
+
+
 def test_a_result_that_ended_early_is_said_to_have(files, tmp_path, capsys):
     short = example_result(duration=17.0, status="stopped").to_hdf5(tmp_path / "short.h5")
     assert main(["compare", files[0], str(short), "--quiet"]) == 0
