@@ -189,6 +189,15 @@ def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
     assert ratio == pytest.approx(bounce(2.4e6) / bounce(0.37e6), rel=0.05)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
+def test_a_z_link_steers_in_neither_curve():
+    """Its lever turns: forces of a left curve are those of the right one, mirrored; by the rods
+    fixed to the car instead they differed by 5 kN."""
+    coach, curve = load_vehicle("coach_25t"), {"cant": 0.1, "cant_deficiency": [0.08]}
+    right, left = (railsim.curving(coach, radius=[R], **curve).Y[0, 0, 0] for R in (300.0, -300.0))
+    np.testing.assert_allclose(left, -right[:, ::-1], atol=10.0)
+
+
 # runs ---------------------------------------------------------------------------------------------
 
 
