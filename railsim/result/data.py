@@ -132,9 +132,11 @@ class Result:
         """Vehicle, track and speed, as far as they are known."""
         names = []
         for key in ("vehicle_toml", "track_toml"):
-            found = re.search(r"^name = (.*)$", str(self._attributes.get(key, "")), re.MULTILINE)
-            if found:
-                names.append(printable(found[1].strip("\"'")))
+            text, keys = str(self._attributes.get(key, "")), ("name", "load")
+            found = [re.search(f"^{word} = (.*)$", text, re.MULTILINE) for word in keys]
+            if found[0]:
+                words = (printable(one[1].strip("\"'")) for one in found if one)
+                names.append(", load case ".join(words))
         words = f" at {self.speed_words}" if "speed" in self._attributes else ""
         return f"{' on '.join(names)}{words}".strip()
 

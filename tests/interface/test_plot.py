@@ -77,6 +77,19 @@ def test_a_limit_is_within_its_axes_where_the_values_are_rounding_errors():
         assert low < -60.0 < 0.0 < high
 
 
+def test_titles_name_the_load_case():
+    """A laden run, called by the vehicle's name alone, was taken for one as the file has it."""
+    run = example_result()
+    loaded = run.attributes["vehicle_toml"].replace("\nsource =", '\nload = "laden"\nsource =', 1)
+    facts = {**run.attributes, "vehicle_toml": loaded}
+    laden = Result({n: run[n] for n in run}, run.quantities, run.coordinates, facts)
+    name = f"{run.vehicle().name}, load case laden"
+    assert histories(laden).get_suptitle().startswith(name)
+    assert laden.title.startswith(name)
+    assert overlay({"a": laden, "b": laden}).get_suptitle().startswith(name)
+    assert name.partition(", load")[0] not in overlay({"a": laden, "b": run}).get_suptitle()
+
+
 @pytest.mark.parametrize("mode", ["constant", "table"])
 def test_titles_call_a_speed_that_varies_that_at_the_start(mode):
     """Of pictures, animations and the result itself."""

@@ -67,6 +67,11 @@ class Vehicle(FileDefinition, Plottable):
         """Mass of all bodies in the load case [kg]."""
         return flatten(self).mass
 
+    @property
+    def called(self) -> str:
+        """Name, and the load case where one is chosen."""
+        return f"{self.name}, load case {self.load}" if self.load else self.name
+
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:
         """Put the sections of wheels that are not round and the sources of laws into the tables."""
