@@ -5,6 +5,7 @@ lateral displacement and yaw, with the curve shaded and the limits of EN 14363 w
 """
 
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,8 +45,8 @@ def histories(
     rows = panels(result, tuple(selections or _default(result)))
     if by == "wheelset":
         cells = [_by_wheelset(result, panel) for panel in rows]
-        columns = max(len(row) for row in cells)
-        grid = [row + [None] * (columns - len(row)) for row in cells]
+        drawn = [column for column in zip_longest(*cells) if any(column)]
+        grid = [list(row) for row in zip(*drawn, strict=True)]
     else:
         columns = 1 if len(rows) < 3 else 2
         grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
@@ -102,6 +103,7 @@ def _figure(
                 continue
             _draw(axes[i, j], result, panel, horizontal, by, window)
             style.shade(axes[i, j], shown, named=i == 0)
+            axes[i, j].tick_params(labelleft=by == "wheel" or not any(row[:j]))
             if not (i + 1 < rows and grid[i + 1][j] is not None):
                 axes[i, j].set_xlabel(result.quantities[over].label)
                 axes[i, j].tick_params(labelbottom=True)

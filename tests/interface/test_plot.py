@@ -77,6 +77,14 @@ def test_a_limit_is_within_its_axes_where_the_values_are_rounding_errors():
         assert low < -60.0 < 0.0 < high
 
 
+def test_wheelsets_that_were_not_chosen_leave_no_gap(result):
+    """A picture of one wheelset was as wide as one of four."""
+    width = [histories(result, (name,), by="wheelset").get_figwidth() for name in ("Q:1", "Q")]
+    assert width[0] < 0.5 * width[1]
+    for axes in histories(result, ("Q:1", "Y:2"), by="wheelset").axes:  # each alone in its row
+        assert axes.yaxis.get_tick_params()["labelleft"]
+
+
 def test_titles_name_the_load_case():
     """A laden run, called by the vehicle's name alone, was taken for one as the file has it."""
     run = example_result()
