@@ -10,6 +10,7 @@ from typing import Any
 from railsim.definitions.study.analyses import unit_of_number
 from railsim.notation import DECIMALS, QUANTITIES, Quantity
 from railsim.text import printable
+from railsim.units import number_with_unit
 
 Record = Mapping[str, Any]
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
@@ -24,8 +25,8 @@ def parameters(
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters that differ between runs, by name: ``words``, ``unit``, ``values``.
 
-    Numbers are numbers; the words are the end of the name that tells it from all others. `units`:
-    By name, as of `railsim.report.inputs.units_of`.
+    Numbers are numbers, those with a unit in SI; the words are the end of the name that tells it
+    from all others. `units`: By name, as of `railsim.report.inputs.units_of`.
 
     >>> runs = [{"labels": {"vehicle": "a", "speed": 20.0, "track.friction": f}} for f in "12"]
     >>> parameters(runs)
@@ -38,17 +39,15 @@ def parameters(
         if len(set(map(str, values))) > 1:
             unit = "m/s" if name == "speed" else (units or {}).get(name, "")
             found[name] = {
-                "words": _short(name, names),
-                # a value such as 60km/h has its own
-                "unit": "" if str(values[0])[-1:].isalpha() else unit,
-                "values": _numbers(values),
-            }
+                "words": _short(name, names), "unit": unit, "values": _numbers(values),
+            }  # fmt: skip
     return found
 
 
 def _numbers(values: Sequence[Any]) -> list[Any]:
     try:
-        return [float(value) for value in values]
+        in_si = [number_with_unit(str(value)) for value in values]  # None without a unit
+        return [float(v) if si is None else si for v, si in zip(values, in_si, strict=True)]
     except (TypeError, ValueError):
         return [printable(str(value)) for value in values]
 

@@ -530,7 +530,10 @@ def test_parameters_have_the_units_that_the_manual_says():
     assert '"unit":"kg"' in found
     assert "mass 40000 kg" in found
     own = [{"labels": {"track.speed": f"{speed}km/h"}} for speed in (60, 80)]
-    assert parameters(own, {"track.speed": "m/s"})["track.speed"]["unit"] == ""
+    found = parameters(own, {"track.speed": "m/s"})["track.speed"]
+    assert (found["unit"], found["values"]) == ("m/s", pytest.approx([60.0 / 3.6, 80.0 / 3.6]))
+    own = [{"labels": {"track.rounding": text}} for text in ("900 mm", "10m", "2.0")]
+    assert parameters(own)["track.rounding"]["values"] == [0.9, 10.0, 2.0]  # in order, not as words
 
 
 def test_spread_has_the_values_of_every_run():
