@@ -147,6 +147,10 @@ class InputError(RailsimError):
         self.faults = tuple(found)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
+    def __reduce__(self) -> tuple[type, tuple[tuple[Fault, ...]]]:
+        """As another process gets it: made of its faults, not of its message."""
+        return type(self), (self.faults,)
+
 
 def input_error(file: str, found: str, allowed: str = "", key: str = "") -> InputError:
     """Return the error of one fault, see `Fault`."""

@@ -135,8 +135,8 @@ class Result:
             text, keys = str(self._attributes.get(key, "")), ("name", "load")
             found = [re.search(f"^{word} = (.*)$", text, re.MULTILINE) for word in keys]
             if found[0]:
-                words = (printable(one[1].strip("\"'")) for one in found if one)
-                names.append(", load case ".join(words))
+                known = (printable(one[1].strip("\"'")) for one in found if one)
+                names.append(", load case ".join(known))
         words = f" at {self.speed_words}" if "speed" in self._attributes else ""
         return f"{' on '.join(names)}{words}".strip()
 

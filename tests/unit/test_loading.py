@@ -1,5 +1,6 @@
 """Loading files: extends, remove, overrides, shipped names, and faults with their file and key."""
 
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from railsim.definitions.loading import (
     load_track_text,
     load_vehicle,
 )
-from railsim.errors import InputError
+from railsim.errors import Fault, InputError, PackageMissing
 from railsim.files import sources
 from railsim.files.overrides import split_overrides
 
@@ -454,3 +455,15 @@ def test_a_missing_element_is_told_with_the_way_to_add_it():
     assert 'elements.mine={kind="actuator|airspring|' in str(caught.value)
     with pytest.raises(InputError, match=r"did you mean 'carbody'[?]$"):
         load_vehicle("coach_manchester", ["bodies.carbdy.mass=3"])
+
+
+def test_errors_come_whole_from_another_process():
+    """Exceptions are sent by their arguments: the message was taken for faults of one letter."""
+    for error in (
+        InputError(Fault("a.toml", f"key{k}", "-1", "above 0") for k in range(300)),
+        PackageMissing([Fault("plot", "", "needs the package 'pandas'")]),
+    ):
+        sent = pickle.loads(pickle.dumps(error))
+        assert type(sent) is type(error)
+        assert sent.faults == error.faults
+        assert str(sent) == str(error)
