@@ -461,7 +461,7 @@ def test_errors_come_whole_from_another_process():
     """Exceptions are sent by their arguments: the message was taken for faults of one letter."""
     for error in (
         InputError(Fault("a.toml", f"key{k}", "-1", "above 0") for k in range(300)),
-        PackageMissing([Fault("plot", "", "needs the package 'pandas'")]),
+        PackageMissing([Fault("plot", "", "needs the package 'pandas'", "install it")]),
     ):
         sent = pickle.loads(pickle.dumps(error))
         assert type(sent) is type(error)
