@@ -293,7 +293,7 @@ class Identified:
             return "\n".join([*head, vehicle.to_toml()])
         known = Path(base)
         if known.suffix == ".toml":
-            base = os.path.relpath(known.resolve(), path.resolve().parent)
+            base = Path(os.path.relpath(known.resolve(), path.resolve().parent)).as_posix()
         lines = [*head, f"extends = {tomli_w.dumps({'x': str(base)})[4:].strip()}", ""]
         lines.insert(len(head), 'format = "railsim-vehicle/1"')
         tables: dict[str, list[str]] = {}

@@ -331,7 +331,9 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     head = {
         "format": base.data["format"],
         "name": f"{base.data.get('name', vehicle)}, optimised",
-        "extends": os.path.relpath(vehicle, folder) if is_file(vehicle) else str(vehicle),
+        "extends": Path(os.path.relpath(vehicle, folder)).as_posix()
+        if is_file(vehicle)
+        else str(vehicle),
     }
     return str(tomli_w.dumps({**head, **_difference(base.data, changed)}))
 
