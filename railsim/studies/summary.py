@@ -30,6 +30,7 @@ from railsim.studies.records import Record, compact_json, parsed
 from railsim.studies.spec import StudySpec, checked
 from railsim.studies.user_function import user_quantities
 from railsim.text import spreadsheet_cell
+from railsim.units import number_with_unit
 
 Row = dict[str, Any]  # cells by the names of their columns, without units
 INDEX_BYTES = 500_000_000
@@ -240,8 +241,10 @@ def _columns_of_peak(quantity: str, kind: str) -> tuple[str, dict[str, str]]:
 
 
 def summary_row(record: Record) -> dict[str, Any]:
-    """Return the cells of the line of a run by the names of their columns, without units."""
-    row = {"name": record["name"], **record["labels"], "file": record["file"]}
+    """Return the cells of the line of a run by the names of their columns, without units, in SI."""
+    given = ((n, value, number_with_unit(str(value))) for n, value in record["labels"].items())
+    labels = {n: value if si is None or "." not in n else si for n, value, si in given}
+    row = {"name": record["name"], **labels, "file": record["file"]}
     row |= {name: record.get(name, "") for name in FACTS}
     row["remarks"] = " ".join(record.get("remarks", ()))
     for peak in record.get("peaks", ()):

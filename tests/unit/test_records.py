@@ -94,3 +94,10 @@ def test_summary_has_columns_of_each_curve_in_their_order():
     assert [unit_of(name) for name in ("Q_median3", "Q_peak_20hz", "Q_peak_distance")] == [
         "N", "N", "m",
     ]  # fmt: skip
+
+
+def test_parameters_with_a_unit_are_numbers_in_si_in_the_summary():
+    """As all of its columns; names of vehicles and tracks stay, whatever they look like."""
+    labels = {"vehicle": "5m", "track.rounding": "900 mm", "track.rail": "60E1", "speed": 20.0}
+    row = summary_row({"name": "a", "labels": labels, "file": None})
+    assert {name: row[name] for name in labels} == {**labels, "track.rounding": 0.9}
