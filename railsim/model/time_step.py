@@ -72,8 +72,9 @@ GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
 NEUTRAL = 1e-3
 _NEVER = 1 << 40
 # of a map before the norms of its powers are looked at, of these, and the least norm of a square
-# that is no round-off; squarings from which on a lower bound need not be ln 2 to be taken
-_BALANCING, _SQUARINGS, _LEFT, _SURE = 3, 16, 1e-20, 8
+# that is no round-off; squarings from which on a lower bound need not be ln 2 to be taken, and the
+# least mean of a diagonal over its norm that is none
+_BALANCING, _SQUARINGS, _LEFT, _SURE, _SEEN = 3, 16, 1e-20, 8, 1e-6
 
 
 def empty_recorder(
@@ -367,7 +368,7 @@ def _bound(matrix: Floats, limit: float) -> float:
             return limit
         power = (power / norm).astype(np.float32)
         trace = abs(float(np.trace(power))) / len(power)
-        least = (logarithm + math.log(trace)) / 2.0**doubled if trace > _LEFT else 0.0
+        least = (logarithm + math.log(trace)) / 2.0**doubled if trace > _SEEN else 0.0
         if least > (max(2.0 * limit, SLIGHT) if doubled >= _SURE else math.log(2.0)):
             return least
         power = power @ power

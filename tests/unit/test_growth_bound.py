@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from railsim.model.time_step import _bound
+from railsim.model.time_step import SLIGHT, _bound
 
 
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
     n=st.integers(1, 30),
-    radius=st.sampled_from([0.999, 0.9999, 1.0, 1.0003, 1.001, 1.01, 1.9, 2.1, 30.0]),
+    radius=st.sampled_from([0.999, 0.9999, 1.0, 1.0003, 1.001, 1.01, 1.02, 1.1, 2.1, 30.0]),
     spread=st.sampled_from([0.0, 3.0]),
     share=st.sampled_from([0.1, 0.5, 1.0]),
 )
@@ -28,7 +28,7 @@ def test_bounds_hold(seed, n, radius, spread, share):
         if bound == limit:
             assert largest < np.exp(limit)
         elif bound:
-            assert 2.0 < np.exp(bound) < 1.001 * largest
+            assert SLIGHT < bound < np.log(largest) + 1e-6
 
 
 @pytest.mark.parametrize("rate", [-1.0, 0.0, 0.1])
@@ -50,4 +50,4 @@ def test_growth_beyond_any_use_is_found_without_eigenvalues():
     """A wheel on a contact that is too stiff for its step: two modes near -3, others decay."""
     turned, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(32, 32)))
     matrix = turned @ np.diag([-3.0, -3.1, *np.linspace(0.1, 0.99, 30)]) @ turned.T
-    assert _bound(matrix, 7e-4) == pytest.approx(np.log(3.1), rel=0.01)
+    assert np.log(2.0) < _bound(matrix, 7e-4) < np.log(3.1) + 1e-6
