@@ -10,6 +10,10 @@ from railsim.table import Amount, Column, Table
 ROUNDING = 1e-5
 """Share of a limit by which rounding may miss it: dimensions have six or seven digits."""
 
+NEAR_BOUND = 0.02
+"""Share of a range, or of a limit, within which an optimum counts as at it: evolving designs end up
+to 1.9 % from a bound that holds them, after 80 evaluations."""
+
 SHOWN = {"m": "mm", "rad": "deg", "Pa": "MPa"}
 """Unit in which a design tool shows values of an SI unit."""
 

@@ -110,7 +110,8 @@ def result_scene(
     wheelsets = [result.bodies.index(name) for name in result.wheelsets]
     profiles = sections(result, flat)
     return Scene(
-        title=f"{vehicle.called} · {result.track().name} · {result.speed_words}{result.end_words}",
+        title=f"{vehicle.name_with_load} · {result.track().name} · "
+              f"{result.speed_words}{result.end_words}",
         bodies=drawn,
         time=result["time"][rows], distance=distance[rows], pose=poses[:, columns],
         track=_track(Alignment(result.track()), distance[rows]), Q=result["Q"][rows],
@@ -187,7 +188,7 @@ def mode_scene(
     s = np.arange(-AROUND, AROUND + 1.0, TRACK_STEP)
     flat_track = {"s": s, "x": s, "y": 0.0 * s, "heading": 0.0 * s, "cant": 0.0 * s}
     return Scene(
-        title=f"{vehicle.called} · {mode['name']} · {frequency:.3g} Hz, "
+        title=f"{vehicle.name_with_load} · {mode['name']} · {frequency:.3g} Hz, "
               f"damping {100.0 * float(mode['damping_ratio']):.3g} %",
         bodies=drawn, time=time, distance=np.zeros(len(time)),
         pose=np.real(shape[None] * np.exp(1j * phase)[:, None, None]),

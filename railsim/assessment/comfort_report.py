@@ -17,7 +17,7 @@ from railsim.result.filters import band_passed
 
 NEAR = (0.85, 1.15)  # band around the frequency of hunting, over this frequency
 SHOCKS = {"MTVV/a_w": 1.5, "VDV/(a_w T^1/4)": 1.75}
-QUARTER, PERCEIVED = 0.25, 0.01  # of the largest axis; m/s2, below which half perceive nothing
+LEAST_SHARE, PERCEIVED = 0.25, 0.01  # of the largest axis; threshold of perception [m/s2]
 MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz of the weightings
 
 
@@ -200,7 +200,7 @@ def underestimated(points: list[PointComfort]) -> str:
         for p in points:
             most, time = (p.MTVV, 1.0) if name == "MTVV/a_w" else (p.VDV, p.duration**0.25)
             for axis, value, rms, felt in zip("xyz", most, p.iso_rms, p.MTVV, strict=True):
-                if felt >= PERCEIVED and value >= QUARTER * np.max(most):
+                if felt >= PERCEIVED and value >= LEAST_SHARE * np.max(most):
                     ratios.append((float(value / rms / time), f"along {axis} at {p.sensor}"))
         ratio, place = max(ratios, default=(0.0, ""))
         if ratio > limit:

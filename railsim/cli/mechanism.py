@@ -1,6 +1,5 @@
 """``railsim mechanism``: kinematics, forces and optimisation of planar linkages."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ import click
 
 from railsim.cli import common as cli
 from railsim.errors import changed_faults, input_error
+from railsim.files.access import relative
 
 if TYPE_CHECKING:
     from railsim.definitions.mechanism.definition import Mechanism
@@ -91,7 +91,7 @@ def command(
             from railsim.mechanisms.optimum import optimised_text
 
             own = Path(files[0])
-            base = Path(os.path.relpath(own, output.out)).as_posix() if own.is_file() else files[0]
+            base = relative(own, output.out) if own.is_file() else files[0]
             content[OPTIMISED] = optimised_text(base, optimum, assignments, case).encode()
         output.write_all(content)
     output.answer(

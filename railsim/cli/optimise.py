@@ -55,7 +55,7 @@ def command(study: str, output: cli.Output, **how: Any) -> None:
 
 
 def _lines(found: "Optimisation") -> "list[str | Table]":
-    from railsim.studies.optimise import NEAR_BOUND
+    from railsim.design_checks import NEAR_BOUND
     from railsim.table import Table
 
     if found.chosen is None:

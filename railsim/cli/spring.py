@@ -1,7 +1,6 @@
 """``railsim spring``: dimension and verify a trailing-arm primary suspension."""
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -12,7 +11,7 @@ import click
 from railsim.cli import common as cli
 from railsim.cli.terminal import echo
 from railsim.errors import RailsimError, input_error, nearest
-from railsim.files.access import TABLES, is_file, write_text
+from railsim.files.access import TABLES, is_file, relative, write_text
 from railsim.files.key_paths import key_path
 from railsim.files.sources import find_file, read_source
 
@@ -255,7 +254,7 @@ def _base(
             "beside this one unless vehicle.remove names its parts."
         )
     if is_file(extends):
-        extends = Path(os.path.relpath(base, out.parent if out else "")).as_posix()
+        extends = relative(base, out.parent if out else "")
     return extends, removed, beside
 
 

@@ -163,6 +163,11 @@ def is_file(path: str | Path) -> bool:
         return False
 
 
+def relative(path: str | Path, folder: str | Path) -> str:
+    """Return a path as seen from a folder, with forward slashes, which every system reads."""
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
 def read_bytes(path: str | Path, limit: int) -> bytes:
     """Read a regular file of at most `limit` bytes; a link may lead to it.
 

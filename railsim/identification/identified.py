@@ -1,7 +1,6 @@
 """What an identification has found: values, how well they are known, and the residuals."""
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,7 +13,7 @@ import tomli_w
 from railsim.arrays import Floats
 from railsim.definitions.base import FrozenDict
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.files.access import check_file, whole_file
+from railsim.files.access import check_file, relative, whole_file
 from railsim.identification.parameters import TRACK, Parameter, blended, present, scaled
 from railsim.identification.residuals import banded
 from railsim.profiles import save_profile
@@ -293,7 +292,7 @@ class Identified:
             return "\n".join([*head, vehicle.to_toml()])
         known = Path(base)
         if known.suffix == ".toml":
-            base = Path(os.path.relpath(known.resolve(), path.resolve().parent)).as_posix()
+            base = relative(known.resolve(), path.resolve().parent)
         lines = [*head, f"extends = {tomli_w.dumps({'x': str(base)})[4:].strip()}", ""]
         lines.insert(len(head), 'format = "railsim-vehicle/1"')
         tables: dict[str, list[str]] = {}

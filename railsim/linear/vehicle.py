@@ -135,7 +135,7 @@ class LinearVehicle:
         faults.require(abs(cant) <= 0.5, "cant", f"found {cant:g} m", "0.5 m at most")
         faults.check()
         check_types([vehicle], track)
-        self.held, self.name = held, vehicle.called
+        self.held, self.name = held, vehicle.name_with_load
         self.curvature, self.cant = 1.0 / radius if math.isfinite(radius) else 0.0, cant
         known = dict(profiles or {})
         if self.contact.conicity is not None:

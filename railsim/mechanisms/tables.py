@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from railsim.definitions.mechanism.faults import bounds_of, bounds_remarks
-from railsim.design_checks import shown, shown_unit
+from railsim.design_checks import NEAR_BOUND, shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.contact import Contact, moved
@@ -23,8 +23,6 @@ from railsim.table import Amount, Column, Table
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
 
-NEAR_BOUND = 0.02
-"""Share of a parameter's range within which a bound is near the optimum, active or not."""
 COMPARISON = [
     Column("name", "mechanism"),
     Column("stroke", "", "mm", ".4f"),

@@ -115,7 +115,7 @@ def _figure(
 
 def title(result: Result) -> str:
     """Return what a figure of a result is called: vehicle, track, speed, and an early end."""
-    names = unformatted(result.vehicle().called), unformatted(result.track().name)
+    names = unformatted(result.vehicle().name_with_load), unformatted(result.track().name)
     return f"{names[0]}\n{names[1]} · {result.speed_words}{result.end_words}"
 
 

@@ -129,7 +129,7 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
 
 def _shared(results: Sequence[Result]) -> str:
     """What of vehicle, track and speed is the same for all results."""
-    told = [(r.vehicle().called, r.track().name, r.speed_words) for r in results]
+    told = [(r.vehicle().name_with_load, r.track().name, r.speed_words) for r in results]
     same = [names[0] for names in zip(*told, strict=True) if len(set(names)) == 1]
     return " · ".join(map(unformatted, same))
 

@@ -148,15 +148,18 @@ def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part
 
 def of_wear(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about the wear of wheels or rails, by its record."""
-    what, of = ("rails", RAILS) if "track" in record else ("wheels", WHEELS)
-    worn, runs, *_ = record.values()
-    rows = {side: record[side] for side in (RAILS.sides if of is RAILS else ("rows",))}
+    if "track" in record:
+        what, of, worn, runs, sides = "rails", RAILS, "track", "traffic", RAILS.sides
+    else:
+        what, of, worn, runs, sides = "wheels", WHEELS, "vehicle", "routes", ("rows",)
+    rows = {side: record[side] for side in sides}
     last, ended = next(iter(rows.values()))[-1]["distance"] / of.scale, record["ended"]
     text = f"{'Ended after' if ended else 'Computed to'} {last:g} {of.unit}"
     text += f": {ended}" if ended else "."
     tables, method = wear_tables(of, rows), f"Law of wear {record['law']}, {of.note}."
-    sections = [Section("Wear", [shares_of(runs)], tables), Section("Pictures", drawings=figures)]
-    title = f"{worn}: wear of the {what}"
+    words = [shares_of(record[runs])]
+    sections = [Section("Wear", words, tables), Section("Pictures", drawings=figures)]
+    title = f"{record[worn]}: wear of the {what}"
     return Part(title, text, not ended, record["remarks"], sections, [method])
 
 

@@ -38,9 +38,8 @@ def parameters(
         values = [record["labels"].get(name, "") for record in records]
         if len(set(map(str, values))) > 1:
             unit = "m/s" if name == "speed" else (units or {}).get(name, "")
-            found[name] = {
-                "words": _short(name, names), "unit": unit, "values": _numbers(values),
-            }  # fmt: skip
+            words = _short(name, names)
+            found[name] = {"words": words, "unit": unit, "values": _numbers(values)}
     return found
 
 

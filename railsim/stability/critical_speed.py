@@ -118,7 +118,7 @@ def critical_speed(
         return LinearVehicle(vehicle, track, contact=contact, settings=settings, profiles=profiles)
 
     smooth = prepared(law, contact)
-    found = CriticalSpeed(contact, vehicle.called, conditions(track, settings), low, high)
+    found = CriticalSpeed(contact, vehicle.name_with_load, conditions(track, settings), low, high)
     found.remarks += smooth.remarks
     found.conicity_over_amplitude = _conicity(smooth)
     found.linear, stuck = _linear(found, smooth)

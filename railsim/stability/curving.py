@@ -308,7 +308,7 @@ class _Search:
         settings: Settings,
         profiles: Mapping[str, Profile] | None,
     ) -> None:
-        self.track, self.cant, self.vehicle = track, cant, vehicle.called
+        self.track, self.cant, self.vehicle = track, cant, vehicle.name_with_load
         assembled = assemble(vehicle, circle(track), settings.in_steady_rolling(), profiles)
         check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
         balance = equilibrium(assembled, WALKING_PACE)

@@ -6,7 +6,6 @@ independent seeds of its track, scaled to the target quality.
 """
 
 import math
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -32,7 +31,7 @@ from railsim.definitions.track.elements import Circle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
-from railsim.files.access import check_folder
+from railsim.files.access import check_folder, relative
 from railsim.processes import available_cores
 from railsim.profiles import load_profile
 from railsim.result import Result, open_result
@@ -94,7 +93,7 @@ def campaign(
                 check_outputs(case.vehicle, case.settings, case.speed, plan.standard)
         Faults(dict.fromkeys(faults)).check()
     spec = StudySpec(
-        folder=os.path.relpath(Path.cwd(), folder),
+        folder=relative(Path.cwd(), folder),
         name=plan.name,
         purpose=plan.purpose,
         scenario=str(scenario),

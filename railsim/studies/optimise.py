@@ -6,7 +6,6 @@ the journal.  Begin reading in `optimise`; `search.py` proposes designs.
 """
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -20,9 +19,10 @@ from railsim.definitions import Vehicle
 from railsim.definitions.loading import load_study
 from railsim.definitions.study.definition import Study
 from railsim.definitions.study.design import Optimise
+from railsim.design_checks import NEAR_BOUND
 from railsim.errors import argument_error, input_error
 from railsim.files import sources
-from railsim.files.access import check_folder, is_file, make_folder, read_text, write_text
+from railsim.files.access import check_folder, is_file, make_folder, read_text, relative, write_text
 from railsim.files.overrides import apply_overrides, split_overrides
 from railsim.processes import available_cores
 from railsim.studies.carry_out import FILES
@@ -46,8 +46,6 @@ from railsim.studies.summary import unit_of
 from railsim.table import Column, Table
 from railsim.text import plain
 
-NEAR_BOUND = 0.02  # share of a range or a limit within which it counts as reached: evolving designs
-# end up to 1.9 % from a bound that holds them, after 80 evaluations
 INPUT_BYTES = 1_000_000
 BESIDE = ("optimise.json", "designs.csv", "front.png")
 
@@ -331,9 +329,7 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     head = {
         "format": base.data["format"],
         "name": f"{base.data.get('name', vehicle)}, optimised",
-        "extends": Path(os.path.relpath(vehicle, folder)).as_posix()
-        if is_file(vehicle)
-        else str(vehicle),
+        "extends": relative(vehicle, folder) if is_file(vehicle) else str(vehicle),
     }
     return str(tomli_w.dumps({**head, **_difference(base.data, changed)}))
 

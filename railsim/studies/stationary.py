@@ -209,7 +209,7 @@ def stationary(
         nominal = f"{1e3 * limits.gauge.value:g} mm"
         reasons.append(f"limits are those of {nominal}, the gauge is {1e3 * track.gauge:g} mm")
     judged = tuple(values), tuple(reasons), loops, remarks
-    return Stationary(vehicle.called, limits.edition, held, *judged)
+    return Stationary(vehicle.name_with_load, limits.edition, held, *judged)
 
 
 def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floats]:

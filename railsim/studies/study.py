@@ -13,7 +13,7 @@ from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.study.analyses import Analysis, needs_run
 from railsim.definitions.study.definition import Sample
 from railsim.errors import argument_error
-from railsim.files.access import check_folder, is_file, make_folder, write_text
+from railsim.files.access import check_folder, is_file, make_folder, relative, write_text
 from railsim.processes import available_cores
 from railsim.result import Result
 from railsim.studies.carry_out import carry_out, comparison_picture
@@ -168,7 +168,7 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
     if spec.quantities and not needs_run(spec.analyses):
         raise argument_error("quantities", "no analysis computes a run", 'add one of kind = "run"')
     plan = Plan(spec, execution.workers or available_cores())
-    spec = spec.changed(railsim_version=__version__, folder=os.path.relpath(Path.cwd(), folder))
+    spec = spec.changed(railsim_version=__version__, folder=relative(Path.cwd(), folder))
     outcome = carry_out(plan.points, plan.cases, spec, folder, execution)
     if execution.plots:
         _draw(outcome)

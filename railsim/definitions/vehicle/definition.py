@@ -68,7 +68,7 @@ class Vehicle(FileDefinition, Plottable):
         return flatten(self).mass
 
     @property
-    def called(self) -> str:
+    def name_with_load(self) -> str:
         """Name, and the load case where one is chosen."""
         return f"{self.name}, load case {self.load}" if self.load else self.name
 
