@@ -4,7 +4,7 @@ The first result is what the others are compared with.  Differences are those of
 (|b| - |a|) / |a|, so that a mirrored run differs by nothing.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
@@ -18,6 +18,7 @@ from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
 from railsim.result.tables import PLACE
 from railsim.table import Amount, Column, Table
+from railsim.text import in_words, printable, shortened
 
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
@@ -75,6 +76,58 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
         for (where, _), found in rows.items()
         if first in found
     )
+
+
+def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
+    """Return what results differ in beside their vehicles: the value of each in words, by key.
+
+    `speed` [m/s], `track`, its name, and the keys of the track file and of the settings, which
+    begin with `track.` and `settings.`; not what a run wrote.
+    """
+    each = list(results.values())
+    tracks = [result.track() for result in each]
+    on_track = differing(tracks)
+    return {
+        key: words
+        for key, words in {
+            "speed": [f"{result.speed:.6g}" for result in each],
+            "track": [track.name if on_track else "" for track in tracks],
+            **{f"track.{key}": words for key, words in on_track.items()},
+            **{
+                f"settings.{key}": words
+                for key, words in differing([result.settings() for result in each]).items()
+                if not key.startswith("outputs.")
+            },
+        }.items()
+        if "." in key or len(set(words)) > 1
+    }
+
+
+def condition_table(found: Mapping[str, Sequence[str]], labels: Iterable[str]) -> Table:
+    """Return the conditions that differ, those of each result in a column."""
+    rows = [["speed (m/s)" if key == "speed" else key, *words] for key, words in found.items()]
+    return Table(["conditions that differ", *map(printable, labels)], rows)
+
+
+def differing(definitions: Sequence[Any]) -> dict[str, list[str]]:
+    """Return the keys in which definitions differ, each with all its values in words."""
+    flat = [dict(flat_keys(one.model_dump())) for one in definitions]
+    return {
+        key: [shortened(in_words(values.get(key, "—"))) for values in flat]
+        for key in dict.fromkeys(key for values in flat for key in values)
+        if key not in ("name", "source") and len({str(values.get(key)) for values in flat}) > 1
+    }
+
+
+def flat_keys(node: Any, key: str = "") -> list[tuple[str, Any]]:
+    """Return the values of plain tables by their dotted keys; rows of tables are one value."""
+    if isinstance(node, dict):
+        pairs = [(f"{key}.{name}" if key else str(name), value) for name, value in node.items()]
+        return [row for name, value in pairs for row in flat_keys(value, name)]
+    if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
+        count = f"{len(node)} row{'s' * (len(node) > 1)}"
+        return [(key, f"{count}: {'; '.join(map(in_words, node))}")]
+    return [(key, node)]
 
 
 @dataclass(frozen=True)

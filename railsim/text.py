@@ -20,6 +20,21 @@ def shortened(text: str, longest: int = LONGEST_VALUE) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
+def in_words(value: Any) -> str:
+    """A value of a file in words: no brackets of Python.
+
+    >>> in_words((10, 10)), in_words(True), in_words(None), in_words({"mu": 0.1 + 0.2})
+    ('10, 10', 'yes', 'none', 'mu 0.3')
+    """
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {in_words(part)}" for key, part in value.items())
+    if isinstance(value, tuple | list):
+        return ", ".join(map(in_words, value)) or "none"
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
 def printable(text: str) -> str:
     r"""Return text without characters that steer a terminal; ends of lines stay.
 

@@ -32,7 +32,8 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     """Print peaks and mid-curve values of results side by side.
 
     The others are compared with the first result; differences are those of magnitudes, and those
-    along the track where the plan is the same.  With --out the table and pictures of the leading
+    along the track where the plan is the same.  What differs in speed, track and settings stands
+    first.  With --out the table and pictures of the leading
     wheelset's quantities are written.
 
     Of one STUDY, a folder, the runs that differ in nothing but the vehicle are compared with each
@@ -44,7 +45,14 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
       railsim compare curves
       railsim compare before after --out changes
     """
-    from railsim.compare import compare, comparison_table, comparison_tables, difference_table
+    from railsim.compare import (
+        compare,
+        comparison_table,
+        comparison_tables,
+        condition_table,
+        conditions,
+        difference_table,
+    )
     from railsim.plot.overlay import difference_figure, overlay
 
     cli.goes_with("--out", output.folder, "over")
@@ -58,10 +66,12 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
     for title, results in groups.items():
         rows = compare(results)
         differing, why = _differing(results)
+        unlike = conditions(results)
         record = {
             "results": list(results),
             "status": {label: result.status for label, result in results.items()},
             "remarks": {label: list(result.remarks) for label, result in results.items()},
+            "conditions": {key: dict(zip(results, unlike[key], strict=True)) for key in unlike},
             "rows": [row.record() for row in rows],
             "along_the_track": [one.record() for one in differing],
         }
@@ -75,6 +85,8 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
             output.write(differences, lambda d=differing, of=first: difference_figure(d, of))
         if title:
             parts += [*[""] * bool(parts), title]
+        if unlike:
+            parts += [condition_table(unlike, results), ""]
         for one in comparison_tables(rows, results):
             parts += [one, ""]
         for label, result in results.items():

@@ -86,21 +86,6 @@ def day(created: str) -> str:
     return f"{when.day} {month_name[when.month]} {when.year}, {when:%H:%M}"
 
 
-def in_words(value: Any) -> str:
-    """A value of a file in words: no brackets of Python.
-
-    >>> in_words((10, 10)), in_words(True), in_words(None), in_words({"mu": 0.1 + 0.2})
-    ('10, 10', 'yes', 'none', 'mu 0.3')
-    """
-    if isinstance(value, dict):
-        return ", ".join(f"{key} {in_words(part)}" for key, part in value.items())
-    if isinstance(value, tuple | list):
-        return ", ".join(map(in_words, value)) or "none"
-    if value is None or isinstance(value, bool):
-        return {None: "none", True: "yes", False: "no"}[value]
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 DPI = 130
 IMAGE = Markup('<img alt="{}" width="{}" src="data:image/png;base64,{}">')
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from railsim.compare import differing, flat_keys
 from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import track_remarks
@@ -15,11 +16,11 @@ from railsim.description.rest import rest_frequencies
 from railsim.errors import InputError, ModelError
 from railsim.model.statics import static_loads
 from railsim.profiles import Profile
-from railsim.report.document import Drawing, Section, Table, in_words, of_values
+from railsim.report.document import Drawing, Section, Table, of_values
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.result import Result
 from railsim.simulation.assumptions import assumptions
-from railsim.text import printable, shortened
+from railsim.text import in_words, printable
 
 Record = Mapping[str, Any]
 MOST_SHOWN = 12  # values of an input of a study
@@ -174,32 +175,12 @@ def _differences(vehicles: Mapping[str, Any]) -> Table:
     )  # fmt: skip
 
 
-def differing(vehicles: Sequence[Any]) -> dict[str, list[str]]:
-    """Return the keys in which vehicles differ, each with the value of every vehicle in words."""
-    flat = [dict(_flat(vehicle.model_dump())) for vehicle in vehicles]
-    return {
-        key: [shortened(in_words(values.get(key, "—"))) for values in flat]
-        for key in dict.fromkeys(key for values in flat for key in values)
-        if key not in ("name", "source") and len({str(values.get(key)) for values in flat}) > 1
-    }
-
-
-def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
-    if isinstance(node, dict):
-        pairs = [(f"{key}.{name}" if key else str(name), value) for name, value in node.items()]
-        return [row for name, value in pairs for row in _flat(value, name)]
-    if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
-        count = f"{len(node)} row{'s' * (len(node) > 1)}"
-        return [(key, f"{count}: {'; '.join(map(in_words, node))}")]
-    return [(key, node)]
-
-
 def _settings(results: Mapping[str, Result]) -> Table:
     """Return a table of the settings of the runs, with differences from the default."""
-    usual = dict(_flat(Settings().model_dump()))
+    usual = dict(flat_keys(Settings().model_dump()))
     found: dict[str, dict[str, None]] = {}
     for result in results.values():
-        own = dict(_flat(result.settings().model_dump()))
+        own = dict(flat_keys(result.settings().model_dump()))
         own["step"] = f"{1e3 * float(result.attributes.get('step', 0.0)):.4g} ms"
         for key, value in own.items():
             found.setdefault(key, {})[in_words(value)] = None

@@ -14,10 +14,10 @@ from railsim.assessment.tables import transition_table
 from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
+from railsim.compare import differing
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError, listed
 from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, of_values
-from railsim.report.inputs import differing
 from railsim.result import Result
 from railsim.result.sensors import sensors
 from railsim.table import beside

@@ -10,7 +10,7 @@ from example_result import example_result, text
 
 import railsim
 from railsim.cli import main
-from railsim.compare import compare, differences
+from railsim.compare import compare, conditions, differences
 from railsim.result import Result
 from railsim.result.export import selected
 
@@ -89,6 +89,30 @@ def test_leading_wheelsets_are_compared_at_the_same_place():
     for one in differences({"base": base, "longer": longer}, ["sum_Y", "Y_over_Q"]):
         assert not one.values.any()
         assert one.distance[-1] == base["distance"][-1]
+
+
+def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path, capsys):
+    """Another friction on one rail, rigid rails and another law: not the vehicle's doing."""
+    track = text("tracks/curve_r250.toml") + '\n[support]\npreset = "rigid"\n'
+    other = changed(
+        example_result(speed=15.0),
+        {
+            "track_toml": track.replace("friction = 0.4", "friction = [0.4, 0.1]"),
+            "settings_json": '{"creep_law": "polach", "outputs": {"drives": true}}',
+        },
+    )
+    assert conditions({"base": example_result(), "alike": example_result(gain=2.0)}) == {}
+    assert conditions({"base": example_result(), "other": other}) == {
+        "speed": ["20", "15"],
+        "track.friction": ["0.4, 0.4", "0.4, 0.1"],
+        "track.support.preset": ["ballasted", "rigid"],
+        "settings.step": ["0.001", "none"],
+        "settings.creep_law": ["fastsim", "polach"],
+    }
+    main(["compare", files[0], str(other.to_hdf5(tmp_path / "other.h5"))])
+    head = capsys.readouterr().out.split("peaks")[0].splitlines()
+    assert head[0].split() == ["conditions", "that", "differ", "base", "other"]
+    assert head[1].split() == ["speed", "(m/s)", "20", "15"]
 
 
 def test_command_prints_value_wheel_time_and_difference(files, capsys):

@@ -24,12 +24,13 @@ import railsim
 from railsim.assessment.criteria import CRITERIA
 from railsim.cli import main
 from railsim.cli.gathered import gather
+from railsim.compare import differing, flat_keys
 from railsim.definitions import Settings
 from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
 from railsim.definitions.vehicle.laws import Signal
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
-from railsim.report.document import day, in_words
-from railsim.report.inputs import _flat, _settings, differing, inputs_of, what_was_run
+from railsim.report.document import day
+from railsim.report.inputs import _settings, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import _peaks, page
@@ -37,6 +38,7 @@ from railsim.report.spread import columns, command, parameters, worst_rows, wors
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
 from railsim.result.extremes import run_facts
+from railsim.text import in_words
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -331,7 +333,7 @@ def test_values_are_told_in_words():
 
 @pytest.mark.parametrize(("count", "words"), [(1, "1 row: 0, 1"), (2, "2 rows: 0, 1; 0, 1")])
 def test_rows_of_a_table_are_counted_in_the_differences(count, words):
-    assert _flat({"damper": [(0.0, 1.0)] * count}) == [("damper", words)]
+    assert flat_keys({"damper": [(0.0, 1.0)] * count}) == [("damper", words)]
 
 
 def test_tables_that_differ_far_behind_their_beginning_are_differences():
@@ -344,7 +346,7 @@ def test_tables_that_differ_far_behind_their_beginning_are_differences():
     ((key, words),) = differing([one, other]).items()
     assert key == "damper"
     assert words == ["13 rows: 0, 0; 0.01, 100; 0.02, 200; 0.03, 300; 0.04, 400..."] * 2
-    assert _flat(bogies) == [("placements", "1 row: name front, position 9.5, 0, 0")]
+    assert flat_keys(bogies) == [("placements", "1 row: name front, position 9.5, 0, 0")]
 
 
 def test_remarks_on_a_track_stand_beside_its_drawing_and_names_once():
