@@ -32,6 +32,7 @@ from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
+from railsim.measurement.alignment import MOST as MOST_SHIFT
 from railsim.measurement.alignment import common_shift
 from railsim.measurement.counterpart import amplified, check_channels, compared, series
 from railsim.measurement.likeness import suspicions
@@ -44,7 +45,6 @@ LIKE = 50.0  # 1/s, at which signs and clocks are compared
 START = 3.0  # s after the start of a run that are not compared
 UNKNOWN = 0.01  # share of a section that a gap may take
 MOST = 0.9  # of a measured run: what is compared is said below it
-ALONG = 30.0  # m
 SAME_SPEED = 0.02  # share by which the speeds of one run may differ
 RIGHT = {"sum_Y": -1, "bodyy": 1}
 """Sense of what is positive outwards in right-hand curves: -1 for forces on the rails."""
@@ -405,9 +405,9 @@ def _placed(
 ) -> tuple[Measurement, list[str]]:
     """Return a run with its arc length moved to match the simulation, and what was done."""
     signals = ((run.distance, run[name], distance, x) for name, x in simulated.items())
-    best = common_shift(signals, most=ALONG)
+    best = common_shift(signals)
     if best is None:
-        found = f"no channel is like the simulated one at places within {ALONG:g} m"
+        found = f"no channel is like the simulated one at places within {MOST_SHIFT:g} m"
         return run, [f"{found}: the place on the track is not checked"]
     words = []
     if abs(best.shift) > 1.0 or abs(best.stretch) > 1e-3:

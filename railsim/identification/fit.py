@@ -40,7 +40,6 @@ PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many ti
 REWEIGHTED = 2  # times that the noise is taken from the residuals
 SHARES = 5  # of profiles that are tried before the search
 STRETCHED = 1e-3  # of the arc length, from which it is said
-ALONG = 20.0  # m, within which the place of a run is looked for
 SCALE = 5.0  # weight of a residual in units of the noise beyond which a robust loss yields
 
 
@@ -267,7 +266,7 @@ def _places(problem: Problem, x: Floats) -> Floats:
             for measured, simulated in zip(one.measured, values, strict=True)
             if (inside := np.isfinite(simulated)).any()
         ]
-        best = common_shift(signals, most=ALONG)
+        best = common_shift(signals)
         found += [0.0, 0.0] if best is None else [best.shift, best.stretch / STRETCH]
     return np.array(found)
 

@@ -27,6 +27,7 @@ CLEAR = 0.6  # correlation from which a window counts
 AGREEING = 0.5  # share of the windows of a signal that must show one shift
 TOGETHER = 1.0 / 3.0  # share of the signals that must show it
 NEAR = 3.0  # m, of the line through all shifts
+MOST = 30.0  # m, largest shift that is looked for
 AS_ALIKE = 0.05  # below the largest correlation
 WAVES = (3.0, 40.0)  # m, that an axlebox and the track's level share
 CURVATURES = ("curvature", "yaw_rate")
@@ -43,16 +44,14 @@ class Shift:
     share: float  # of all windows that count and lie near the line
 
 
-def common_shift(
-    signals: Iterable[tuple[Floats, Floats, Floats, Floats]], *, most: float
-) -> Shift | None:
+def common_shift(signals: Iterable[tuple[Floats, Floats, Floats, Floats]]) -> Shift | None:
     """Return the shift of a run with several signals: the median of those that are most alike.
 
-    `signals`: arguments of `shift_of` of each; `most`: largest shift that is looked for [m]. One
-    signal that lags, however clear it is, so does not move the others. Returns: None where no
-    signal has one shift in half of its windows, or the others do not share it.
+    `signals`: arguments of `shift_of` of each. One signal that lags, however clear it is, so does
+    not move the others. Returns: None where no signal has one shift in half of its windows, or the
+    others do not share it.
     """
-    every = [shift_of(*signal, most=most) for signal in signals]
+    every = [shift_of(*signal) for signal in signals]
     found = [one for one in every if one is not None and one.share >= AGREEING]
     best = max((one.correlation for one in found), default=0.0)
     alike = sorted((s for s in found if s.correlation >= best - AS_ALIKE), key=lambda s: s.shift)
@@ -62,7 +61,7 @@ def common_shift(
 
 
 def shift_of(
-    s: Floats, x: Floats, s_reference: Floats, reference: Floats, *, most: float = 30.0
+    s: Floats, x: Floats, s_reference: Floats, reference: Floats, *, most: float = MOST
 ) -> Shift | None:
     """Return by how much the arc lengths of one signal must be changed to match another.
 
