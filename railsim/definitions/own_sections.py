@@ -12,7 +12,7 @@ from railsim.errors import Fault
 SHORTEST = 5.0  # m
 Zone = Annotated[
     Literal["1", "2", "3", "4"],
-    BeforeValidator(str),  # a number too
+    BeforeValidator(lambda zone: str(zone) if zone in (1, 2, 3, 4) else zone),
     WithJsonSchema({"enum": ["1", "2", "3", "4", 1, 2, 3, 4]}),
 ]
 

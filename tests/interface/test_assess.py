@@ -271,7 +271,7 @@ def test_own_sections_of_other_lengths_and_places_are_told(tmp_path):
     (["{begin = 310, end = 'x'}"], "sections.0.end: "),
     (["{begin = 310, end = 380, track = 'made'}"], "sections.0.track: 'made'"),
     (["{begin = 310, end = 380, zone = '5'}"], "zone: '5'; must be '1', '2', '3' or '4'"),
-    (["{begin = 310, end = 380, zone = 0}"], "zone: '0'; must be '1', '2', '3' or '4'"),
+    (["{begin = 310, end = 380, zone = 0}"], "zone: 0; must be '1', '2', '3' or '4'"),
     (["{begin = 310, end = 380, zone = true}"], "zone: 'True'; must be '1', '2', '3' or '4'"),
     (["{begin = 10, end = 80}"], "sections.0: 10 to 80 m; within 8"),
     ([], "sections: "),
