@@ -75,6 +75,8 @@ def command(
     result = not of_study and Path(file).suffix.lower() in RESULTS
     cli.goes_with("results (.h5)", result, "over", "by", "between")
     default = folder / "study" if of_study and folder.name else folder
+    if not folder.parent.is_dir():  # then it is the file that is missing, not its place
+        default = Path(folder.name)
     path = output.file(default, PICTURES, suffix=".png")
     options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:

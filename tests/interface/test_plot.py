@@ -326,6 +326,11 @@ def test_default_picture_is_beside_the_result_and_not_overwritten(file, capsys):
     assert json.loads(capsys.readouterr().out) == {"file": str(file.with_suffix(".png"))}
 
 
+def test_a_file_in_a_folder_that_is_not_there_is_missed(capsys):
+    assert main(["plot", "nowhere/track.toml"]) == 2
+    assert "nowhere/track.toml: no file 'nowhere/track.toml'" in capsys.readouterr().err
+
+
 def test_unknown_format_is_refused(file, tmp_path, capsys):
     assert main(["plot", str(file), "--out", str(tmp_path / "run.xyz")]) == 2
     assert ".png" in capsys.readouterr().err
