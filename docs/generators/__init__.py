@@ -10,6 +10,7 @@ GENERATORS = {
     "vehicles": "pages of the library; parts: names; part `data`: from the files only (minutes)",
     "stability": "pictures of modes, critical speeds, curving; parts: names (ten minutes)",
     "tracks": "tables and picture of irregularities (a minute)",
+    "irregularity": "errors of tracks from accelerations, by twins (minutes)",
     "contact": "tables of contact geometry; parts: names (minutes)",
     "creep": "tables and pictures of creep forces; parts: names (minutes)",
     "robustness": "differences of 20 curves; parts: `grid` of 280, `rigid` the table (minutes)",

@@ -32,6 +32,9 @@ V, RATE, NOISE, BIAS = 50.0, 1000.0, 0.05, 0.02
 BOX_QUANTITY = "sensor_acceleration:axlebox_1_left:z"
 BOX, BOX_Z = "axlebox_1_left.z", "axlebox_1_left_z"
 PIECE = Piece(np.arange(100.0, 400.0, 0.25), *[np.zeros(0)] * 2, np.full(1200, V), RATE)
+SENSORS = ("axlebox", "frame", "floor")
+OTHER = {"carbody.mass": 38600.0 * 1.1, "secondary_spring.stiffness.z": 370e3 * 1.2,
+         "coil_spring.stiffness.z": 991e3 * 0.8}  # fmt: skip
 ERRI = {"type": "random", "spectrum": "erri_b176_low", "seed": 7}
 
 
@@ -68,12 +71,27 @@ def rough(length, **irregular):
     )
 
 
-def twin(vehicle, length, speed, points=("axlebox", "frame", "floor"), **irregular):
+def twin(vehicle, length, speed, points=SENSORS, **irregular):
+    """A run on straight track with irregularities."""
+    return run_over(vehicle, rough(length, **irregular), speed, points)
+
+
+def run_over(vehicle, track, speed, points=SENSORS):
     """A run, its track, and what accelerometers with noise and bias read in y and z."""
-    track = rough(length, **irregular)
     settings = Settings(output_rate=RATE, outputs={"sensors": "readings"})
     result = railsim.simulate(vehicle, track, speed=speed, settings=settings)
     return result, track, measured(result, vehicle, points, speed)
+
+
+def speeding_up(vehicle):
+    """The same from 30 to 40 m/s within 1.2 km."""
+    track = rough(1200.0)
+    s = np.linspace(0.0, 1200.0, 200)
+    table = np.column_stack([s, np.sqrt(900.0 + 700.0 * s / 1200.0)]).tolist()
+    outputs, drive = {"sensors": "readings"}, {"mode": "table", "speed_table": table}
+    settings = Settings(output_rate=RATE, outputs=outputs, drive=drive)
+    result = railsim.simulate(vehicle, track, settings=settings)
+    return result, track, measured(result, vehicle, SENSORS, 35.0)
 
 
 def measured(result, vehicle, points, speed, seed=0):
@@ -350,10 +368,7 @@ def test_a_curve_without_simulated_runs_is_said(short, coach):
 @pytest.mark.parametrize(("radius", "cant", "speed"), [(600.0, 0.1, 27.8), (2500.0, 0.1, 50.0)])
 def test_twins_through_curves(coach, radius, cant, speed):
     """What is asked for on straight track holds with clothoids, cant and flanges that touch."""
-    track = canted_curve(radius, cant)
-    settings = Settings(output_rate=RATE, outputs={"sensors": "readings"})
-    result = railsim.simulate(coach, track, speed=speed, settings=settings)
-    read = measured(result, coach, ("axlebox", "frame", "floor"), speed)
+    result, track, read = run_over(coach, canted_curve(radius, cant), speed)
     found = irregularity(read, coach, track.replace(irregularities=[]))
     by = holds(found, result, track)
     inside = [np.abs(e) < 1.96 * sd for (_, e, sd) in by.values()]
@@ -376,13 +391,7 @@ def test_friction_elements_that_keep_their_state_have_no_equation_at_rest(monkey
 @pytest.mark.further
 def test_twin_that_gains_speed(coach):
     """From 30 to 40 m/s: short pieces with their own modes."""
-    track = rough(1200.0)
-    s = np.linspace(0.0, 1200.0, 200)
-    table = np.column_stack([s, np.sqrt(900.0 + 700.0 * s / 1200.0)]).tolist()
-    outputs, drive = {"sensors": "readings"}, {"mode": "table", "speed_table": table}
-    settings = Settings(output_rate=RATE, outputs=outputs, drive=drive)
-    result = railsim.simulate(coach, track, settings=settings)
-    read = measured(result, coach, ("axlebox", "frame", "floor"), 35.0)
+    result, track, read = speeding_up(coach)
     found = irregularity(read, coach, track.replace(irregularities=[]))
     assert len({piece.speed for piece in found.pieces}) > 3
     holds(found, result, track)
@@ -477,10 +486,7 @@ def test_vehicle_that_is_another_one(coach):
     _, track, measurement = twin(coach, 1500.0, 40.0)
     bare = track.replace(irregularities=[])
     right = errors(irregularity(measurement, coach, bare, simulations=0), track)
-    values = {"carbody.mass": 38600.0 * 1.1, "secondary_spring.stiffness.z": 370e3 * 1.2,
-              "coil_spring.stiffness.z": 991e3 * 0.8}  # fmt: skip
-    other = coach.with_values(values)
-    wrong = errors(irregularity(measurement, other, bare, simulations=0), track)
+    wrong = errors(irregularity(measurement, coach.with_values(OTHER), bare, simulations=0), track)
     for name in ("alignment", "level", "cross_level"):
         for band in BANDS:
             assert rms(wrong[name, band][1]) < 2.0 * rms(right[name, band][1])
