@@ -222,9 +222,10 @@ def loss_of_stability(
     while passed < high:
         after = min(high, passed + min((high - low) / (points - 1), STEP * passed))
         after = high if high - after < 1e-9 * high else after
-        unstable = after if growth(after) >= 0.0 else _beyond_zero(growth, before, passed, after)
+        middle = passed if before < passed else 0.5 * (passed + after)
+        unstable = after if growth(after) >= 0.0 else _beyond_zero(growth, before, middle, after)
         if unstable is None and after == high:  # a peak in the last interval
-            unstable = _beyond_zero(growth, passed, after, after)
+            unstable = _beyond_zero(growth, passed, 0.5 * (passed + after), after)
         if unstable is not None:
             stable = passed if unstable > passed else before
             root = float(brentq(growth, stable, unstable, xtol=1e-7 * high, rtol=1e-12))
@@ -242,8 +243,7 @@ def _beyond_zero(
     is above the least one, at most; more is looked into where peaks are sharper.
     """
     low, peak, high = map(growth, (before, middle, after))
-    at_end = middle in (before, after)  # two values say nothing of a peak between them
-    if peak < max(low, high) or not (at_end or 2.0 * peak - min(low, high) >= 0.0):
+    if peak < max(low, high) or 2.0 * peak - min(low, high) < 0.0:
         return None
     found = minimize_scalar(
         lambda x: -growth(x), bounds=(before, after), method="bounded", options={"maxiter": 12}

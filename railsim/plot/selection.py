@@ -20,7 +20,10 @@ MOST_LINES = 24
 STUDY = ("dQ_over_Q0", "sum_Y", "Y_over_Q", "wheelset_roll", "wheelset_lateral", "wheelset_yaw")
 """Default quantities of plots."""
 
-LIMITS = {"Y_over_Q": (0.8, "EN 14363: 0.8"), "dQ_over_Q0": (-0.6, "EN 14363: −60 %")}
+LIMITS = {
+    "Y_over_Q": (0.8, "EN 14363: 0.8, mean over 2 m"),
+    "dQ_over_Q0": (-0.6, "EN 14363: −60 %"),
+}
 """EN 14363 (2016): derailment quotient, on-track tests; wheel unloading, twisted track [SI]."""
 TWIST_TEST_SPEED = 3.0
 """Speed up to which the limit of wheel unloading holds, that of the test on twisted track [m/s]."""
