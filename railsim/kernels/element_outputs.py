@@ -16,7 +16,7 @@ from railsim.kernels.elements import (
     spring_damper,
 )
 from railsim.kernels.lanes import LANES, eight_from, store_lanes
-from railsim.kernels.vectors import dot, plus
+from railsim.kernels.vectors import dot, plus, rotate, rotate_back, times
 
 LINK, MOUNT = range(2)
 
@@ -75,7 +75,7 @@ def mount_output(system, work, inner, index, e, out):
     mounts, laws = system.mounts, work.laws
     which = eight_from(index, index + 1)
     one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
-    point_1, point_2, _, spring, rotation = mount_columns(mounts.row, which)
+    point_1, point_2, share, spring, rotation = mount_columns(mounts.row, which)
     R1, R2, omega_1, omega_2, _, _, g, w = relative_motion(work.pose, one, two, point_1, point_2)
     if mounts.flags[index, TRANSLATES]:
         d, rate = in_axes_of(R1, omega_1, g, w)
@@ -83,11 +83,13 @@ def mount_output(system, work, inner, index, e, out):
         while law < mounts.law.shape[0] and mounts.law[law, 0] < index:
             law += 1
         more, _ = other_laws(system, work, (index, law, index + 1), d, rate, inner)
-        force = plus(spring_damper(spring, d, rate), more)
+        force = times(share[0], plus(spring_damper(spring, d, rate), more))
+        d_2, rate_2 = in_axes_of(R2, omega_2, g, w)
+        force_2 = times(share[1], spring_damper(spring, d_2, rate_2))  # of a shear spring half
         put(out, e, DEFLECTION, laws, d)
-        put(out, e, FORCE, laws, force)
+        put(out, e, FORCE, laws, plus(force, rotate_back(R1, rotate(R2, force_2))))
         put(out, e, RATE, laws, rate)
-        out[e, POWER] += first_lane(laws, dot(force, rate))
+        out[e, POWER] += first_lane(laws, dot(force, rate) + dot(force_2, rate_2))
     angle, rate, moment = rotation_law(R1, R2, omega_1, omega_2, rotation)
     put(out, e, ANGLE, laws, angle)
     put(out, e, MOMENT, laws, moment)

@@ -166,6 +166,34 @@ def test_a_spring_between_two_points_stands_as_its_free_length_says():
     assert loads.Q0.sum() == pytest.approx((MASS + 2 * 1300.0) * GRAVITY, rel=1e-9)
 
 
+def test_forces_of_sheared_springs_hold_the_car_on_cant():
+    """Across and down m g (sin, cos) of 150 mm of cant, 1e-4; the car leans more than its frames.
+
+    In the axes of the frames alone, the load of the springs pulling across was left out: 9 %.
+    """
+    straight = load_track("straight").replace(cant=[{"type": "CST", "length": 9.0, "cant": 0.15}])
+    outputs = {"elements": ["*.secondary_*", "*.lateral_bump_stop"]}
+    found = railsim.simulate(
+        load_vehicle("coach_manchester"),
+        straight,
+        speed=5.0,
+        duration=0.01,
+        settings=Settings(start_state="steady", outputs=outputs),
+    )
+    held = np.zeros(2)
+    for e, name in enumerate(found.coordinates["element"]):
+        if "damper" not in name:  # at rest
+            lean = of_body(found, f"{name.split('.')[0]}.frame")[0][0, ROLL]
+            _, across, down = found.element_force[0, e, :3]
+            held += [
+                across * np.cos(lean) - down * np.sin(lean),
+                down * np.cos(lean) + across * np.sin(lean),
+            ]
+    weight, angle = 43628.0 * GRAVITY, np.arcsin(0.15 / 1.5)
+    expected = weight * np.array([np.sin(angle), np.cos(angle)])
+    np.testing.assert_allclose(held, expected, atol=1e-4 * weight)
+
+
 # contact patches and rails ------------------------------------------------------------------------
 
 
