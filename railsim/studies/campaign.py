@@ -21,13 +21,13 @@ from railsim.assessment.outputs import check_outputs
 from railsim.assessment.record import START
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality
-from railsim.cant import curve_speed
+from railsim.cant import cant_deficiency, curve_speed
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.excitations.random import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.loading import load_running_limits, load_scenario
 from railsim.definitions.study.scenario import Part, Scenario, Speed, TestCondition
-from railsim.definitions.track.elements import Circle
+from railsim.definitions.track.elements import CantElement, Circle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
@@ -44,6 +44,7 @@ from railsim.studies.spec import RunSpec, StudySpec
 from railsim.track.curves import curves
 
 MOST = 20  # seeds of a part
+FASTEST = 1.1  # speed of a test over the admissible one: that of zone 1
 STEP = 10  # between two of them: seeds of the zones' own tracks lie in between
 LATERAL, VERTICAL = ("lateral", "gauge"), ("vertical", "cross_level")
 
@@ -163,7 +164,7 @@ def scenario_cases(
                 labels["condition"] = state
             case = replace(
                 case, name="_".join(filter(None, label)), vehicle=made, labels=labels,
-                track=scaled_radii(case.track, part.speed, service),
+                track=fitted_curves(case.track, part.speed, service, limits),
             )  # fmt: skip
             cases += repeated(case, limits, service, number) if limits else [case]
     Faults(dict.fromkeys(faults)).check()
@@ -230,12 +231,15 @@ def _curve_faults(track: Track, part: Part, file: str, key: str) -> Iterator[Fau
 
 
 def part_speed(speed: Speed, service: Service) -> float:
-    """Speed of a vehicle in a part [m/s]; V^2 = g R (h + I)/2b0 from the cant deficiency."""
+    """Speed of a vehicle in a part [m/s]; V^2 = g R (h + I)/2b0 from the cant deficiency.
+
+    No more than `FASTEST` times the admissible speed, however large the radius is.
+    """
     if speed.fixed is not None:
         return speed.fixed
     if speed.admissible is not None:
         return speed.admissible * service.admissible_speed
-    return _speed_in_curve(speed, service)
+    return min(_speed_in_curve(speed, service), FASTEST * service.admissible_speed)
 
 
 def _speed_in_curve(speed: Speed, service: Service) -> float:
@@ -288,21 +292,39 @@ def _exchange(node: Any, wheels: dict[str, str]) -> bool:
     return found
 
 
-def scaled_radii(track: Track, speed: Speed, service: Service) -> Track:
-    """Track whose radii give the cant deficiency asked for at the speed asked for.
+def fitted_curves(
+    track: Track, speed: Speed, service: Service, limits: RunningLimits | None = None
+) -> Track:
+    """Track whose curves give the cant deficiency asked for at the speed of the part.
 
-    Its permitted speed changes with them: at equal cant deficiency with the root of the radius.
+    Where the speed is asked for too, one factor multiplies the radii, by `limits` not below the
+    zone of `radius`.  Where that, or the highest speed of a part, leaves the deficiency too small,
+    another one lowers the cants, to none at most.  The permitted speed of the track goes with that
+    of the part.
     """
-    if speed.admissible is None or speed.cant_deficiency is None:
+    if speed.cant_deficiency is None or speed.radius is None:
         return track
-    as_drawn = _speed_in_curve(speed, service)
-    factor = (speed.admissible * service.admissible_speed / as_drawn) ** 2
-    plan = list(track.plan)
+    at, as_drawn = part_speed(speed, service), _speed_in_curve(speed, service)
+    factor, plan = 1.0, list(track.plan)
+    if speed.admissible is not None:
+        radii = [abs(element.radius) for element in plan if isinstance(element, Circle)]
+        ranges = [zone.radius for zone in limits.zones.values() if zone.radius] if limits else []
+        ends = [low / min(radii) for low, high in ranges if low <= speed.radius <= high]
+        factor = max((at / as_drawn) ** 2, min(1.0, 1.001 * max(ends, default=0.0)))
     for k, element in enumerate(plan):
         if isinstance(element, Circle):
             plan[k] = element.model_copy(update={"radius": factor * element.radius})
-    permitted = track.speed and track.speed * math.sqrt(factor)
-    return track.model_copy(update={"plan": tuple(plan), "speed": permitted})
+    changed = {"plan": (*plan,), "speed": track.speed and track.speed * at / as_drawn}
+    wanted = speed.cant_deficiency * service.cant_deficiency
+    cant = max(0.0, cant_deficiency(at, 1.0 / (factor * speed.radius), wanted))
+    if cant < speed.cant - 1e-6:  # m
+        changed["cant"] = tuple(_lowered(one, cant / speed.cant) for one in track.cant or ())
+    return track.model_copy(update=changed)
+
+
+def _lowered(element: CantElement, factor: float) -> CantElement:
+    given = {key: getattr(element, key) for key in element.KEYS}
+    return element.model_copy(update={k: factor * v for k, v in given.items() if v is not None})
 
 
 def repeated(case: Case, limits: RunningLimits, service: Service, condition: int) -> list[Case]:

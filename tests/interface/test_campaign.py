@@ -23,7 +23,13 @@ from railsim.definitions.track.layout import track_remarks
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
 from railsim.profiles import load_profile
-from railsim.studies.campaign import campaign, counting_sections, part_speed, scenario_cases
+from railsim.studies.campaign import (
+    campaign,
+    counting_sections,
+    fitted_curves,
+    part_speed,
+    scenario_cases,
+)
 
 
 @points("vehicle", ["coach_manchester", "coach_flexicoil"], always=(0,))
@@ -142,6 +148,27 @@ def test_speed_from_the_cant_deficiency():
     assert speeds["zone4"] == pytest.approx(math.sqrt(9.81 * 300.0 * 0.27 / 1.5))
     assert speeds["zone1"] == pytest.approx(1.1 * 33.33333)
     assert [round(v, 1) for v in speeds.values()] == [36.7, 35.0, 29.7, 23.0]
+
+
+@points("vehicle", ["metro_b_motor", "wagon_uic_link", "locomotive_coco_a"], always=(0,))
+def test_slow_vehicle_is_tested_in_every_zone_and_not_faster_than_it_may_run(vehicle):
+    """80 and 100 km/h: radii scaled to the deficiency are below zone 2; it takes lower cants."""
+    scenario, limits = load_scenario("en14363"), load_running_limits("en14363")
+    service = railsim.load_vehicle(vehicle).service
+    for number, part in enumerate(scenario.parts.values(), start=1):
+        speed = part_speed(part.speed, service)
+        assert speed <= 1.1 * service.admissible_speed + 1e-9
+        drawn = railsim.load_track(part.track)
+        track = fitted_curves(drawn, part.speed, service, limits)
+        found = track_sections(track, limits, service, (100.0, track.length), lambda _, v=speed: v)
+        counted = [one for one in found if not one.reason]
+        assert {one.zone for one in counted} == {str(number)}
+        if number > 1:
+            middle = 1.0 / (9.81 * part.speed.radius)  # of the curves, whose radius may be scaled
+            ratio = track.plan[2].radius / drawn.plan[2].radius
+            cant = part.speed.cant * track.cant[2].cant / drawn.cant[2].cant
+            deficiency = 1.5 * speed**2 * middle / ratio - cant
+            assert deficiency == pytest.approx(service.cant_deficiency)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ class Speed(base.Definition):
     """Speed of a part: fixed, a share of the admissible one, or from the cant deficiency.
 
     With both a share of the admissible speed and a cant deficiency, the radii of the track are
-    multiplied by one factor so that both hold.
+    multiplied by one factor so that both hold; its cants are lowered where that is not enough.
     """
 
     fixed: base.Positive | None = None
