@@ -1,5 +1,8 @@
 """The loop of wear without runs: shares of routes, parts of a step, rows, all in closed form."""
 
+import gc
+import sys
+import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -62,6 +65,28 @@ def test_quantities_of_the_settings_leave_the_loop_what_it_needs(monkeypatch):
         wear_loop.wear_loop(COACH, [(CURVE, 20.0, 1.0)], step=STEP, steps=1, settings=own)
     assert seen[0].quantities == ()
     assert seen[0].contact_patches
+
+
+def test_what_a_run_leaves_is_gone_before_the_next_one(worn, monkeypatch):
+    """A run holds the table of its profile, 0.1 GB; the command line collects rarely."""
+    left, simulate = [], wear_loop.simulate
+
+    def simulate_in_a_cycle(*given, **how):
+        assert not [one for one in left if one() is not None]
+        result = type("Run", (), vars(simulate(*given, **how)))()
+        result.itself = result
+        left.append(weakref.ref(result))
+        return result
+
+    monkeypatch.setattr(wear_loop, "simulate", simulate_in_a_cycle)
+    monkeypatch.setattr(sys.modules[__name__], "ROUTES", ROUTES[:1])
+    before = gc.get_threshold()
+    gc.set_threshold(10**6)
+    try:
+        worn(1e-15, steps=3)
+    finally:
+        gc.set_threshold(*before)
+    assert len(left) >= 3
 
 
 @pytest.mark.parametrize("parts", [1, 3])
