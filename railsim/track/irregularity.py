@@ -24,7 +24,6 @@ from railsim.laws.permission import permitted_part
 BEYOND_ROWS = 1.05
 # Least cant and length at which a cross level is held against it, and share of it that is doubtful.
 CANTED, LONG, TWICE = 0.02, 30.0, 0.5  # m, m, 1
-MISSING, RECORDED = 5.0, 100  # median steps between two rows of a record; rows that make it one
 LARGEST = 0.5  # m; of a law of one's own
 
 
@@ -102,15 +101,15 @@ def measured_remarks(track: Track) -> list[str]:
 
 def _gap_remarks(part: Measured, index: int) -> list[str]:
     """Remark on rows that are missing: a smooth curve bridges them, and no defect is seen there."""
-    s = np.array([row[0] + part.shift for row in part.rows or ()])
-    steps = np.diff(s)
-    if len(s) < RECORDED or not len(gaps := np.flatnonzero(steps > MISSING * np.median(steps))):
+    if not (gaps := part.gaps()):
         return []
-    k = int(gaps[np.argmax(steps[gaps])])
+    s = np.array([row[0] + part.shift for row in part.rows or ()])
+    k = max(gaps, key=lambda k: s[k] - s[k - 1])
     more = f"the longest of {len(gaps)} such gaps, " if len(gaps) > 1 else ""
     return [
-        f"irregularities.{index} has no rows from s = {s[k]:.1f} to {s[k + 1]:.1f} m, {more}"
-        f"elsewhere one every {np.median(steps):.3g} m: a smooth curve bridges them."
+        f"irregularities.{index} has no rows from s = {s[k - 1]:.1f} to {s[k]:.1f} m, {more}"
+        f"elsewhere one every {np.median(np.diff(s)):.3g} m: a smooth curve bridges them, and "
+        "forces there are not those of the track."
     ]
 
 

@@ -656,3 +656,18 @@ def test_largest_value_between_the_rows_is_reported(tmp_path):
     (remark,) = measured_remarks(recorded(tmp_path, written(s, z)))
     assert "z_left reaches 4 mm" in remark
     assert "the largest row is 3.7 mm" in remark
+
+
+@pytest.mark.parametrize("begin", [100.0, 101.5])
+def test_rails_have_no_kink_at_the_ends_of_a_gap(begin):
+    """Waves of 6 m and 5 mm bend by A k^2 = 5.5e-3 1/m; the gap nowhere bends more."""
+    k, amplitude = 2.0 * np.pi / 6.0, 5e-3
+    s = np.arange(0.0, 200.0, 0.25)
+    s = s[(s <= begin) | (s >= begin + 12.0)]
+    rows = [(float(x), 0.0, amplitude * float(np.sin(k * x)), 0.0, 0.0) for x in s]
+    track = load_track("straight").replace(irregularities=[{"type": "measured", "rows": rows}])
+    at = np.arange(begin - 5.0, begin + 17.0, 0.05)
+    (_, z, *_), (_, slope, *_) = displacement(track)(at)
+    assert np.abs(np.diff(slope)).max() / 0.05 <= 1.05 * amplitude * k**2
+    assert np.abs(z).max() <= amplitude * np.hypot(1.0, 0.75 * k)  # a slope A k falls within 1.5 m
+    assert slope == pytest.approx(np.gradient(z, at), abs=2e-4)

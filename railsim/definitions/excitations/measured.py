@@ -14,6 +14,8 @@ from railsim.definitions.excitations import base
 READING = ("encoding", "columns", "units", "offset", "reverse", "falling_mileage", "chord", "band")
 # Share of the range of the rows around by which a spline between measured rows may leave it.
 OVERSHOOT = 0.25
+MISSING, RECORDED = 5.0, 100  # median steps that are a gap of a record; rows that make it one
+FLATTENED = 1.5  # m, over which the rails lose their slope at either end of a gap
 _INNER = np.arange(1, 8) / 8.0  # positions within an interval, over its length
 Row = tuple[Finite, base.Amplitude, base.Amplitude, base.Amplitude, base.Amplitude]
 
@@ -90,12 +92,34 @@ class Measured(base.Irregular):
         return f"measured, {len(self.rows or ())} rows{times}"
 
     def interpolation(self) -> tuple[Floats, Floats, Floats]:
-        """Positions of the rows [m], and displacements [m] and slopes [1] there by columns."""
+        """Positions of the rows [m], and displacements [m] and slopes [1] there by columns.
+
+        In a gap with two rows more, between which the rails are level: to them they lose their
+        slope by a parabola, as a spline would swing out and a shape-preserving one has a kink.
+        """
         rows = np.array(self.rows)
         positions = rows[:, 0] + self.shift
         values = self.scale * rows[:, 1:].T
-        slopes = np.stack([shape_preserving_slopes(positions, row) for row in values])
+        gaps = self.gaps()
+        slopes = np.concatenate([
+            np.stack([shape_preserving_slopes(s, row) for row in part])
+            for s, part in zip(np.split(positions, gaps), np.split(values, gaps, 1), strict=True)
+        ], axis=1)  # fmt: skip
+        for k in reversed(gaps):
+            way = min(FLATTENED, (positions[k] - positions[k - 1]) / 3.0) * np.array([1.0, -1.0])
+            ends = slice(k - 1, k + 1)
+            flat = values[:, ends] + 0.5 * way * slopes[:, ends]
+            positions = np.insert(positions, k, positions[ends] + way)
+            values = np.insert(values, [k, k], flat, axis=1)
+            slopes = np.insert(slopes, [k, k], 0.0, axis=1)
         return positions, values, slopes
+
+    def gaps(self) -> list[int]:
+        """Return the rows of a record before which others are missing, by their numbers."""
+        steps = np.diff([row[0] for row in self.rows or ()])
+        if len(steps) < RECORDED - 1:
+            return []
+        return [int(k) + 1 for k in np.flatnonzero(steps > MISSING * np.median(steps))]
 
     def displacement(self, length: float) -> base.Displacement:
         """Return the spline through the rows."""
@@ -164,10 +188,12 @@ def shape_preserving_slopes(positions: Floats, values: Floats) -> Floats:
     wave leaves it by 0.15 at most.
 
     `positions`, shape (n,): increasing arc lengths [m]; `values`, shape (n,): displacements [m].
-    Returns: slopes [1] (shape (n,)).
+    Returns: slopes [1] (shape (n,)); 0 of a single row.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
+    if len(positions) < 2:
+        return np.zeros_like(values)
     slopes = CubicSpline(positions, values)(positions, 1)
     monotone = PchipInterpolator(positions, values)(positions, 1)
     padded = np.concatenate((values[:1], values, values[-1:]))
