@@ -46,6 +46,14 @@ REACH = 1.5
 """Distance along the vehicle from an axle to an element that acts on it [m]: half a wheelbase."""
 INERTIA = 1.3
 """Moment of inertia over the sum of the other two: at most 1, in published data up to 1.29."""
+GYRATION = (0.05, 15.0)
+"""Radius of gyration of a body [m]: bolsters have 0.2 m, long cars 9 m."""
+HEIGHT = 8.0
+"""Height of a body above the rails [m]: raised pantographs reach 6.5 m."""
+DAMPER = (200.0, 1e7)
+"""Damping of a damper [N s/m]: 4 kN s/m to 2.5 MN s/m."""
+LAG = 1.0
+"""Damping over series stiffness of a damper [s]: 0.3 s at most, of yaw dampers."""
 SPRING_LOAD = (0.6, 1.5)
 """Static load of a spring over the load at which its length was measured."""
 SPRING_TRAVEL = 0.7
@@ -76,7 +84,7 @@ def _without_supports(vehicle: Vehicle) -> list[Remark]:
         points |= {f"service.points.{name}": at.position for name, at in service.points.items()}
         points["service.floor_height"] = (0.0, 0.0, -service.floor_height)
     found = [*_bodies(flat, points), *_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
-    found += _by_text(_pulling(flat))
+    found += [*_by_text(_pulling(flat)), *_by_text(_dampers(flat))]
     for name in vehicle.loads:
         of_load = _bodies(flatten(vehicle.model_copy(update={"load": name})), points)
         found += [Remark(f"loads.{name}: {r.key}", r.text) for r in of_load if r not in found]
@@ -85,7 +93,7 @@ def _without_supports(vehicle: Vehicle) -> list[Remark]:
 
 def _bodies(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> list[Remark]:
     """Remarks on places, `points` by name among them, inertias and the mass."""
-    found = [*_below_the_rails(flat, points), *_lengths(flat, points)]
+    found = [*_below_the_rails(flat, points), *_heights(flat), *_lengths(flat, points)]
     return [*found, *_inertias(flat), *_wheel_load(flat)]
 
 
@@ -119,6 +127,13 @@ def _below_the_rails(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -
         low = max(heights.values())
         text = f"below the rails, z up to {low:g} m: z points down, a height of 1 m is z = -1"
         yield gathered(text, names)
+
+
+def _heights(flat: FlatVehicle) -> Iterator[Remark]:
+    heights = {b.name: -b.position[2] for b in flat.bodies if HEIGHT < -b.position[2] <= LONGEST}
+    if heights:
+        text = f"up to {max(heights.values()):g} m above the rails: is its position in m?"
+        yield gathered(text, [*heights])
 
 
 def _lengths(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> Iterator[Remark]:
@@ -178,6 +193,29 @@ def _inertias(flat: FlatVehicle) -> Iterator[Remark]:
     if names:
         text = "a moment of inertia is above the sum of the other two"
         yield gathered(f"{text}: Ixx, Iyy, Izz in this order?", names)
+    axles = [b.name for b in flat.of_kind("wheelset") if b.inertia[1] > min(b.inertia)]
+    if axles:
+        text = "the moment of inertia about the axle is not the smallest"
+        yield gathered(f"{text}: Ixx, Iyy, Izz in this order?", axles)
+    low, high = GYRATION
+    radii = {b.name: np.sqrt(np.array(b.inertia) / b.mass) for b in flat.bodies if b.mass > 0.0}
+    odd = {k: r[(r < low) | (r > high)] for k, r in radii.items()}
+    if names := [name for name, r in odd.items() if len(r)]:
+        text = f"radius of gyration {odd[names[0]][0]:.3g} m, railways have {low:g} to {high:g} m"
+        yield gathered(f"{text}: is the mass in kg, the inertia in kg m2?", names)
+
+
+def _dampers(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
+    """Dampers with the damping of none, or that give way before they damp."""
+    for element in flat.elements:
+        law = element.definition
+        if not isinstance(law, SpringDamper) or not law.damping:
+            continue
+        if not DAMPER[0] <= law.damping <= DAMPER[1]:
+            yield f"damping {law.damping:g} N s/m, railways have 4e3 to 2.5e6: in N s/m?", element
+        elif law.damping > LAG * law.series_stiffness > 0.0:
+            words = f"damping {law.damping:g} N s/m gives way at {law.series_stiffness:g} N/m"
+            yield f"{words} in series: in N s/m and N/m?", element
 
 
 def _wheel_load(flat: FlatVehicle) -> Iterator[Remark]:

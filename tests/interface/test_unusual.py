@@ -47,6 +47,13 @@ INCLINED = {  # 3 parts across, 4 down of 5
     "damping": 0.0,
 }
 
+DAMPER = {
+    "kind": "spring_damper",
+    "bodies": ["frame", "axle"],
+    "points": [[0.0, 0.0, -0.9], [0.0, 0.0, -0.5]],
+    "damping": 15e3,
+}
+
 
 def vehicle(body=(), spring=(), axle=(), **others):
     return Vehicle.model_validate(
@@ -94,6 +101,18 @@ def vehicle(body=(), spring=(), axle=(), **others):
             "stop.left, stop.right",
             "no force before 30 m of travel: is it in m?",
         ),
+        (vehicle(body={"position": [0.0, 0.0, -12.0]}), "frame", "up to 12 m above the rails"),
+        (
+            vehicle(axle={"inertia": [90.0, 800.0, 800.0]}),
+            "axle",
+            "about the axle is not the smallest",
+        ),
+        # sqrt(800/1.3) m, sqrt(5/8000) m
+        (vehicle(axle={"mass": 1.3}), "axle", "radius of gyration 24.8 m"),
+        (vehicle(body={"inertia": [5.0, 9.0, 9.0]}), "frame", "radius of gyration 0.025 m"),
+        (vehicle(damper={**DAMPER, "damping": 15.0}), "damper", "damping 15 N s/m"),
+        (vehicle(damper={**DAMPER, "damping": 15e6}), "damper", "damping 1.5e+07 N s/m"),
+        (vehicle(damper={**DAMPER, "series_stiffness": 4e3}), "damper", "gives way at 4000 N/m"),
         # a plate, the limit, has Izz = Ixx + Iyy = 14000 kg m2
         (vehicle(body={"inertia": [5e3, 9e3, 20e3]}), "frame", "above the sum of the other"),
         (vehicle(body={"mass": 8.0}), "mass", "mean static wheel load 6.42 kN"),
@@ -167,7 +186,7 @@ def test_bodies_joined_in_a_ring_bounce_as_one():
 
 
 def test_an_ordinary_vehicle_has_no_remark():
-    assert vehicle_remarks(vehicle()) == []
+    assert vehicle_remarks(vehicle(damper={**DAMPER, "series_stiffness": 4e6})) == []
 
 
 def test_equal_findings_are_one_line_with_a_count():
