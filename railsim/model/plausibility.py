@@ -18,6 +18,8 @@ from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.errors import ModelError, listed
+from railsim.profiles import Profile
+from railsim.profiles.profile import FLANGE_BACK
 
 if TYPE_CHECKING:
     from railsim.model.assembly import Model
@@ -111,6 +113,31 @@ def gauge_remarks(flat: FlatVehicle, track: Track) -> list[Remark]:
             )
             texts.setdefault(text, []).append(body.name)
     return [gathered(text, names) for text, names in texts.items()]
+
+
+def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
+    """Remark on rails that come closer than the flanges of a wheelset are apart."""
+    tables = model.system.track
+    apart = gauge + tables.rail[:, 2, 0] - tables.rail[:, 0, 0]
+    texts: dict[str, list[str]] = {}
+    for body in model.flat.of_kind("wheelset"):
+        assert body.wheelset is not None
+        flanges = [_flange_thickness(model.profiles[name]) for name in body.wheelset.profile]
+        over = body.wheelset.back_to_back + sum(flanges)
+        if apart[k := int(np.argmin(apart))] < over:
+            text = (
+                f"{1e3 * over:.1f} mm over its flanges, the rails are {1e3 * apart[k]:.1f} mm "
+                f"apart at s = {tables.s_start + k * tables.ds:.1f} m: it wedges between them"
+            )
+            texts.setdefault(text, []).append(body.name)
+    return [gathered(text, names) for text, names in texts.items()]
+
+
+def _flange_thickness(wheel: Profile) -> float:
+    """Thickness of a flange 10 mm below the rolling circle, Sd of EN 15313 [m]."""
+    tip = int(np.argmax(wheel.z))
+    face = slice(tip, tip + int(np.argmax(wheel.z[tip:] < 0.005)))
+    return float(np.interp(-0.010, -wheel.z[face], wheel.y[face])) - FLANGE_BACK
 
 
 def gathered(what: str, names: Sequence[str]) -> Remark:

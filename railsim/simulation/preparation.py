@@ -16,7 +16,7 @@ from railsim.kernels.state import TIME
 from railsim.model.assembly import assemble
 from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import Equilibrium, stored_equilibrium
-from railsim.model.plausibility import gauge_remarks, vehicle_remarks
+from railsim.model.plausibility import gauge_remarks, narrow_remarks, vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
 from railsim.result import Sink
@@ -57,6 +57,7 @@ def prepare(
     model = balance.model
     step, _ = steps.at(speed)
     unusual = [*vehicle_remarks(vehicle, model), *gauge_remarks(model.flat, track)]
+    unusual += narrow_remarks(model, track.gauge)
     remarks: list[str] = [*balance.remarks, *map(str, unusual), *measured_remarks(track)]
     if before is None:
         state = start_state(

@@ -11,7 +11,8 @@ from railsim import cli
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.model.plausibility import gauge_remarks, vehicle_remarks
+from railsim.model.plausibility import gauge_remarks, narrow_remarks, vehicle_remarks
+from railsim.profiles import load_profile
 from railsim.result import peak
 from railsim.simulation import disturbance
 
@@ -211,6 +212,20 @@ def test_they_are_shown_by_validate_info_and_once_by_a_run(tmp_path, capsys):
     )
     assert capsys.readouterr().out.count("frame: below the rails") == 1
     assert any("below the rails" in remark for remark in railsim.open_result(out).remarks)
+
+
+@pytest.mark.parametrize(("narrower", "wedged"), [(0.0095, False), (0.0105, True)])
+def test_rails_closer_than_the_flanges_are_remarked_on(narrower, wedged):
+    """S1002: Sd 32.5 mm, so that 1360 mm between the backs are 1425 mm over the flanges."""
+    rail = np.zeros((40, 6, 4))
+    rail[12, 0, 0], rail[12, 2, 0] = 0.4 * narrower, -0.6 * narrower
+    system = SimpleNamespace(track=SimpleNamespace(rail=rail, s_start=-5.0, ds=0.5))
+    coach = flatten(load_vehicle("coach_manchester"))
+    model = SimpleNamespace(system=system, flat=coach, profiles={"S1002": load_profile("S1002")})
+    remarks = narrow_remarks(model, 1.435)
+    assert bool(remarks) == wedged
+    said = "1425.0 mm over its flanges, the rails are 1424.5 mm apart at s = 1.0 m"
+    assert all(said in str(remark) and "and 1 more" in str(remark) for remark in remarks)
 
 
 @cache
