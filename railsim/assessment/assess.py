@@ -13,6 +13,7 @@ from railsim.assessment.comfort_report import (
 from railsim.assessment.record import RUNNING, Record
 from railsim.assessment.running import assess_running, by_vehicle, running_limits
 from railsim.assessment.safety import safety_report
+from railsim.assessment.verdict import status_words
 from railsim.assessment.wear import WholeLifeRailModel
 from railsim.assessment.wear_report import wear_report
 from railsim.definitions.limits import ComfortLimits, RunningLimits
@@ -140,8 +141,8 @@ def _by_runs(
     vehicle = next(iter(runs.values())).vehicle().name
     records = {name: Record(result, name, coarse=coarse) for name, result in runs.items()}
     remarks = [remark for record in records.values() for remark in record.remarks()]
-    ended = {name: r.status for name, r in runs.items() if r.status != "complete"}
-    remarks += [f"{n}: {end}, only the part before that is assessed" for n, end in ended.items()]
+    ended = [status_words(name, r) for name, r in runs.items() if r.status != "complete"]
+    remarks += [f"{words}; only the part before that is assessed" for words in ended]
     about = vehicle, standard, tuple(runs)
     if standard == "wear":
         wear = {name: wear_report(record, law) for name, record in records.items()}

@@ -52,8 +52,8 @@ def all_verdicts(
     runs: Mapping[str, Result], reports: Sequence[ZoneReport], conditions: Sequence[Condition]
 ) -> dict[str, Verdict]:
     """Return the verdicts by criterion, on all runs, also those that did not reach their end."""
-    derailed = [_ended(n, r) for n, r in runs.items() if r.status == "derailed"]
-    stopped = [f"{_ended(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
+    derailed = [status_words(n, r) for n, r in runs.items() if r.status == "derailed"]
+    stopped = [f"{status_words(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
     missing = [condition.sentence for condition in conditions if condition.state != MET]
     found = {}
     for name in VERDICTS:
@@ -83,7 +83,8 @@ def _stopped(result: Result) -> bool:
     return result.status not in ("complete", "derailed")
 
 
-def _ended(name: str, result: Result) -> str:
+def status_words(name: str, result: Result) -> str:
+    """Say how a run ended, and why."""
     why = str(result.attributes.get("status_reason", ""))
     return f"{name}: {result.status}" + (f", {why}" if why else "")
 

@@ -333,6 +333,10 @@ def test_derailed_run_is_no_pass():
     (found,) = assess(made(track(STRAIGHT), FAST, status="derailed"))
     assert found.verdict == "derailed"
     assert found.exceeded
+    # what climbed is said with comfort, wear and safety too: their values end before it
+    (found,) = assess(made(track(STRAIGHT), FAST, status="derailed"), "comfort")
+    said = "run: derailed, made up; only the part before that is assessed"
+    assert any(remark.endswith(said) for remark in found.remarks), found.remarks
 
 
 def test_excess_is_a_failure_even_with_few_sections():
