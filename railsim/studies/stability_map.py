@@ -100,7 +100,9 @@ def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
             point.vehicle, point.track, settings=point.settings, **{**options, **conicity}
         )
     except RailsimError as error:
-        return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [str(error)]}
+        where = ", ".join(f"{name} {value}" for name, value in point.at.items())
+        why = f"{where}: {error}"
+        return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [why]}
     return {"at": point.at, **found.record()}
 
 
@@ -115,7 +117,9 @@ def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) 
 def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
     """Return the critical speeds of a map by method in words, NaN where there is none [m/s]."""
     first = next((record for record in records if "linearisation" in record), {})
-    cones = {record.get("conicity") for record in records if "linearisation" in record}
+    # of those that failed too, which say only where they are
+    own = [record.get("conicity") or record.get("at", {}).get("conicity") for record in records]
+    cones = {conicity for conicity in own if conicity}
     contact = Contact(
         first.get("linearisation", "tangent"),
         first.get("amplitude") or AMPLITUDE,

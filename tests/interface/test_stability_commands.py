@@ -14,6 +14,7 @@ from railsim.linear.vehicle import Contact
 from railsim.plot.stability import map_figure
 from railsim.stability import critical_speed, curving
 from railsim.stability.branches import Branch, Point
+from railsim.studies import stability_map
 from railsim.studies.stability_map import map_speeds, map_table
 
 
@@ -459,3 +460,17 @@ def test_a_map_tells_stable_points_from_those_unstable_throughout():
     assert [row[-1] for row in rows] == [
         "none to 80 m/s", "", "unstable at 20 m/s", "not computed"
     ]  # fmt: skip
+    # of several cones that which alone has a speed is not that of the column
+    one = {"linearisation": "tangent", "conicity": 1, **records[1]}
+    assert list(map_speeds([one, records[-1]])) == ["linear, tangent"]
+    assert list(map_speeds([{**one, "at": {}}])) == ["linear, tangent, cones of 1"]
+
+
+def test_a_point_of_a_map_without_a_solution_is_named(monkeypatch):
+    def fails(*_, **__):
+        raise ModelError("no static equilibrium")
+
+    monkeypatch.setattr(stability_map, "critical_speed", fails)
+    point = SimpleNamespace(at={"conicity": 0.2}, vehicle=None, track=None, settings=None)
+    (remark,) = stability_map.point_record(point, {})["remarks"]
+    assert remark == "conicity 0.2: no static equilibrium"
