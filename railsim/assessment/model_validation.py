@@ -184,7 +184,9 @@ def _alike(first: Track, second: Track) -> bool:
     def course(track: Track) -> list[object]:
         rows = [one.model_dump() for one in track.irregularities]
         # a file counts by its name: the folder may be another by now
-        named = [{k: Path(v).name if k == "file" else v for k, v in row.items()} for row in rows]
+        named = [
+            {k: Path(v).name if k == "file" and v else v for k, v in row.items()} for row in rows
+        ]
         return [track.plan, track.cant, track.vertical, track.gauge, named]
 
     return course(first) == course(second)

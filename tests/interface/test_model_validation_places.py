@@ -15,6 +15,7 @@ from railsim.notation import REQUESTED
 from railsim.result import Result
 
 SPEED, RATE = 23.0, 200.0
+RECORD = {"type": "measured", "rows": [(float(s), 0.0, 1e-3 * s, 0.0, 0.0) for s in range(5)]}
 
 
 def load(t):
@@ -147,12 +148,14 @@ def test_accelerations_of_axleboxes_and_frames_are_not_those_of_the_floor():
         ({"vertical": [{"type": "CST", "length": 99.0, "gradient": 0.01}]}, False),
         ({"gauge": 1.44}, False),
         ({"irregularities": [{"type": "dip", "s": 9.0, "length": 2.0, "depth": 0.01}]}, False),
+        ({"irregularities": [RECORD]}, False),  # its file is None once its rows are read
     ],
 )  # fmt: skip
 def test_tracks_are_alike_in_course_gauge_and_irregularities(change, same):
     one = track({"type": "STR", "length": 700.0})
     assert _alike(one, one.replace(**change)) is same
     assert _alike(one.replace(**change), one) is same
+    assert _alike(one.replace(**change), one.replace(**change))
 
 
 OTHER = np.array([0.27, 1.13, 2.6, 4.1, 7.3, 11.9, 19.1])  # Hz: not alike, so that no place moves
