@@ -53,6 +53,10 @@ def describe_vehicle(vehicle: Vehicle) -> Description:
         f"{flat.mean_wheel_load / 1e3:.2f} kN; distance is that of '{flat.reference}'",
     ]
     parts += [f"  source: {vehicle.source}"] if vehicle.source else []
+    if (service := vehicle.service) is not None:
+        speed, height = 3.6 * service.admissible_speed, 1e3 * service.cant_deficiency
+        limits = f"up to {speed:.4g} km/h and {height:g} mm of cant deficiency"
+        parts.append(f"  service: {service.category.replace('_', ' ')}, {limits}")
     if vehicle.loads:
         cases = ", ".join(vehicle.loads)
         parts.append(f"  load case: {vehicle.load or 'design'}; also defined: {cases}")

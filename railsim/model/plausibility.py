@@ -233,9 +233,12 @@ def _inertias(flat: FlatVehicle) -> Iterator[Remark]:
 
 
 def _dampers(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
-    """Dampers with the damping of none, or that give way before they damp."""
+    """Dampers with the damping of none, or that give way before they damp; friction in per cent."""
     for element in flat.elements:
         law = element.definition
+        friction = float(np.max(getattr(law, "friction_coefficient", 0.0)))
+        if friction > 1.0:
+            yield f"coefficient of friction {friction:g}, railways have at most 0.5", element
         if not isinstance(law, SpringDamper) or not law.damping:
             continue
         if not DAMPER[0] <= law.damping <= DAMPER[1]:

@@ -29,6 +29,12 @@ def test_vehicle_fits_on_a_screen(capsys):
     assert "preload of 12 elements" in lines[-1]
 
 
+def test_speed_in_kilometres_an_hour_is_seen(capsys):
+    """80, meant as km/h, is read as m/s."""
+    lines = lines_of(capsys, "coach_manchester", "--set", "service.admissible_speed=80")
+    assert "  service: passenger, up to 288 km/h and 150 mm of cant deficiency" in lines
+
+
 def test_vehicle_as_json_is_placed_and_mirrored(capsys):
     data = data_of(capsys, "coach_manchester")
     assert data["mass"] == pytest.approx(56110.0)

@@ -114,6 +114,19 @@ def vehicle(body=(), spring=(), axle=(), **others):
         (vehicle(damper={**DAMPER, "damping": 15.0}), "damper", "damping 15 N s/m"),
         (vehicle(damper={**DAMPER, "damping": 15e6}), "damper", "damping 1.5e+07 N s/m"),
         (vehicle(damper={**DAMPER, "series_stiffness": 4e3}), "damper", "gives way at 4000 N/m"),
+        (
+            vehicle(
+                spring={
+                    "kind": "friction",
+                    "points": None,
+                    "point": [0.0, 1.0, -0.46],
+                    "friction_coefficient": [10.0, 6.0, 6.0],
+                    "stick_stiffness": [4e6] * 3,
+                }
+            ),
+            "spring.left, spring.right",
+            "coefficient of friction 10,",
+        ),
         # a plate, the limit, has Izz = Ixx + Iyy = 14000 kg m2
         (vehicle(body={"inertia": [5e3, 9e3, 20e3]}), "frame", "above the sum of the other"),
         (vehicle(body={"mass": 8.0}), "mass", "mean static wheel load 6.42 kN"),
