@@ -5,6 +5,7 @@ same inputs is not computed again.  A test campaign has conditions of the vehicl
 independent seeds of its track, scaled to the target quality.
 """
 
+import logging
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -43,6 +44,7 @@ from railsim.studies.rows import in_a_name
 from railsim.studies.spec import RunSpec, StudySpec
 from railsim.track.curves import curves
 
+_LOG = logging.getLogger(__name__)
 MOST = 20  # seeds of a part
 FASTEST = 1.1  # speed of a test over the admissible one: that of zone 1
 STEP = 10  # between two of them: seeds of the zones' own tracks lie in between
@@ -93,6 +95,9 @@ def campaign(
             with faults.caught(_as_assigned):
                 check_outputs(case.vehicle, case.settings, case.speed, plan.standard)
         Faults(dict.fromkeys(faults)).check()
+    remark = how.get("on_remark") or _LOG.warning
+    for words in left_out(plan, names, cases):
+        remark(words)
     spec = StudySpec(
         folder=relative(Path.cwd(), folder),
         name=plan.name,
@@ -111,6 +116,19 @@ def campaign(
     results = {case.name: open_result(folder / case.file_name) for case in cases}
     assessments = assess(results, plan.standard, method=plan.method)
     return Campaign(folder, tuple(assessments), results, outcome.computed)
+
+
+def left_out(
+    plan: Scenario, vehicles: Sequence[str | Path], cases: Sequence[Case]
+) -> Iterator[str]:
+    """Yield what a vehicle would need for each condition in which it is not tested."""
+    tested = {(case.labels["vehicle"], case.labels.get("condition")) for case in cases}
+    for vehicle, (state, needed) in product(map(short_name, vehicles), plan.conditions.items()):
+        if (vehicle, state) not in tested:
+            load = [f"a load case '{needed.load}'"] if needed.load else []
+            wheels = [f"wheels {' or '.join(needed.wheels)}"] if needed.wheels else []
+            words = " and ".join((*load, *wheels))
+            yield f"{vehicle}: not tested in the condition '{state}', which needs {words}"
 
 
 def _as_assigned(fault: Fault) -> Fault:
