@@ -479,6 +479,14 @@ def test_a_run_without_a_speed_begins_with_that_of_its_speed_table(tmp_path):
         load_case(RunSpec(COACH, CURVE, None))
 
 
+def test_the_settings_of_a_slow_run_are_held_against_its_vehicle_before_it_starts(tmp_path):
+    """At 0.5 m/s too, so that no other run of a study starts in vain."""
+    settings = tmp_path / "s.toml"
+    settings.write_text('format = "railsim-settings/1"\noutputs = {elements = ["nothing"]}\n')
+    with pytest.raises(InputError, match=r"outputs\.elements: no element is called 'nothing'"):
+        load_case(RunSpec(COACH, CURVE, 0.5, settings=settings))
+
+
 def test_grid_values_may_be_lists():
     assert parse_grid("settings.fastsim_grid=[5,5],[10,10]")[1] == ("[5,5]", "[10,10]")
     grid = {"settings.fastsim_grid": ["[5,5]", "[10,10]"]}

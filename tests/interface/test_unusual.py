@@ -159,6 +159,20 @@ def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):
     assert any(names in remark.key and words in remark.text for remark in found), found
 
 
+@pytest.mark.parametrize("kind", ["spring_damper", "bushing"])
+@pytest.mark.parametrize("series", [0.0, 5e5])
+def test_a_damper_counts_for_the_bounce_unless_a_spring_is_in_series(kind, series):
+    """Two of c, k: c/sqrt(2 k m) = 5e6/sqrt(2 4e5 8e3) = 62.5; behind a spring it gives way."""
+    along = {"stiffness": 0.0, "damping": 5e6, "series_stiffness": series}
+    damper = {key: SPRING[key] for key in ("bodies", "points", "sides")} | along
+    if kind == "bushing":
+        damper = {key: [0.0, 0.0, value] for key, value in along.items()} | STOP
+        del damper["axis"]
+    unusual = vehicle(spring={"damping": [0.0, 0.0, 0.0]}, damper={**damper, "kind": kind})
+    found = [remark.text.partition(",")[0] for remark in vehicle_remarks(unusual, supports=False)]
+    assert found == (["damping ratio 62.5 of its bounce"] if series == 0.0 else [])
+
+
 @pytest.mark.parametrize(
     ("tables", "key", "words"),
     [

@@ -9,9 +9,9 @@ import pytest
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.errors import InputError
-from railsim.linear.track_response import QUANTITIES
+from railsim.linear.track_response import QUANTITIES, TrackResponse
 from railsim.measurement import load_measurement
-from railsim.observation import irregularity
+from railsim.observation import contact, irregularity
 from railsim.observation.contact import Noise, _smoothed
 from railsim.observation.estimate import BANDS, Estimate, estimate_of, joined
 from railsim.observation.innovations import (
@@ -27,6 +27,12 @@ from railsim.track.irregularity import displacement
 
 N = 2000  # points of a piece
 STEP = 0.25  # m
+
+
+class Made(dict):
+    """A result of given histories."""
+
+    status = "complete"
 
 
 class Run:
@@ -211,6 +217,80 @@ def test_smoothed_spectra_keep_their_mean_and_noise_its_power_at_any_step():
     noise = Noise(k, np.tile(row[:, None], 4), 1e-3)
     assert noise.at(k, 0.25) == pytest.approx(np.tile(row[:, None], 4), abs=2e-12)
     assert noise.at(k, 0.5) == pytest.approx(np.tile(row[:, None] / 2.0, 4), abs=2e-12)
+
+
+def test_contact_in_the_mean_of_a_run_with_linear_contact_is_that_contact(monkeypatch):
+    """Accelerations A x + B u + gain (y - u, yaw and rates); in z and roll known white noise.
+
+    Two wheelsets 4 m apart; one state of an element that follows the first, h' = (3 y + 2 u - h)/T.
+    Noise that is alike where both pass counts twice, of opposite signs once.  y has a slow swing,
+    whose mean within the window is not zero.
+    """
+    monkeypatch.setattr(contact, "LENGTH", 400.0)
+    random, offsets, hidden, V = np.random.default_rng(5), np.array([2.0, -2.0]), 16, 25.0
+    bodies = np.append(np.tile([0, 0, 0, 0, 1, 1, 1, 1], 2), -1)
+    components = np.append(np.tile([1, 2, 3, 5], 4), -1)
+    position_of = {(int(bodies[i]), int(components[i])): i for i in range(8)}
+    A, B = np.zeros((17, 17)), np.zeros((17, 2, 4, 3))
+    A[8:16] = random.normal(size=(8, 17))
+    B[8:16, :, 0, 0] = random.normal(size=(8, 2))
+    T = 0.02  # s
+    A[hidden, [hidden, 0]], B[hidden, 0, 0, 0] = np.array([-1.0, 3.0]) / T, 2.0 / T
+    rows = np.arange(8, 16).reshape(2, 4)
+    tangent = TrackResponse(V, (), offsets, A, B, *np.zeros((3, 0)), rows, *np.zeros((2, 0)))
+    gain = random.normal(size=(2, 2, 4))  # of wheelsets, of their y and yaw
+    relative = []
+
+    def simulate(vehicle, track, **how):
+        s = np.arange(0.0, 400.0, STEP)
+        x = random.normal(scale=1e-3, size=(17, len(s)))
+        x[0] += 5e-3 * np.cos(2.0 * np.pi * s / 400.0)
+        along = s + offsets[:, None]
+        u = np.array([displacement(track)(row)[0][[0, 2]].mean(axis=0) for row in along])
+        k = 2.0 * np.pi * np.fft.rfftfreq(len(s), STEP)
+        x[hidden] = np.fft.irfft(np.fft.rfft(3.0 * x[0] + 2.0 * u[0]) / (1.0 + 1j * k * V * T))
+        acceleration = A @ x + np.einsum("nw,ws->ns", B[:, :, 0, 0], u)
+        noise = 0.1 * random.normal(size=500 + len(s))
+        for w, way in enumerate(u):
+            y, yaw = 4 * w, 4 * w + 3
+            known = np.array([x[y] - way, x[yaw], x[8 + y], x[8 + yaw]])
+            acceleration[[8 + y, 8 + yaw]] += gain[w] @ known
+            relative.append(known[0, 250:-250].std())
+            begin = 100 + int(offsets[w] / STEP)
+            own = noise[begin : begin + len(s)]
+            acceleration[[8 + y + 1, 8 + y + 2]] += own, own * (1 - 2 * w)
+        result = Made({"distance": s})
+        for name, states in (
+            ("body_position", x[:8]), ("body_velocity", x[8:16]),
+            ("body_acceleration", acceleration[8:16]),
+        ):  # fmt: skip
+            result[name] = np.zeros((len(s), 2, 6))
+            result[name][:, bodies[:8], components[:8]] = states.T
+        return result
+
+    monkeypatch.setattr(contact, "simulate", simulate)
+    linear = SimpleNamespace(
+        at=0.0,
+        coordinates=SimpleNamespace(
+            bodies=bodies, components=components, n_positions=8, position_of=position_of
+        ),
+        model=SimpleNamespace(system=SimpleNamespace(contact=SimpleNamespace(body=[0, 1]))),
+    )
+    rough = {"spectrum": "erri_b176_high", "wavelengths": [3.0, 100.0]}
+    track = load_track("straight")
+    found, noise = contact.in_the_mean(None, track, linear, tangent, rough)
+    expected, inputs = A.copy(), B.copy()
+    for w in range(2):
+        states = 4 * w + np.array([0, 3, 8, 11])
+        expected[np.ix_(rows[w, [0, 3]], states)] += gain[w]
+        inputs[rows[w, [0, 3]], w, 0, 0] -= gain[w, :, 0]
+    for matrix, by_hand in ((found.A, expected), (found.B, inputs)):
+        assert matrix == pytest.approx(by_hand, abs=3e-3)
+    assert noise.amplitude == pytest.approx(np.mean(relative), rel=0.01)
+    y, z, roll, yaw = noise.power.T
+    assert z.mean() == pytest.approx(2.0 * 0.1**2, rel=0.1)
+    assert z == pytest.approx(2.0 * roll, rel=0.05)
+    assert max(y.max(), yaw.max()) < 1e-6
 
 
 def test_estimate_of_a_piece_adds_up_its_fields_and_leaves_out_what_is_not_seen():
