@@ -102,9 +102,12 @@ def test_a_motion_that_grows_is_followed_to_its_end():
 
 @pytest.mark.parametrize("above", [0.1, 0.2])
 def test_slow_growth_just_above_the_loss_of_stability_is_followed_to_its_end(above):
-    """Within two minutes 10 um become 0.1 mm and 1.2 mm, which are no motions of their own."""
+    """Within two minutes 10 um become 0.1 mm and 1.2 mm, which are no motions of their own.
+
+    It passes 20 um by 4 % or 8 % between two looks, a known motion there is not where it ends.
+    """
     start = NormalForm().rest(LOST + above, 1e-5)
-    seen = settled(NormalForm(), start, LOST + above, LOST + above)
+    seen = settled(NormalForm(), start, LOST + above, LOST + above, [2e-5])
     assert seen.amplitude == pytest.approx(hunting(LOST + above)[0], rel=0.01)
 
 
