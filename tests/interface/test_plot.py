@@ -22,7 +22,16 @@ from railsim.plot.curving import _parted
 from railsim.plot.histories import STUDY, histories, widen
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
-from railsim.plot.style import DISTINCT, HUES, SHADES, distinct, shade, spans, wheelset_colours
+from railsim.plot.style import (
+    DISTINCT,
+    HUES,
+    SHADES,
+    distinct,
+    label_grid,
+    shade,
+    spans,
+    wheelset_colours,
+)
 from railsim.plot.track import track_figure
 from railsim.report.runs import page
 from railsim.result import Result
@@ -64,6 +73,17 @@ def test_figures_of_the_study_are_the_default(result):
 def test_title_says_how_a_run_ended_early():
     for status, words in (("complete", "(72 km/h)"), ("derailed", "(72 km/h) · derailed")):
         assert histories(example_result(status=status)).get_suptitle().endswith(words)
+
+
+def test_of_a_grid_the_lowest_axes_and_the_first_of_each_row_are_labelled():
+    """Five of two rows of three, and two of one row."""
+    for count, below, beside in ((5, [2, 3, 4], [0, 3]), (2, [0, 1], [0])):
+        axes = Figure().subplots(1 + count // 3, 3).ravel()
+        label_grid(axes, count, 3, ("x", "y"))
+        used = [one for one in axes if one.get_visible()]
+        assert used == list(axes[:count])
+        assert [used.index(one) for one in used if one.get_xlabel() == "x"] == below
+        assert [used.index(one) for one in used if one.get_ylabel() == "y"] == beside
 
 
 def test_a_limit_is_within_its_axes_where_the_values_are_rounding_errors():

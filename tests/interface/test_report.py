@@ -30,6 +30,7 @@ from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
 from railsim.definitions.vehicle.laws import Signal
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.document import day
+from railsim.report.drawings import track_svg
 from railsim.report.inputs import _settings, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published, reading
@@ -347,6 +348,41 @@ def test_tables_that_differ_far_behind_their_beginning_are_differences():
     assert key == "damper"
     assert words == ["13 rows: 0, 0; 0.01, 100; 0.02, 200; 0.03, 300; 0.04, 400..."] * 2
     assert flat_keys(bogies) == [("placements", "1 row: name front, position 9.5, 0, 0")]
+
+
+def test_a_drawn_track_has_its_curvature_and_cant_to_scale_and_wide_curves_their_radius():
+    """1 m is one unit across; of -2.5 to 2 1/km and of 0 to 50 mm each is 48 units high."""
+    track = railsim.load_track("straight").replace(
+        plan=[
+            {"type": "STR", "length": 300.0},
+            {"type": "CIR", "length": 500.0, "radius": -400.0},
+            {"type": "STR", "length": 150.0},
+            {"type": "CIR", "length": 50.0, "radius": 500.0},
+        ],
+        cant=[
+            {"type": "CST", "length": 300.0, "cant": 0.0},
+            {"type": "LIR", "length": 100.0},
+            {"type": "CST", "length": 600.0, "cant": 0.05},
+        ],
+    )
+    drawn = track_svg(track)
+    assert re.findall(r'class="curve" x="(\S+)" y="0" width="(\S+)"', drawn) == [
+        ("300.0", "500.0"), ("950.0", "50.0"),
+    ]  # fmt: skip
+    words = re.findall(r'<text x="(\S+)" [^>]*>([^<]*)<', drawn)
+    assert words == [
+        ("550.0", "R \N{MINUS SIGN}400 m"), ("4", "curvature: -2.5 to 2 1/km"),
+        ("4", "cant: 0 to 50 mm"), ("996", "s = 0 to 1000 m"),
+    ]  # fmt: skip
+    lines = [
+        dict(tuple(map(float, point.split(","))) for point in points.split())
+        for points in re.findall(r'points="([^"]*)"', drawn)
+    ]
+    zero, curvature, level, cant = lines
+    assert zero == {0.0: 43.3, 1000.0: 43.3}  # 70 - 48 2.5/4.5
+    assert [curvature[s] for s in (100.0, 550.0, 900.0, 975.0)] == [43.3, 70.0, 43.3, 22.0]
+    assert level == {0.0: 164.0, 1000.0: 164.0}
+    assert [cant[s] for s in (100.0, 350.0, 900.0)] == [164.0, 140.0, 116.0]
 
 
 def test_remarks_on_a_track_stand_beside_its_drawing_and_names_once():

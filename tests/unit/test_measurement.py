@@ -50,7 +50,9 @@ def test_table_of_a_run_shows_the_range_and_the_gaps_of_every_channel(tmp_path):
     def gap(row, name, text):
         return "" if name == "load" and 600 <= row < 750 else text
 
-    page = railsim.load_measurement(written(tmp_path, cell=gap))._repr_html_()
+    measured = railsim.load_measurement(written(tmp_path, cell=gap))
+    assert repr(measured) == "<Measurement 'run': 2 channels, 0.3 km>"  # 6 s at 50 m/s
+    page = measured._repr_html_()
     rows = [re.findall(r"<td[^>]*>([^<]*)</td>", row) for row in page.split("<tr")]
     found = {row[0]: [float(cell) for cell in row[2:]] for row in rows if len(row) == 5}
     assert found["box"] == pytest.approx([-5.0, 5.0, 0.0], rel=1e-3)
