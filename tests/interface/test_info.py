@@ -107,8 +107,24 @@ def test_spring_file_fits_on_a_screen(capsys):
     lines = lines_of(capsys, "turasas_axlebox")
     assert len(lines) < 25
     assert max(map(len, lines)) < 110
-    assert any(line.startswith("outer ") for line in lines)
+    cells = [line.split() for line in lines]
+    assert ["inner", "142", "27", "6", "338", "159"] in cells  # mm
+    for row in (["CUM", "75.8264"], ["target", "75.8264", "78.39"]):  # kN, mm
+        assert row in cells
     assert lines[-1].startswith("tables besides: fatigue, search")
+
+
+def test_mechanism_file_is_told_with_its_parameters(capsys):
+    lines = lines_of(capsys, "watt_axlebox_guide")
+    assert lines[0] == "Watt axlebox guide"
+    assert [line.partition(": ")[2] for line in lines[2:4]] == ["coupler", "left_arm, right_arm"]
+    assert lines[4:6] == ["  driven by coupler.axle", ""]
+    assert [line.split() for line in lines[7:]] == [
+        ["arm", "0.4", "m", "new"], ["coupler", "0.2", "m", "new"], ["lift", "0.06", "m", "new"],
+    ]  # fmt: skip
+    lines = lines_of(capsys, "tilting_two_springs")
+    assert "  actuators: operator, piston" in lines
+    assert "  elements: front, rear" in lines
 
 
 def test_spring_as_json_holds_the_whole_file(capsys):

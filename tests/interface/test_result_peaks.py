@@ -1,5 +1,7 @@
 """Peaks and mid-curve values of a result whose arrays are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from example_result import arrays, attributes, example_result
@@ -182,6 +184,14 @@ def test_full_curve_values_are_medians_with_their_scatter():
     low, high = np.percentile(flat["Q"][rows], [15.87, 84.13], axis=0)
     np.testing.assert_allclose(curve.scatter["Q"], 0.5 * (high - low))
     assert curve.record()["medians"]["Q"] == curve.medians["Q"].tolist()
+    # a scatter that is shown as 0, or that is not known, is not shown
+    for scatter, shown in (
+        ([1234.0, 4.9], ["60.00 ± 1.23", "60.00"]),
+        ([np.nan, 0.0], ["60.00"] * 2),
+    ):
+        values = {"medians": {"Q": np.full((1, 2), 60e3)}, "scatter": {"Q": np.array([scatter])}}
+        table = full_curve_table(flat, replace(curve, **values))
+        assert [row[-1] for row in table.rows] == shown
 
 
 @pytest.mark.parametrize(

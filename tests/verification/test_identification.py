@@ -355,6 +355,8 @@ def test_tables_scale_their_forces_only():
         ([f"{PRIMARY}+{PRIMARY}"], {}, "z is given twice"),
         (["wheel:S1002:S1002", "wheel:S1002:S1002:0:0.5"], {}, "S1002 is given twice"),
         (["bodies.body.mas"], {}, "no value 'mas'; did you mean 'mass'?"),
+        (["bodies..mass"], {}, "bodies..mass: a dotted path of keys"),
+        (["wheel:S1002:nothing"], {}, "nothing: no such profile; allowed: 49E1"),
     ],
 )
 def test_bad_input_is_one_line(found, keys, how, words):
