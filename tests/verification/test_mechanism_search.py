@@ -79,21 +79,26 @@ def test_an_optimum_keeps_its_limits_between_the_positions_too(tmp_path, workers
 def test_gradients_are_those_of_differences_where_parameters_move_the_output(
     tmp_path, kind, travel
 ):
-    """The zone lies at fixed heights: another arm reaches them at other angles."""
+    """The zone lies at fixed heights: another arm reaches them at other angles.
+
+    They are counted from where the arm begins, which a parameter turns.
+    """
     start, end = travel
     low, high = sorted((start - end) * h for h in (-0.05, -0.15))
     path = tmp_path / "arm.toml"
-    head = ARM.partition("[angles.mu]")[0]
+    head = ARM.partition("[angles.mu]")[0].replace("[ground.points]", "turn = 0.0\n[ground.points]")
+    for old, new in (("start = 0.4", start), ("end = 2.4", end)):
+        head = head.replace(old, f'{old.partition(" ")[0]} = "{new} + turn"')
     path.write_text(
-        head.replace("start = 0.4", f"start = {start}").replace("end = 2.4", f"end = {end}")
+        head
         + f"[zone]\nlow = {low}\nwork = {low}\nhigh = {high}\n"
         + f'[optimise]\nobjective = "{kind}"\nrange = "zone"\ntarget = 2.0\nslope = 3.0\n'
-        + "[optimise.bounds]\nr = [0.2, 0.4]\nd = [0.05, 0.25]\n"
+        + "[optimise.bounds]\nr = [0.2, 0.4]\nd = [0.05, 0.25]\nturn = [-0.1, 0.1]\n"
     )
-    judge, x, h = Judge(load_mechanism(path)), np.array([0.31, 0.12]), 1e-6
+    judge, x, h = Judge(load_mechanism(path)), np.array([0.31, 0.12, 0.02]), 1e-6
     found = [
         (judge(x + step, {}).objective - judge(x - step, {}).objective) / (2.0 * h)
-        for step in h * np.eye(2)
+        for step in h * np.eye(3)
     ]
     assert judge(x, {}).gradient == pytest.approx(found, rel=1e-6)
 
