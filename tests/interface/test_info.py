@@ -7,7 +7,8 @@ import pytest
 from example_result import example_result
 
 from railsim import cli
-from railsim.definitions.loading import load_vehicle
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.description.tracks import describe_track
 from railsim.plot.vehicle import vehicle_figure
 
 
@@ -96,6 +97,43 @@ def test_friction_and_widening_along_the_track_are_shown(capsys, tmp_path):
     assert "friction by table" in text
     assert "gauge widened by up to 12 mm" in text
     assert "about the inner rail" in text
+
+
+def test_what_a_track_file_gives_is_told_in_the_units_of_the_trade(capsys, tmp_path):
+    """Arc lengths in m, mileage in km, an inclination of 0.025 as 1:40."""
+    path = tmp_path / "t.toml"
+    given = [
+        'format = "railsim-track/1"', 'name = "t"', 'source = "survey"', "gauge = 1.435",
+        'plan = [{type="STR", length=250.0}]', "inclination = 0.025", "friction = [0.3, 0.4]",
+        "rounding = 8.0", "speed = 25.0", "mileage = 12300.0", "falling_mileage = true",
+        "friction_falling = {rest = 0.4, decay = 0.6}", "third_body = [1.0, 0.5]",
+    ]  # fmt: skip
+    rows = [[float(s), 0.0, 1e-3, 0.0, 1e-3] for s in range(20, 60, 10)]
+    measured = f'irregularities = [{{type = "measured", rows = {rows}, shift = 5.0}}]'
+    path.write_text("\n".join([*given, measured]))
+    lines = lines_of(capsys, str(path))
+    assert lines[:8] == [
+        "t",
+        "  250 m, gauge 1435 mm, rail 60E1 1:40, friction 0.3 / 0.4, rounded over 8 m",
+        "  permitted speed 25 m/s (90 km/h)",
+        "  mileage from km 12.300 to km 12.050",
+        "  friction with slip down to 0.4 of it, 0.6 s/m",
+        "  third body: Kalker's coefficients times 1.0 / 0.5",
+        "  source: survey",
+        "",
+    ]
+    track = load_track(path)
+    data = describe_track(track, []).data
+    assert data["mileage"] == (12300.0, 12050.0)
+    (part,) = data["irregularities"]
+    assert (part["number"], part["first"], part["last"]) == (4, 25.0, 55.0)
+    assert "rows" not in part
+    # what is not given is not told
+    plain = track.replace(falling_mileage=False, mileage=0.0, third_body=1.0)
+    text = "\n".join(map(str, describe_track(plain, []).parts))
+    assert "friction 0.3 / 0.4" in text
+    assert "mileage" not in text
+    assert "third body" not in text
 
 
 def test_remarks_are_shown(capsys):
