@@ -34,6 +34,17 @@ def test_speed_in_kilometres_an_hour_is_seen(capsys):
     """80, meant as km/h, is read as m/s."""
     lines = lines_of(capsys, "coach_manchester", "--set", "service.admissible_speed=80")
     assert "  service: passenger, up to 288 km/h and 150 mm of cant deficiency" in lines
+def test_axleboxes_and_elements_of_a_vehicle_are_told_with_their_numbers(capsys):
+    """Two bogies of two wheelsets with two axleboxes each, which only pitch."""
+    lines = lines_of(capsys, "coach_25t")
+    cells = [line.split() for line in lines]
+    box = ["axlebox", "rear.outer.wheelset", "0", "0", "8", "0", "-10.300"]  # 8.43 kg m2
+    assert ["rear.outer.arm.left", *box, "-1.000", "-0.458"] in cells
+    body = ["carbody", "body", "38600", "92800", "2821000", "2795000", "0.000", "0.000", "-2.081"]
+    assert body in cells
+    numbers = {row[0]: int(row[2]) for row in cells if row and row[0].startswith("bogie.")}
+    assert numbers["bogie.axle.arm_bush"] == 8
+    assert f" {sum(numbers.values())} elements" in lines[1]
 
 
 def test_vehicle_as_json_is_placed_and_mirrored(capsys):
