@@ -139,6 +139,8 @@ def test_what_a_track_file_gives_is_told_in_the_units_of_the_trade(capsys, tmp_p
     (part,) = data["irregularities"]
     assert (part["number"], part["first"], part["last"]) == (4, 25.0, 55.0)
     assert "rows" not in part
+    rising = describe_track(track.replace(falling_mileage=False), [0.5])  # m/s
+    assert "  mileage from km 12.300 to km 12.550" in rising.parts
     # what is not given is not told
     plain = track.replace(falling_mileage=False, mileage=0.0, third_body=1.0)
     text = "\n".join(map(str, describe_track(plain, []).parts))
