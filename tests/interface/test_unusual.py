@@ -169,7 +169,8 @@ def test_a_damper_counts_for_the_bounce_unless_a_spring_is_in_series(kind, serie
         damper = {key: [0.0, 0.0, value] for key, value in along.items()} | STOP
         del damper["axis"]
     unusual = vehicle(spring={"damping": [0.0, 0.0, 0.0]}, damper={**damper, "kind": kind})
-    found = [remark.text.partition(",")[0] for remark in vehicle_remarks(unusual, supports=False)]
+    texts = [remark.text for remark in vehicle_remarks(unusual, supports=False)]
+    found = [text.partition(",")[0] for text in texts if "bounce" in text]
     assert found == (["damping ratio 62.5 of its bounce"] if series == 0.0 else [])
 
 
