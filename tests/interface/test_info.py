@@ -34,6 +34,8 @@ def test_speed_in_kilometres_an_hour_is_seen(capsys):
     """80, meant as km/h, is read as m/s."""
     lines = lines_of(capsys, "coach_manchester", "--set", "service.admissible_speed=80")
     assert "  service: passenger, up to 288 km/h and 150 mm of cant deficiency" in lines
+
+
 def test_axleboxes_and_elements_of_a_vehicle_are_told_with_their_numbers(capsys):
     """Two bogies of two wheelsets with two axleboxes each, which only pitch."""
     lines = lines_of(capsys, "coach_25t")
