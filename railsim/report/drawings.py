@@ -154,7 +154,7 @@ def track_svg(track: Track) -> str:
         text = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, y, strict=True))
         shapes.append(f'<polyline class="rail" points="0,{zero:.1f} {width:.0f},{zero:.1f}"/>')
         shapes.append(f'<polyline class="k0" points="{text}"/>')
-        shown = f"{words}: {low:.4g} to {high:.4g} {unit}"
+        shown = f"{words}: {values.min():.4g} to {values.max():.4g} {unit}"
         shapes.append(f'<text x="4" y="{top + 14:.0f}">{shown}</text>')
     words = f"s = 0 to {track.length:.6g} m"
     shapes.append(f'<text x="{width - 4:.0f}" y="14" text-anchor="end">{words}</text>')

@@ -148,6 +148,7 @@ def test_what_a_track_file_gives_is_told_in_the_units_of_the_trade(capsys, tmp_p
     text = "\n".join(map(str, describe_track(plain, []).parts))
     assert "friction 0.3 / 0.4" in text
     assert "mileage" not in text
+    assert "rail 60E1 upright," in describe_track(track.replace(inclination=0.0), []).parts[1]
     assert "third body" not in text
 
 
