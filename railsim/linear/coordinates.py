@@ -146,8 +146,8 @@ class FreeVehicle:
     """x' = f(x) of a vehicle about a state of steady rolling, the reference body's x free.
 
     The kernels keep the reference body's x; in free running they say by which V' they do so.  Added
-    back to all bodies, with the traction that keeps the speed, it gives the motion of the free body
-    seen from frames that move at constant speed.
+    back to all bodies, it gives the motion of the free body seen from frames that move at constant
+    speed.  The traction that would keep the speed in a curve does not change the derivatives.
 
     `model`: with preloads; `system`: on its track; `state`: steady rolling; `held`: whether the
     wheelsets are held; `hold`: other bodies that are held, as in `coordinates`.
@@ -174,12 +174,8 @@ class FreeVehicle:
         reference = bodies.reference
         self._reference = 6 * reference, 6 * self._n + 6 * reference
         self.system = system._replace(drive=Drive(FREE, np.zeros((1, 2)), np.zeros(3)))
-        change = self.evaluate(state)[-1]
+        self.evaluate(state)  # for the frames
         self._is_straight = not self.work.frames[:, OMEGA : OMEGA + 3].any()
-        along = self._directions(state[None])[0][np.flatnonzero(self._whole == reference)[0], 0]
-        # the traction without which the vehicle would slow down in the curve
-        force = -change * float(along * bodies.mass[reference])
-        self.system = system._replace(drive=Drive(FREE, np.array([[0.0, force]]), np.zeros(3)))
 
     @property
     def x(self) -> Floats:
