@@ -97,6 +97,7 @@ def folder_of(file: str) -> Path:
 def described_runs(file: str) -> "Description":
     """Return the runs of a study or of a folder: how they ended, and what tells them apart."""
     from railsim.description import Description
+    from railsim.description.values import short
     from railsim.table import Table
 
     found = gather([file])
@@ -107,7 +108,8 @@ def described_runs(file: str) -> "Description":
         {"run": record["name"], **record["labels"], "status": record["status"]}
         for record in found.records
     ]
-    table = Table(["run", *keys, "status"], ({k: str(v) for k, v in row.items()} for row in rows))
+    shown = ({key: short(value) for key, value in row.items()} for row in rows)
+    table = Table(["run", *keys, "status"], shown)
     title = f"{folder_of(file)}: {len(rows)} run{'s' * (len(rows) != 1)}, {ended}"
     data = {"kind": "runs", "folder": str(folder_of(file)), "status": statuses, "runs": rows}
     return Description(data, [title, "", table, *found.remarks])
