@@ -7,6 +7,7 @@ Whoever tells its progress also hears of an interrupt that was lost, see `railsi
 
 import logging
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread, main_thread
@@ -17,6 +18,7 @@ from railsim.cli.terminal import echo
 from railsim.text import counted_remarks
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing
+BETWEEN = 60.0  # seconds between lines in a log
 COMPILING = "preparing: compiling (after an installation; about a minute, kept for later)"
 UNCACHED = "not kept: there is no folder for it, give one by RAILSIM_CACHE_DIR"
 CAUSES = {
@@ -58,8 +60,8 @@ def _report_causes(ended: Event) -> None:
 def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]]:
     """Give a function that takes the finished fraction and shows it.
 
-    `words`: what is going on; `quiet`: show nothing at all. Without a terminal there is no bar
-    either.
+    `words`: what is going on; `quiet`: show nothing at all. Without a terminal, as in a log, lines
+    instead of a bar: for every twentieth, and one a minute at most.
     """
     raise_pending_signal()
     if quiet:
@@ -82,9 +84,15 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     doing = logging.getLogger("railsim.doing")
     before, handler = doing.level, _Words(bar, words)
 
+    told = time.monotonic(), 0.0  # when a line was printed, and of how much
+
     def show(fraction: float) -> None:
+        nonlocal told
         raise_pending_signal()
         bar.update(fraction - bar.n)
+        if bar.disable and fraction >= told[1] + 0.05 and time.monotonic() >= told[0] + BETWEEN:
+            told = time.monotonic(), fraction
+            echo(f"{words}: {100.0 * fraction:.0f} %", err=True)
 
     doing.setLevel(logging.INFO)
     doing.addHandler(handler)

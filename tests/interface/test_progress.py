@@ -54,6 +54,15 @@ def test_nothing_is_said_where_nothing_is_prepared(capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_a_log_gets_lines_that_are_a_twentieth_apart(capsys, monkeypatch):
+    for between in (60.0, 0.0):
+        monkeypatch.setattr(progress, "BETWEEN", between)
+        with progress.progress_bar("wear", quiet=False) as show:
+            for hundredths in range(11):
+                show(0.01 * hundredths)
+    assert capsys.readouterr().err.splitlines() == ["wear: 5 %", "wear: 10 %"]
+
+
 def record(number, status="complete", value=1e3):
     peaks = [{"quantity": "sum_Y", "kind": "abs", "value": value}]
     remarks = [f"hunts at {number} Hz", "is too long"]
