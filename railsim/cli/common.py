@@ -357,7 +357,8 @@ class Output:
         """Return the file of ``--out``, by default another with this suffix; refuse it early."""
         path = Path(self.out or default)
         if not self.out and path.name and suffix:
-            path = path.with_suffix(suffix)
+            # a name of the library may end in a number: turnout_245_1in9.25
+            path = path.with_name((path.stem if path.suffix[1:2].isalpha() else path.name) + suffix)
         access.check_file(path, overwrite=self.overwrite, endings=endings)
         return path
 

@@ -28,7 +28,7 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 @click.command()
 @click.argument("file", metavar="R.h5|STUDY|TRACK")
 @click.argument("selections", nargs=-1, metavar="[QUANTITY]...")
-@cli.option("--out", "Picture (.png, .svg, .pdf); default FILE.png.", "F.png")
+@cli.option("--out", "Picture (.png, .svg, .pdf); default FILE.png, FILE_recording.png.", "F.png")
 @cli.choice("--over", "Horizontal axis; the reference body's distance.", "distance|time")
 @cli.choice("--by", "Axes for all wheels, or for each wheelset.", "wheel|wheelset")
 @cli.option("--between", "Range of the horizontal axis to show.", "A B", float, nargs=2)
@@ -77,7 +77,8 @@ def command(
     default = folder / "study" if of_study and folder.name else folder
     if not folder.parent.is_dir():  # then it is the file that is missing, not its place
         default = Path(folder.name)
-    path = output.file(default, PICTURES, suffix=".png")
+    recording = selections == (RECORDING,) and not (result or of_study)
+    path = output.file(default, PICTURES, suffix=f"_{RECORDING}.png" if recording else ".png")
     options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
         figure = _study_figure(str(folder), selections, *options.values())

@@ -366,6 +366,12 @@ def test_track_is_drawn_by_name(tmp_path, monkeypatch, capsys):
     assert "quantities belong to results" in capsys.readouterr().err
 
 
+def test_tracks_whose_names_begin_alike_have_pictures_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", "turnout_245_1in9.25"]) == 0
+    assert os.listdir() == ["turnout_245_1in9.25.png"]
+
+
 def test_track_figure_shows_everything_that_changes_along_the_track():
     track = load_track("curve_r250").replace(
         friction_table=[[0.0, 0.4], [100.0, 0.4, 0.2]],
@@ -487,7 +493,9 @@ def test_legend_of_an_overlay_has_as_many_columns_as_fit(result, words, count, c
     assert figure.legends[0]._ncols == columns
 
 
-def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(tmp_path, capsys):
+def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(
+    tmp_path, capsys, monkeypatch
+):
     """Offsets at a chord, of rails of ERRI B176: what acts has that spectrum again.
 
     Means over a third of a decade of 32 averaged spectra: 15 %.
@@ -510,8 +518,9 @@ def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(tmp_path,
         "plan = [{ type = 'STR', length = 3000.0 }]\n[[irregularities]]\ntype = 'measured'\n"
         "file = 'record.csv'\nchord = [4.0, 6.0]\nscale = 1.0\n"
     )
-    out = tmp_path / "record.png"
-    assert main(["plot", str(tmp_path / "line.toml"), "recording", "--out", str(out)]) == 0
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", "line.toml", "recording"]) == 0
+    out = tmp_path / "line_recording.png"  # line.png is that of the track
     assert out.stat().st_size > 50_000
     data = read_source(tmp_path / "line.toml", "track").data
     ((name, before, after),) = recordings(data["irregularities"])
