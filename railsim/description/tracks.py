@@ -21,6 +21,8 @@ _COPIED = (
     "gauge_widening", "cant_rotation", "third_body", "rounding", "speed",
 )  # fmt: skip
 
+ENDS = ("begin", "end")
+
 
 def _checked(speed: float | str) -> float:
     value = speed_in_si(speed)
@@ -49,13 +51,14 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
     if speeds_si and any("cant_deficiency" in row for row in data["plan"]):
         parts.append("columns of speeds: cant deficiency in mm")
     ends = [Column("begin", "from", "m", "g"), Column("end", "to", "m", "g")]
-    vertical = [
-        [row["type"], row["begin"], row["end"], _range(row["values"], 1e3)]
-        for row in data["vertical"]
-    ]
-    gradient = Column("gradient", "gradient per mille", format=">")
-    if vertical:
-        parts += ["", Table([Column("vertical"), *ends, gradient], vertical)]
+    # the plan's table has the cant at the ends of its elements only
+    ramps = {round(r[end], 6) for r in data["cant"] if r["type"] == "LIR" for end in ENDS}
+    within = ramps - {round(r[end], 6) for r in data["plan"] for end in ENDS}
+    for name, words in (("cant", "cant (mm)"), ("vertical", "gradient per mille")):
+        if not (within if name == "cant" else data[name]):
+            continue
+        rows = [[r["type"], r["begin"], r["end"], _range(r["values"], 1e3)] for r in data[name]]
+        parts += ["", Table([Column(name), *ends, Column("values", words, format=">")], rows)]
     irregular = [
         [str(part["type"]), ", ".join(f"{k} {short(v)}" for k, v in part.items() if k != "type")]
         for part in data["irregularities"]

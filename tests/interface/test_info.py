@@ -92,6 +92,14 @@ def test_gradients_are_shown(capsys, tmp_path):
     assert any("0 to 10" in line for line in lines_of(capsys, str(path)))
 
 
+def test_cant_within_an_element_of_the_plan_is_shown(capsys):
+    lines = lines_of(capsys, "twist")  # 50 mm on one straight
+    assert lines[lines.index("CST          0      50           0") + 2].split() == [
+        "LIR", "65", "67.5", "32.5", "to", "50",
+    ]  # fmt: skip
+    assert not any(line.startswith("LIR") for line in lines_of(capsys, "curve_r250"))
+
+
 def test_irregularities_are_shown(capsys):
     option = 'irregularities=[{type="random", spectrum="erri_b176_low", seed=7}]'
     lines = lines_of(capsys, "straight", "--set", option)
