@@ -124,7 +124,7 @@ def _safety(run: str, report: SafetyReport) -> list[Table]:
     wheels = [
         Column("place", run), Column("limit", "Nadal", format=".3f"),
         Column("Y_over_Q", "largest Y/Q", format=".3f"),
-        Column("climb_distance", "climb", "m", ".2f"), Column("rise", unit="mm", format=".2f"),
+        Column("climb_distance", "climb", "m", ".2f"), Column("rise", "rise on it", "mm", ".2f"),
         Column("lifted", "off its rail"),
     ]  # fmt: skip
     rows = [vars(w) | {"lifted": "yes" if w.lifted else ""} for w in report.wheels]
