@@ -51,10 +51,10 @@ def check_rails(flat: FlatVehicle, track: Track, profiles: dict[str, Profile]) -
         return NONE
     rows, tables, first = [], [], 0
     for rail in track.check_rail:
-        last = first + len(rail.flangeway) - 1
+        last = first + len(rail.rows) - 1
         side = 0 if rail.rail == "left" else 1
         rows.append([side, first, last, rail.stiffness, rail.damping, rail.friction])
-        tables += list(rail.flangeway)
+        tables += rail.rows
         first = last + 1
     wheels = np.array(
         [

@@ -8,8 +8,8 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.track.check_rail import CheckRail
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
-from railsim.model.check_rails import flange_back
-from railsim.profiles import Profile
+from railsim.model.check_rails import check_rails, flange_back, standing_at
+from railsim.profiles import Profile, load_profile
 from railsim.simulation import simulate
 
 # contour of the check rail of crossing 56E1-R245-1:9.25 where it is narrowest, and flange of the
@@ -122,6 +122,31 @@ def test_check_rail_that_is_out_of_reach_changes_nothing():
 def test_wrong_check_rails_are_refused(wrong, said):
     with pytest.raises(InputError, match=said):
         curve([{**RAIL, **wrong}])
+
+
+def test_contact_facing_and_trailing_is_at_mirrored_places():
+    """The same list about s = 60 m: what is d ahead of it in one is d behind it in the other."""
+    rows = [[-10.0, 0.060], [-7.0, 0.040], [5.0, 0.041], [6.0, 0.066]]
+    rail = CheckRail(rail="right", flangeway=rows, shift=60.0)
+    flat = flatten(load_vehicle("coach_manchester"))
+    known = {n: load_profile(n) for n in flat.of_kind("wheelset")[0].wheelset.profile}
+    facing, trailing = (
+        check_rails(flat, curve([one]), known)
+        for one in (rail, rail.model_copy(update={"trailing": True}))
+    )
+    np.testing.assert_array_equal(facing.check_wheel, trailing.check_wheel)
+    d = np.linspace(-10.0, 6.0, 33)
+    for s in (50.1, 53.0, 62.5, 65.9):
+        there, mirrored = standing_at(facing, s), standing_at(trailing, 120.0 - s)
+        np.testing.assert_allclose(there.check_flangeway, mirrored.check_flangeway, rtol=1e-12)
+    widths = [
+        np.interp(60.0 + sign * d, *found.check_flangeway.T)
+        for sign, found in ((1.0, facing), (-1.0, trailing))
+    ]
+    np.testing.assert_allclose(*widths, rtol=1e-12)
+    assert not len(standing_at(trailing, 51.0).check)  # a facing one stands there
+    with pytest.raises(InputError, match="trailing"):
+        curve([{**RAIL, "trailing": 1}])
 
 
 @pytest.mark.parametrize("how", ["run-in", "steady"])

@@ -29,6 +29,11 @@ class CheckRail(base.Definition):
     ]
     """Rows [s, width] from its begin to its end, linear in between, or one width all along: from
     the gauge face of the running rail to its own face, both 14 mm below the rail tops [m]"""
+    shift: base.Finite = 0.0
+    """Added to the arc lengths of `flangeway` [m]"""
+    trailing: base.Flag = False
+    """Whether the rows are passed from their end to their beginning: their arc lengths change their
+    sign before `shift` is added"""
     height: Annotated[base.Finite, Field(ge=-0.02, le=0.08)] = 0.0
     """Height of its top above the tops of the running rails [m]"""
     profile: (
@@ -43,6 +48,12 @@ class CheckRail(base.Definition):
     """Lateral stiffness with its fastening [N/m]"""
     damping: base.NonNegative = 5e4
     """Its damping [N s/m]"""
+
+    @property
+    def rows(self) -> tuple[tuple[float, float], ...]:
+        """Rows [s, width] along the track [m]."""
+        sign = -1 if self.trailing else 1
+        return tuple((sign * s + self.shift, width) for s, width in self.flangeway[::sign])
 
     def mirrored(self) -> Self:
         """Return the same beside the other rail."""

@@ -142,9 +142,7 @@ def _spans(track: "Track") -> Iterator[tuple[str, float, float, float | None]]:
         yield f"irregularities.{k}", *shape.extent(track.length), shift
     for k, part in enumerate(track.sections):
         yield f"sections.{k}", part.begin, part.end, None
-    tables: dict[str, Any] = {
-        f"check_rail.{k}": c.flangeway for k, c in enumerate(track.check_rail)
-    }
+    tables: dict[str, Any] = {f"check_rail.{k}": c.rows for k, c in enumerate(track.check_rail)}
     tables |= {key: getattr(track, key) for key in ("gauge_widening", "friction_table")}
     for key, rows in (tables | {"support.variation": track.support.variation}).items():
         if rows and len(rows) > 1:
