@@ -129,6 +129,19 @@ def test_contradicting_track_is_refused(plan, cant, expected):
         ),
         # from 12100 to 12150 m with its shift of 100 m; its first row is at 12000 m
         ([STRAIGHT], [], {"irregularities": [RECORDED]}, "shift = -12000 puts its begin at s = 0"),
+        (  # the track begins at km 11.95
+            [STRAIGHT],
+            [],
+            {"irregularities": [RECORDED], "mileage": 11_950.0},
+            "shift = -11950 puts its begin at s = 50",
+        ),
+        (
+            [STRAIGHT],
+            [],
+            {"irregularities": [{**RECORDED, "shift": -12000.0}], "mileage": 11_950.0},
+            "begins at km 12.0000, which is put at s = 0 m, km 11.9500 of the track; "
+            "shift = -11950 makes them agree",
+        ),
     ],
 )
 def test_unusual_track_is_remarked_on(plan, cant, more, expected):

@@ -523,7 +523,18 @@ def test_columns_units_signs_decimal_comma_and_mileage_of_a_recording(tmp_path):
         units='{ s = "km", z_left = "mm", y_right = "mm" }',
         reverse='["z_left"]',
         falling_mileage="true",
-    ).irregularities[0]
+    )
+    assert [r for r in found.unusual() if "km" in str(r)] == []  # the track has no mileage
+    for more, words in (
+        ({"falling_mileage": True}, "shift = -250 makes them agree"),
+        ({"falling_mileage": False}, "the file's mileage falls, that of the track rises"),
+    ):
+        (said,) = (
+            str(r) for r in found.replace(mileage=12_050.0, **more).unusual() if r.key[-1:] == "0"
+        )
+        assert "begins at km 12.3000, which is put at s = 0 m, km 12.0500 of the track" in said
+        assert said.endswith(words)
+    found = found.irregularities[0]
     expected = [[i, 0.0, -1e-3 * i, 1e-3 * (2 * i + 0.5), 0.0] for i in range(6)]
     np.testing.assert_allclose(found.rows, expected, atol=1e-9)
     assert found.columns is None

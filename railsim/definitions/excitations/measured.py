@@ -53,6 +53,8 @@ class Measured(base.Irregular):
     shortest and longest [m]"""
     rows: Annotated[tuple[Row, ...], rises("arc length")] | None = None
     """What was read: rows of s, y_left, z_left, y_right, z_right [m]"""
+    mileage: Finite | None = None
+    """Mileage of the first of the `rows` where it falls, as read [m]: compared with the track's"""
     shift: Finite = 0.0
     """Added to the arc lengths of the file [m]"""
     scale: Finite = 1.0
@@ -66,6 +68,8 @@ class Measured(base.Irregular):
             raise ValueError("either 'file' or 'rows' is needed")
         if self.rows is not None and len(self.rows) < 4:
             raise ValueError("four rows at least are needed")
+        if self.rows is None and self.mileage is not None:
+            raise ValueError("'mileage' belongs to 'rows' and does not go with 'file'")
         if self.rows is not None:
             given = [key for key in READING if getattr(self, key) not in (None, (), False)]
             if given:

@@ -55,10 +55,12 @@ def _embed(key: str, table: dict[str, Any]) -> None:
     if how is None:
         return  # refused by the definition
     with changed_faults(lambda one: one if one.file else replace(one, key=f"{key}.{one.key}")):
-        rows = read_measured(path, how)
+        rows, mileage = read_measured(path, how)
     for name in ("file", *READING):
         table.pop(name, None)
     table["rows"] = rows.tolist()
+    if mileage is not None:
+        table["mileage"] = mileage
 
 
 def _definition(table: dict[str, Any]) -> Measured | None:
@@ -82,7 +84,7 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
             continue
         plain = how.model_copy(update={"chord": None, "band": None})
         path = Path(table["file"])
-        before, after = (read_measured(path, one) for one in (plain, how))
+        before, after = (read_measured(path, one)[0] for one in (plain, how))
         before[:, 0] += how.shift
         after[:, 0] += how.shift
         after[:, 1:] *= how.scale
@@ -90,8 +92,11 @@ def recordings(tables: Iterable[Any]) -> list[tuple[str, Floats, Floats]]:
     return found
 
 
-def read_measured(path: Path, how: Measured) -> Floats:
-    """Read rows [s, y_left, z_left, y_right, z_right] in m; raises InputError."""
+def read_measured(path: Path, how: Measured) -> tuple[Floats, float | None]:
+    """Read rows [s, y_left, z_left, y_right, z_right] and a falling mileage of the first, in m.
+
+    Raises InputError.
+    """
     try:
         text = read_bytes(path, TABLE_BYTES).decode(how.encoding or "utf-8-sig")
         return _rows_of(path, text, how)
@@ -114,7 +119,7 @@ class Column(NamedTuple):
     offset: float = 0.0  # value of the undisplaced rails
 
 
-def _rows_of(path: Path, text: str, how: Measured) -> Floats:
+def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None]:
     numbered = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -141,13 +146,13 @@ def _rows_of(path: Path, text: str, how: Measured) -> Floats:
         except ValueError as problem:
             faults.append((number, *problem.args))
     values = np.array(table).reshape(len(table), len(named))
-    rows = _rows(named, values, how)
+    rows, mileage = _rows(named, values, how)
     faults += [(numbers[k], what, allowed) for k, what, allowed in _row_faults(rows, named, values)]
     faults.sort(key=lambda fault: fault[0])
     Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
         raise input_error(str(path), f"{len(rows)} rows", "four rows at least")
-    return _filtered(path, rows, how)
+    return _filtered(path, rows, how), mileage
 
 
 def _check_once(path: Path, names: set[str]) -> None:
@@ -189,13 +194,15 @@ def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[flo
     return values
 
 
-def _rows(columns: Sequence[Column], values: Floats, how: Measured) -> Floats:
+def _rows(columns: Sequence[Column], values: Floats, how: Measured) -> tuple[Floats, float | None]:
     rows = np.zeros((len(values), 5))
     for (name, unit, offset), written in zip(columns, values.T, strict=True):
         rows += np.outer(written - offset, np.multiply(SHARES[name], unit))
-    if how.falling_mileage:
-        rows[:, 0] = rows[:1, 0] - rows[:, 0]
-    return rows
+    if not how.falling_mileage or not len(rows):
+        return rows, None
+    mileage = float(rows[0, 0])
+    rows[:, 0] = mileage - rows[:, 0]
+    return rows, mileage
 
 
 def _row_faults(

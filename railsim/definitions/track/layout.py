@@ -30,6 +30,8 @@ ASTRAY_CANT = 1e-3
 MOST_FRICTION = 1.0
 # Stiffness of a support that is remarked on [N/m]: under 50 kN it would yield by 50 mm.
 SOFTEST = 1e6
+# Difference of mileage that is remarked on [m].
+SAME_MILEAGE = 0.5
 # Smallest cant that counts as cant, smallest difference of length that counts [m].
 SMALL = 1e-6
 
@@ -130,8 +132,36 @@ def track_remarks(track: "Track") -> list[Remark]:
             span = f"from {begin:g} to {end:g} m" if begin <= end else f"from {begin:g} m on"
             text = f"{span}, beyond the track's {track.length:g} m"
             if shift is not None:
-                text += f"; is it a mileage? shift = {shift - begin:g} puts its begin at s = 0"
+                to = shift - begin if track.falling_mileage else -track.mileage or shift - begin
+                at = begin - shift + to
+                text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
             remarks.append(Remark(key, text))
+    return remarks + _mileages(track)
+
+
+def _mileages(track: "Track") -> list[Remark]:
+    """Remark on recordings that are put where the mileage of the track is another one."""
+    remarks = []
+    for k, part in enumerate(track.irregularities):
+        if not isinstance(part, Measured) or not (track.mileage or track.falling_mileage):
+            continue
+        begin, own = part.extent(track.length)[0], part.mileage
+        alike = (own is None) != track.falling_mileage
+        if own is None and part.shift and alike:
+            s = begin - part.shift
+            if 0.5 * track.mileage <= s and abs(s - track.mileage) <= track.length:
+                own = s  # the file's s is a mileage
+        there = float(track.mileage_at(begin))
+        if own is None or (alike and abs(there - own) < SAME_MILEAGE):
+            continue
+        text = f"begins at km {1e-3 * own:.4f}, which is put at s = {begin:g} m, km "
+        text += f"{1e-3 * there:.4f} of the track"
+        if alike:
+            shift = part.shift + (there - own if track.falling_mileage else own - there)
+            text += f"; shift = {shift:.9g} makes them agree"
+        else:
+            text += "; the file's mileage falls, that of the track rises"
+        remarks.append(Remark(f"irregularities.{k}", text))
     return remarks
 
 
