@@ -295,9 +295,10 @@ def test_springs_and_stops_of_a_loaded_wagon(capsys):
 
 def test_runs_of_a_folder_are_listed_whichever_way_it_is_given(capsys, tmp_path):
     for name, gain in (("one", 1.0), ("two", 0.9)):
-        example_result(gain=gain).to_hdf5(tmp_path / f"{name}.h5")
+        example_result(gain=gain, speed=100.0 / 3.6).to_hdf5(tmp_path / f"{name}.h5")
     lines = lines_of(capsys, str(tmp_path))
     assert lines[0].endswith("2 runs, 2 complete")
+    assert "27.7778" in lines[3].split()
     assert [line.split()[0] for line in lines[3:5]] == ["one", "two"]
     data = data_of(capsys, str(tmp_path))
     assert [run["status"] for run in data["runs"]] == ["complete", "complete"]
