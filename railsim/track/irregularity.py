@@ -13,7 +13,7 @@ from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import Measured, largest_between_rows
-from railsim.definitions.track.layout import cant_sections
+from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
 from railsim.errors import input_error, nearest
@@ -24,6 +24,7 @@ from railsim.laws.permission import permitted_part
 BEYOND_ROWS = 1.05
 # Least cant and length at which a cross level is held against it, and share of it that is doubtful.
 CANTED, LONG, TWICE = 0.02, 30.0, 0.5  # m, m, 1
+VERSINE = 0.01  # m; mean alignment in a curve that is doubtful
 LARGEST = 0.5  # m; of a law of one's own
 
 
@@ -80,9 +81,9 @@ def shortest_length(track: Track) -> float:
 
 
 def measured_remarks(track: Track) -> list[str]:
-    """Remark on records between whose rows the rails go further than at them, on gaps and cant.
+    """Remark on records between whose rows the rails go further than at them, on gaps and curves.
 
-    Further by 5 % or more; gaps of five steps or more.
+    Further by 5 % or more; gaps of five steps or more; cant or versines in the record.
     """
     remarks = []
     for index, part in enumerate(track.irregularities):
@@ -95,7 +96,7 @@ def measured_remarks(track: Track) -> list[str]:
                 f"{found.column} reaches {1e3 * found.between:.3g} mm at s = {found.s:.1f} m, "
                 f"the largest row is {1e3 * found.at_rows:.3g} mm."
             )
-        remarks += _gap_remarks(part, index) + _cant_remarks(part, index, track)
+        remarks += _gap_remarks(part, index) + _held_remarks(part, index, track)
     return remarks
 
 
@@ -113,24 +114,33 @@ def _gap_remarks(part: Measured, index: int) -> list[str]:
     ]
 
 
-def _cant_remarks(part: Measured, index: int, track: Track) -> list[str]:
-    """Remark on a cross level that holds the cant, which the track has already."""
+def _held_remarks(part: Measured, index: int, track: Track) -> list[str]:
+    """Remark on a cross level or an alignment that holds the cant or the curves of the track."""
     rows = np.array(part.rows or ())
-    for section in cant_sections(track):
-        cant, middle = section.start_value, 0.5 * (section.begin + section.end)
-        inside = (rows[:, 0] + part.shift >= section.begin) & (
-            rows[:, 0] + part.shift < section.end
-        )
-        if cant != section.end_value or abs(cant) < CANTED or not inside.any():
-            continue
-        s, level = rows[inside, 0], part.scale * (rows[inside, 4] - rows[inside, 2])
-        if np.ptp(s) >= LONG and abs(mean := float(level.mean())) > TWICE * abs(cant):
-            return [
-                f"The cross level of irregularities.{index} is {1e3 * mean:.0f} mm in the mean "
-                f"about s = {middle:.0f} m, where the track has {1e3 * cant:.0f} mm of cant: they "
-                "add up. Where it is the same cant, band takes it out."
-            ]
-    return []
+    s, rails = rows[:, 0] + part.shift, part.scale * rows[:, 1:]
+    remarks = []
+    for word, sections, values in (
+        ("cross level", cant_sections(track), rails[:, 3] - rails[:, 1]),
+        ("alignment", curvature_sections(track), max(rails[:, 0], rails[:, 2], key=np.ptp)),
+    ):
+        for section in sections:
+            own, middle = section.start_value, 0.5 * (section.begin + section.end)
+            inside = (s >= section.begin) & (s < section.end)
+            if own != section.end_value or not own or not inside.any():
+                continue
+            mean = float(values[inside].mean()) if np.ptp(s[inside]) >= LONG else 0.0
+            if word == "alignment" and abs(mean) > VERSINE:
+                there, same = f"in the curve of {1.0 / own:.6g} m", "the versine of this curve"
+            elif word != "alignment" and abs(mean) > TWICE * abs(own) >= TWICE * CANTED:
+                there, same = f"where the track has {1e3 * own:.0f} mm of cant", "the same cant"
+            else:
+                continue
+            remarks.append(
+                f"The {word} of irregularities.{index} is {1e3 * mean:.0f} mm in the mean about "
+                f"s = {middle:.0f} m, {there}: they add up. Where it is {same}, band takes it out."
+            )
+            break
+    return remarks
 
 
 def _widening(track: Track) -> Displacement:

@@ -654,6 +654,30 @@ def test_a_cross_level_that_holds_the_cant_is_remarked_on(level, remarked):
         assert f"is {level:.0f} mm in the mean about s = 390 m" in found[0]
 
 
+@pytest.mark.parametrize("alike", [True, False])
+def test_an_alignment_that_holds_the_versines_of_a_curve_is_remarked_on(alike):
+    """A chord of 10 m in a right-hand curve of 500 m: (5 m)^2/(2 500 m) = 25 mm, to the left."""
+    s = np.arange(0.0, 500.0, 0.5)
+    y = -25e-3 * np.interp(s, [300.0, 360.0, 420.0, 480.0], [0.0, 1.0, 1.0, 0.0]) * alike
+    y += 3e-3 * np.sin(s)
+    rows = [(a, b, 0.0, b, 0.0) for a, b in zip(s.tolist(), y.tolist(), strict=True)]
+    part = {"type": "measured", "rows": rows}
+    found = measured_remarks(load_track("curve_r500").replace(irregularities=[part]))
+    assert len(found) == alike
+    if alike:
+        assert "alignment of irregularities.0 is -25 mm in the mean about s = 390 m, in" in found[0]
+        assert "in the curve of 500 m" in found[0]
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("in", 0.0254), ("ft", 0.3048), ("mm", 0.001)])
+def test_units_of_columns(tmp_path, unit, metres):
+    rows = "\n".join(f"{2 * k},{0.01 * k}" for k in range(5))
+    track = recorded(tmp_path, f"s_ft,z_left_{unit}\n{rows}")
+    found = np.array(track.irregularities[0].rows)
+    np.testing.assert_allclose(found[:, 0], 0.6096 * np.arange(5.0), rtol=1e-12)
+    np.testing.assert_allclose(found[:, 2], 0.01 * metres * np.arange(5.0), rtol=1e-12)
+
+
 def test_largest_value_between_the_rows_is_reported(tmp_path):
     """Eight rows a wave: with one on the crest, and with the crest between two."""
     s = np.arange(0.0, 60.0, 1.0)
