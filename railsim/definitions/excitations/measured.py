@@ -35,7 +35,7 @@ class Measured(base.Irregular):
     columns: dict[Text, Text] | None = None
     """Names of the file's columns by ours, where they differ: `{ s = "Mileage", z_left = "LL" }`;
     columns that are not named are not read"""
-    units: dict[Text, Literal["m", "mm", "km"]] | None = None
+    units: dict[Text, Literal["m", "mm", "km", "in", "ft"]] | None = None
     """Units by our names of the columns, `{ s = "km", z_left = "mm" }`; by default as the names
     say"""
     offset: dict[Text, Finite] | None = None

@@ -19,7 +19,7 @@ from railsim.definitions.excitations.recording import BANDS, band_passed, equal_
 from railsim.errors import Fault, Faults, changed_faults, counted, input_error, nearest
 from railsim.files.access import TABLE_BYTES, read_bytes
 
-UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
+UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3, "_in": 0.0254, "_ft": 0.3048}
 # what a column adds to s, y_left, z_left, y_right, z_right
 SHARES = {
     "s": (1.0, 0.0, 0.0, 0.0, 0.0),
