@@ -127,6 +127,13 @@ def test_contradicting_track_is_refused(plan, cant, expected):
             {"gauge_widening": [[5200.0, 0.0], [5220.0, 0.01]]},
             "gauge_widening: from 5200 to 5220 m, beyond",
         ),
+        # over a window of 10 m the curvature is 0.6/R at most
+        (
+            [STRAIGHT, {**CIRCLE, "length": 6.0}, STRAIGHT],
+            [],
+            {},
+            "plan.1: 6 m are shorter than the rounding (10 m), over which it is averaged",
+        ),
         # from 12100 to 12150 m with its shift of 100 m; its first row is at 12000 m
         ([STRAIGHT], [], {"irregularities": [RECORDED]}, "shift = -12000 puts its begin at s = 0"),
         (  # the track begins at km 11.95

@@ -118,6 +118,8 @@ def track_remarks(track: "Track") -> list[Remark]:
                 f"({track.rounding:g} m), which flattens it"
             )
             remarks.append(Remark(section.key, text))
+    for sections in (plan, cant, vertical):
+        remarks += _not_reached(sections, track.rounding)
     for k, part in enumerate(track.sections):
         if text := part.unusual():
             remarks.append(Remark(f"sections.{k}", text))
@@ -137,6 +139,19 @@ def track_remarks(track: "Track") -> list[Remark]:
                 text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
             remarks.append(Remark(key, text))
     return remarks + _mileages(track)
+
+
+def _not_reached(sections: Sequence[Section], rounding: float) -> Iterator[Remark]:
+    """Remark on constant values between two larger or smaller ones that the rounding averages."""
+    for before, one, after in zip(sections, sections[1:], sections[2:], strict=False):
+        # what it steps from, or where the ramp to it begins, and so behind it
+        at = one.start_value
+        first = before.start_value if before.end_value == at else before.end_value
+        last = after.end_value if after.start_value == at else after.start_value
+        alone = one.slope == 0.0 and (at - first) * (at - last) > 0.0
+        if alone and one.length < rounding - SMALL:
+            text = f"{one.length:g} m are shorter than the rounding ({rounding:g} m), over which"
+            yield Remark(one.key, f"{text} it is averaged: its full value is not reached")
 
 
 def _mileages(track: "Track") -> list[Remark]:
