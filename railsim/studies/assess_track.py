@@ -69,6 +69,7 @@ class Place:
     value: float  # [SI]
     limit: float  # [SI]
     shape: str  # the defect there in words
+    mileage: float | None = None  # of the track there, if it has one [m]
 
 
 class _Run(NamedTuple):
@@ -112,12 +113,14 @@ class TrackAssessment:
                    Column("value", format=".2f"),
                    Column("share", "of the limit", "", ".2f"),
                    "shape"]  # fmt: skip
+        own = any(p.mileage is not None for p in self.places)
+        columns += [Column("mileage", unit="km", format=".3f")] * own
         rows = []
         for p in self.places:
             shown = QUANTITIES[p.quantity]
             value = Amount(p.value, shown, with_unit=True)
             rows.append([p.vehicle, p.speed, p.s, shown.name, p.where, value, p.value / p.limit,
-                         p.shape])  # fmt: skip
+                         p.shape, *[p.mileage] * own])  # fmt: skip
         return Table(columns, rows)
 
     @property
@@ -314,10 +317,12 @@ def _part(track: Track, a: float, b: float) -> tuple[Track, float]:
                 if low <= row[0] + part.shift <= high
             ]
             if len(rows) >= 4:
-                parts.append(part.model_copy(update={"rows": tuple(rows), "shift": 0.0}))
+                cut: Any = {"rows": tuple(rows), "shift": 0.0, "mileage": None}
+                parts.append(part.model_copy(update=cut))
         else:
             parts.append(part)
     changes: dict[str, Any] = {"irregularities": [p.model_dump(exclude_none=True) for p in parts]}
+    changes["mileage"] = float(track.mileage_at(moved))
     if uniform:
         changes |= even_line(min(high, track.length) - moved)
     return track.replace(**changes), moved
@@ -330,7 +335,7 @@ def _judged(
     track: Track, runs: Sequence[_Run], share: float, outcome: Outcome, remarks: Sequence[str]
 ) -> TrackAssessment:
     begin, end = _extent(track)
-    cells = np.arange(begin, end, CELL)
+    cells, known = np.arange(begin, end, CELL), bool(track.mileage or track.falling_mileage)
     geometry = RecordedGeometry(track, begin, end)
     shares: dict[tuple[str, float, str], Floats] = {}
     places: list[Place] = []
@@ -354,10 +359,12 @@ def _judged(
                 lifted[cell[gaps]] = True
                 unloaded.setdefault((name, case.speed), []).append(float(s[gaps][0]))
             for k in _peaks(s, part, share):
+                there, magnitude = float(s[k]), float(part[k] * limit)
+                km = float(track.mileage_at(there)) if known else None
+                shape = geometry.shape(there)
                 places.append(
-                    Place(name, case.speed, quantity, where, float(s[k]), float(part[k] * limit),
-                          limit, geometry.shape(float(s[k])))
-                )  # fmt: skip
+                    Place(name, case.speed, quantity, where, there, magnitude, limit, shape, km)
+                )
     asked = len({(case.labels["vehicle"], case.speed) for case, *_ in runs}) * len(QUANTITIES)
     rows = np.array([*shares.values()]).reshape(-1, len(cells))
     exceeded = np.any(rows > share, axis=0) | lifted

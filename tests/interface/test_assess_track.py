@@ -319,6 +319,21 @@ def test_what_one_vehicle_exceeds_counts_where_another_never_ran(judged, recordi
     assert shown[1] == [words or "not run" for words in shown[0]]
 
 
+def test_places_have_the_mileage_of_the_track(recording, pieces):
+    """Km 34 at s = 0, falling: the defect at 640 m is at km 33.360."""
+    track = recorded(recording).replace(mileage=34_000.0, falling_mileage=True)
+    found = module._judged(track, *pieces[:1], 0.6, pieces[1], [])
+    assert found.table().records()[0]["mileage"] == pytest.approx(34_000.0 - found.places[0].s)
+    assert abs(found.places[0].mileage - (34_000.0 - DEFECT)) < 40.0
+    plain = module._judged(recorded(recording), *pieces[:1], 0.6, pieces[1], [])
+    assert "mileage" not in plain.table().records()[0]
+    (own,) = (one.model_dump(exclude_none=True) for one in track.irregularities)
+    track = track.replace(irregularities=[{**own, "mileage": 34_000.0}])
+    part, moved = module._part(track, 500.0, 900.0)  # and the results of its runs
+    assert (part.mileage_at(0.0), moved) == (33_760.0, 240.0)
+    assert not [remark for remark in part.unusual() if "km" in str(remark)]
+
+
 def test_sections_are_counted_by_hand():
     """Five sections: a dip of 20 mm in the first, vehicles flag the first, second and fifth.
 
