@@ -12,7 +12,7 @@ from railsim.arrays import Floats
 from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.excitations.law import ByLaw
-from railsim.definitions.excitations.measured import Measured, largest_between_rows
+from railsim.definitions.excitations.measured import RECORDED, Measured, largest_between_rows
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.rounded_profile import RoundedProfile
 from railsim.definitions.track.section import Section
@@ -83,7 +83,8 @@ def shortest_length(track: Track) -> float:
 def measured_remarks(track: Track) -> list[str]:
     """Remark on records between whose rows the rails go further than at them, on gaps and curves.
 
-    Further by 5 % or more; gaps of five steps or more; cant or versines in the record.
+    Further by 5 % or more; gaps of five steps or more, or of 30 m at an end of the track; cant or
+    versines in the record.
     """
     remarks = []
     for index, part in enumerate(track.irregularities):
@@ -97,6 +98,17 @@ def measured_remarks(track: Track) -> list[str]:
                 f"the largest row is {1e3 * found.at_rows:.3g} mm."
             )
         remarks += _gap_remarks(part, index) + _held_remarks(part, index, track)
+    ends = [
+        part.extent(track.length)
+        for part in track.irregularities
+        if isinstance(part, Measured) and len(part.rows or ()) >= RECORDED
+    ]
+    low, high = min((a for a, _ in ends), default=0.0), max((b for _, b in ends), default=np.inf)
+    if low > LONG or high < track.length - LONG:
+        remarks.append(
+            f"What is recorded goes from s = {low:.0f} to {high:.0f} m of the {track.length:.0f} m "
+            "of the track: elsewhere it moves no rail."
+        )
     return remarks
 
 

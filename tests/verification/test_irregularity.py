@@ -628,12 +628,14 @@ def test_missing_rows_are_remarked_on(tmp_path):
     assert "no rows from s = 25.0 to 37.0 m, the longest of 2 such gaps" in remark
     few = kept & (s < 36.0) & (s > 15.0)  # a defect drawn by hand
     assert measured_remarks(recorded(tmp_path, written(s[few], z[few]))) == []
+    (remark,) = measured_remarks(recorded(tmp_path, written(s, z), shift=-30.0))
+    assert remark.startswith("What is recorded goes from s = -30 to 60 m of the 100 m of the track")
 
 
 @pytest.mark.parametrize(("level", "remarked"), [(80.0, True), (-80.0, True), (8.0, False)])
 def test_a_cross_level_that_holds_the_cant_is_remarked_on(level, remarked):
     """A recording car measures the cant too: added to that of the plan it would be 160 mm."""
-    s = np.arange(0.0, 500.0, 0.5)
+    s = np.arange(0.0, 1000.0, 0.5)
     share = np.interp(s, [0.0, 300.0, 360.0, 420.0, 480.0], [0.0, 0.0, 1.0, 1.0, 0.0])
     half = 0.5e-3 * (level * share + np.sin(s))
     rows = [(a, 0.0, -b, 0.0, b) for a, b in zip(s.tolist(), half.tolist(), strict=True)]
@@ -657,7 +659,7 @@ def test_a_cross_level_that_holds_the_cant_is_remarked_on(level, remarked):
 @pytest.mark.parametrize("alike", [True, False])
 def test_an_alignment_that_holds_the_versines_of_a_curve_is_remarked_on(alike):
     """A chord of 10 m in a right-hand curve of 500 m: (5 m)^2/(2 500 m) = 25 mm, to the left."""
-    s = np.arange(0.0, 500.0, 0.5)
+    s = np.arange(0.0, 1000.0, 0.5)
     y = -25e-3 * np.interp(s, [300.0, 360.0, 420.0, 480.0], [0.0, 1.0, 1.0, 0.0]) * alike
     y += 3e-3 * np.sin(s)
     rows = [(a, b, 0.0, b, 0.0) for a, b in zip(s.tolist(), y.tolist(), strict=True)]
