@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from railsim.cli import common as cli
+from railsim.cli.terminal import echo
 from railsim.errors import input_error
 
 FILES = ("identified.toml", "identified.json", "report.html", "fits.png", "residuals.png")
@@ -55,6 +56,8 @@ def command(
     def progress(count: int) -> None:
         if not quiet and sys.stderr.isatty():
             sys.stderr.write(f"\r{count} runs simulated")
+        elif not quiet and count % 10 == 0:
+            echo(f"{count} runs simulated", err=True)
 
     how |= {"band": _band(band), "place": not fixed_place, "folder": folder and folder / KEPT}
     found = identify(vehicle, measured, keys, progress=progress, **how)

@@ -5,7 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from railsim.cli import progress
+import railsim.identification
+from railsim.cli import main, progress
+from railsim.errors import input_error
 from railsim.kernels import cache
 from railsim.simulation.run_progress import RunProgress
 
@@ -61,6 +63,19 @@ def test_a_log_gets_lines_that_are_a_twentieth_apart(capsys, monkeypatch):
             for hundredths in range(11):
                 show(0.01 * hundredths)
     assert capsys.readouterr().err.splitlines() == ["wear: 5 %", "wear: 10 %"]
+
+
+def test_a_log_gets_a_line_for_every_ten_runs_of_identify(capsys, monkeypatch):
+    def counting(*_, progress, **__):
+        for count in range(1, 26):
+            progress(count)
+        raise input_error("run", "nothing", "something")
+
+    monkeypatch.setattr(railsim.identification, "identify", counting)
+    assert main(["identify", "coach_25t", "run.toml", "-p", "bodies.carbody.mass"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[:2] == ["10 runs simulated", "20 runs simulated"]
+    assert len(said) == 3
 
 
 def record(number, status="complete", value=1e3):
