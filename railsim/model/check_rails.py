@@ -49,13 +49,12 @@ def check_rails(flat: FlatVehicle, track: Track, profiles: dict[str, Profile]) -
     """Return the check rails of a track, with the backs of a vehicle's wheels."""
     if not track.check_rail:
         return NONE
-    rows, tables, first = [], [], 0
+    rows, tables = [], list[tuple[float, float]]()
     for rail in track.check_rail:
-        last = first + len(rail.rows) - 1
-        side = 0 if rail.rail == "left" else 1
-        rows.append([side, first, last, rail.stiffness, rail.damping, rail.friction])
+        side, first = 0 if rail.rail == "left" else 1, len(tables)
         tables += rail.rows
-        first = last + 1
+        last = len(tables) - 1
+        rows.append([side, first, last, rail.stiffness, rail.damping, rail.friction])
     wheels = np.array(
         [
             [flange_back(wheelset, rail, track.gauge, profiles) for rail in track.check_rail]
