@@ -121,7 +121,10 @@ def campaign(
 def left_out(
     plan: Scenario, vehicles: Sequence[str | Path], cases: Sequence[Case]
 ) -> Iterator[str]:
-    """Yield what a vehicle would need for each condition in which it is not tested."""
+    """Yield what a vehicle would need for each condition in which it is not tested.
+
+    And the runs without a section that counts, as of a vehicle too slow for a cant deficiency.
+    """
     tested = {(case.labels["vehicle"], case.labels.get("condition")) for case in cases}
     for vehicle, (state, needed) in product(map(short_name, vehicles), plan.conditions.items()):
         if (vehicle, state) not in tested:
@@ -129,6 +132,14 @@ def left_out(
             wheels = [f"wheels {' or '.join(needed.wheels)}"] if needed.wheels else []
             words = " and ".join((*load, *wheels))
             yield f"{vehicle}: not tested in the condition '{state}', which needs {words}"
+    limits = load_running_limits(plan.standard) if plan.to_standard else None
+    for case in cases:
+        service = case.vehicle.service
+        if limits and service and not counting_sections(case.track, case, limits, service):
+            yield (
+                f"{case.name}: at {3.6 * case.speed:.0f} km/h none of its sections is within the "
+                "conditions of its zone: the assessment says why, and cannot judge this zone"
+            )
 
 
 def _as_assigned(fault: Fault) -> Fault:

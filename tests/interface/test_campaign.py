@@ -132,6 +132,18 @@ def test_fault_modes_change_the_vehicle_and_load_cases_that_are_unknown_are_left
         scenario_cases(load_scenario(scenario), ["coach_manchester"])
 
 
+def test_runs_without_a_section_that_counts_are_told_before_they_are_run():
+    """11 m/s, 100 mm: 1.5 V^2/(g R) is 35 mm at 600 m and 47 mm at 480 m; 75 mm are required."""
+    scenario = load_scenario("en14363")
+    slow = ["vehicle.service.admissible_speed=11.0", "vehicle.service.cant_deficiency=0.1"]
+    cases = scenario_cases(scenario, ["coach_manchester"], slow)
+    said = [words.split(": at ")[0] for words in left_out(scenario, ["coach_manchester"], cases)]
+    conditions = {case.labels["condition"] for case in cases}
+    assert {words.split("_seed")[0] for words in said} == {
+        f"coach_manchester_{state}_{zone}" for state in conditions for zone in ("zone2", "zone3")
+    }
+
+
 def test_no_two_conditions_share_a_seed_of_a_part_that_is_repeated_often(tmp_path):
     """One to two sections a run of 25 needed: more than ten seeds for each condition."""
     scenario = tmp_path / "often.toml"
