@@ -138,7 +138,7 @@ def track_remarks(track: "Track") -> list[Remark]:
                 at = begin - shift + to
                 text += f"; is it a mileage? shift = {to:.9g} puts its begin at s = {at:g}"
             remarks.append(Remark(key, text))
-    return remarks + _mileages(track)
+    return [*remarks, *_mileages(track)]
 
 
 def _not_reached(sections: Sequence[Section], rounding: float) -> Iterator[Remark]:
@@ -154,30 +154,25 @@ def _not_reached(sections: Sequence[Section], rounding: float) -> Iterator[Remar
             yield Remark(one.key, f"{text} it is averaged: its full value is not reached")
 
 
-def _mileages(track: "Track") -> list[Remark]:
+def _mileages(track: "Track") -> Iterator[Remark]:
     """Remark on recordings that are put where the mileage of the track is another one."""
-    remarks = []
-    for k, part in enumerate(track.irregularities):
-        if not isinstance(part, Measured) or not (track.mileage or track.falling_mileage):
+    known = track.mileage or track.falling_mileage
+    for k, part in enumerate(track.irregularities if known else ()):
+        if not isinstance(part, Measured):
             continue
         begin, own = part.extent(track.length)[0], part.mileage
-        alike = (own is None) != track.falling_mileage
-        if own is None and part.shift and alike:
-            s = begin - part.shift
-            if 0.5 * track.mileage <= s and abs(s - track.mileage) <= track.length:
-                own = s  # the file's s is a mileage
+        alike, s = (own is None) != track.falling_mileage, begin - part.shift
+        if own is None and alike and part.shift and s >= 0.5 * track.mileage:
+            own = s if abs(s - track.mileage) <= track.length else None  # the file's s is a mileage
         there = float(track.mileage_at(begin))
         if own is None or (alike and abs(there - own) < SAME_MILEAGE):
             continue
+        shift = part.shift + (there - own if track.falling_mileage else own - there)
+        agree = f"shift = {shift:.9g} makes them agree"
         text = f"begins at km {1e-3 * own:.4f}, which is put at s = {begin:g} m, km "
-        text += f"{1e-3 * there:.4f} of the track"
-        if alike:
-            shift = part.shift + (there - own if track.falling_mileage else own - there)
-            text += f"; shift = {shift:.9g} makes them agree"
-        else:
-            text += "; the file's mileage falls, that of the track rises"
-        remarks.append(Remark(f"irregularities.{k}", text))
-    return remarks
+        text += f"{1e-3 * there:.4f} of the track; "
+        turned = "the file's mileage falls, that of the track rises"
+        yield Remark(f"irregularities.{k}", text + (agree if alike else turned))
 
 
 def _spans(track: "Track") -> Iterator[tuple[str, float, float, float | None]]:
