@@ -104,7 +104,7 @@ def measured_remarks(track: Track) -> list[str]:
         if isinstance(part, Measured) and len(part.rows or ()) >= RECORDED
     ]
     low, high = min((a for a, _ in ends), default=0.0), max((b for _, b in ends), default=np.inf)
-    if low > LONG or high < track.length - LONG:
+    if LONG < low < track.length or 0.0 < high < track.length - LONG:
         remarks.append(
             f"What is recorded goes from s = {low:.0f} to {high:.0f} m of the {track.length:.0f} m "
             "of the track: elsewhere it moves no rail."
