@@ -24,7 +24,7 @@ import numpy as np
 from railsim.arrays import Floats, Indices
 from railsim.errors import ModelError
 from railsim.kernels import support as rails
-from railsim.kernels.contact_columns import NORMAL, W_Q
+from railsim.kernels.contact_columns import NORMAL, W_C_Z, W_Q
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
@@ -288,11 +288,13 @@ class _Balance:
     def solve(self, guess: Floats) -> Floats:
         """Return the balanced state; raise ModelError with the unbalanced components."""
         state = guess.copy()
-        state[SPEED] = self.speed
-        state[ARC_LENGTH] = 0.0
-        spins = 6 * self.model.index.n_bodies + 4
-        for body in np.flatnonzero(self.system.bodies.kind == WHEELSET):
-            state[spins + 6 * body] = -self.speed / self.system.bodies.radius[body]
+        state[SPEED], state[ARC_LENGTH] = self.speed, 0.0
+        wheelsets, spins = self.system.contact.body, 6 * self.model.index.n_bodies + 4
+        self._accelerations(state)
+        # Rolling without slip where the wheels touch: creep forces near mu N have next to no slopes
+        lever, nominal = self.work.wheel[:, :, W_C_Z], self.system.bodies.radius[wheelsets, None]
+        radius = np.where(lever > 0.0, lever, nominal).mean(axis=1)
+        state[spins + 6 * wheelsets] = -self.speed / radius
         rest = self._accelerations(state)
         change = np.zeros(len(self._unknowns))
         for _ in range(_STEPS):

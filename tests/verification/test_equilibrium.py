@@ -1,6 +1,7 @@
 """Steady rolling of vehicles whose elements have kinks where they rest, and of worn wheels."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,10 +13,15 @@ from selection import points
 
 import railsim.model.equilibrium
 from railsim.constants import GRAVITY
+from railsim.contact import contact_geometry
 from railsim.definitions.loading import load_vehicle, load_vehicle_text
 from railsim.errors import ModelError
+from railsim.kernels.state import velocity_begin
+from railsim.kernels.system import RADIUS
+from railsim.linear.vehicle import on_cones
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import RESIDUAL, _at_rest, _Balance, equilibrium
+from railsim.profiles import load_profile
 
 DATA = Path(__file__).parents[1] / "data" / "vehicles"
 WAGON = (DATA / "two_axle_wagon.toml").read_text(encoding="utf-8")
@@ -101,6 +107,35 @@ def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
     np.testing.assert_allclose(found.Q0, found.Q0[0, 0], rtol=1e-6)
     for body in found.model.system.contact.body:
         assert abs(found.state[6 * body + 1]) < 1e-9
+
+
+def test_wheels_roll_on_the_radius_on_which_they_stand_whatever_the_nominal_one_is():
+    """A creepage of 1 % on the nominal radius saturates the creep force, which has no slope left.
+
+    From there Newton's method went astray: the radius of the points of contact is the one to roll
+    on, as on steep cones, which touch the rails farther in.
+    """
+    track = load_track("straight").replace(support={"preset": "rigid"})
+    model = assemble(load_vehicle("coach_manchester"), track, Settings())
+    expected, bodies = equilibrium(model, 1.0), model.system.bodies
+    row = bodies.row * np.where(np.arange(bodies.row.shape[1]) == RADIUS, 0.99, 1.0)
+    other = replace(model, system=model.system._replace(bodies=bodies._replace(row=row)))
+    np.testing.assert_allclose(equilibrium(other, 1.0).state, expected.state, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("small_contact_tables")
+def test_steep_cones_roll_on_the_radius_on_which_they_stand():
+    """Cones of 1:5 touch the rails 18 mm farther in: a creepage of 0.8 % on the nominal radius."""
+    vehicle, profile = on_cones(load_vehicle("coach_manchester"), 0.2)
+    geometry = contact_geometry(profile, load_profile("60E1"), lateral=[-1e-4, 0.0, 1e-4])
+    track = load_track("straight").replace(support={"preset": "rigid"})
+    for friction in (0.1, 0.4, 1.0):
+        rough = track.replace(friction=friction)
+        model = assemble(vehicle, rough, Settings(), {profile.name: profile})
+        found, first = equilibrium(model, 1.0), velocity_begin(model.index.n_bodies)
+        spins = found.state[first + 6 * model.system.contact.body + 4]
+        np.testing.assert_allclose(-1.0 / spins, geometry.rolling_radius[1, 0], atol=0.2e-3)
 
 
 # one the mirror image of the other: two contact tables serve both
