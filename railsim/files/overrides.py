@@ -19,6 +19,7 @@ from railsim.units import number_with_unit
 
 Read = Callable[[Any], Any]
 """What becomes of a present value."""
+_TABLES = {"damping": "damper_table", "stiffness": "spring_table"}  # in whose place they stand
 
 
 def apply_overrides(
@@ -91,6 +92,8 @@ def _changed(
             present = parent[last] if not isinstance(parent, dict) or last in parent else None
             names = tuple(str(descend(data, path[:end])[1]) for end in range(1, len(path) + 1))
             parent[last] = read(present)
+            if not parent[last] and (table := _TABLES.get(last)) in parent:
+                raise KeyError(f"has no effect beside '{table}'; no force: {table}=[[0,0],[1,0]]")
             replace_origin(changed.origin, names, present, parent[last], origin)
         except KeyError as problem:
             faults.append(located_fault(origin, key, str(problem.args[0]), ""))

@@ -358,6 +358,29 @@ def test_element_with_a_wrong_value_is_refused_for_it_alone(element, key, words)
     assert words in "; ".join(filter(None, [fault.found, fault.allowed]))
 
 
+@pytest.mark.parametrize("element", [
+    {**DAMPER, "stiffness": 5.0, "damping": 0.0, "series_stiffness": 4.0},
+    bushing(stiffness=[5, 0, 0], damping=[0, 2, 0], series_stiffness=[4, 4, 0]),
+])  # fmt: skip
+def test_damper_that_failed_has_no_force_though_a_spring_is_in_series(element):
+    (row,) = flatten(wagon(element)).elements[0].definition.rows()
+    along = row.states[0] if hasattr(row, "states") else row.state
+    assert along is None
+    assert np.max(row.stiffness) == 5.0
+    assert np.all(np.asarray(row.damping) == 0.0)
+
+
+def test_no_damping_beside_a_table_is_refused_as_it_would_change_nothing():
+    key = "assemblies.bogie.elements.yaw_damper.damping"
+    coach = load_vehicle("coach_25t")
+    for change in (lambda: load_vehicle("coach_25t", [f"{key}=0"]),
+                   lambda: coach.with_values({key: 0.0})):  # fmt: skip
+        with pytest.raises(InputError, match=r"damping: has no effect beside 'damper_table'"):
+            change()
+    table = "yaw_damper.damper_table=[[0,0],[1,0]]"
+    assert "yaw_damper" in load_vehicle("coach_25t", [table]).assemblies["bogie"].elements
+
+
 @pytest.mark.parametrize("element", [STOP, PAD, AIR, WIND])
 def test_further_elements_are_placed(element):
     (flat,) = flatten(wagon(element)).elements

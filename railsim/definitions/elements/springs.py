@@ -45,7 +45,8 @@ class SpringDamper(base.FreeLength, base.SidedElement):
             raise ValueError("either 'stiffness' or 'spring_table', not both")
         if self.damping > 0.0 and self.damper_table is not None:
             raise ValueError("either 'damping' or 'damper_table', not both")
-        if self.series_stiffness > 0.0 and self.damping == 0.0 and self.damper_table is None:
+        given = self.damper_table is not None or "damping" in self.model_fields_set  # 0: it failed
+        if self.series_stiffness > 0.0 and not given:
             raise ValueError("'series_stiffness' needs 'damping' or 'damper_table'")
         if self.has_free_length and self.stiffness == 0.0:
             raise ValueError("a free length needs 'stiffness'")
@@ -74,7 +75,8 @@ class SpringDamper(base.FreeLength, base.SidedElement):
     def rows(self) -> list[Link]:
         """One link; behind a spring in series the damper's force is an internal state."""
         state = None
-        if self.series_stiffness > 0.0:
+        damps = self.damping > 0.0 or self.damper_table is not None
+        if self.series_stiffness > 0.0 and damps:
             parameter = (self.damping, self.series_stiffness, 0.0)
             state = (
                 State("maxwell", parameter)
@@ -113,8 +115,8 @@ class Bushing(base.VerticalSpring, base.PointElement):
 
     @check
     def _series_needs_damping(self) -> None:
-        for axis, series, damping in zip("xyz", self.series_stiffness, self.damping, strict=True):
-            if series > 0.0 and damping == 0.0:
+        for axis, series in zip("xyz", self.series_stiffness, strict=True):
+            if series > 0.0 and "damping" not in self.model_fields_set:
                 raise ValueError(f"'series_stiffness' along {axis} needs 'damping' along {axis}")
 
     @property
@@ -125,7 +127,7 @@ class Bushing(base.VerticalSpring, base.PointElement):
     def rows(self) -> list[Mount]:
         """One mount with a Maxwell state for each damper behind a spring."""
         pairs = list(zip(self.damping, self.series_stiffness, strict=True))
-        x, y, z = (State("maxwell", (c, k, 0.0)) if k > 0.0 else None for c, k in pairs)
+        x, y, z = (State("maxwell", (c, k, 0.0)) if min(c, k) > 0.0 else None for c, k in pairs)
         cx, cy, cz = (c if k == 0.0 else 0.0 for c, k in pairs)
         return [
             self.mount(
