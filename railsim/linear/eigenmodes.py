@@ -22,6 +22,7 @@ from railsim.linear.system import Linearisation
 At = Callable[[float], Linearisation]
 
 SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are looked for
+LOWEST = 0.1  # Hz, of an oscillation that loses its stability: sways on cones of 0.005 have 0.28
 SLOWEST = 1e-3  # Hz; below it a mode is no oscillation
 GROWS = 0.05  # 1/s of motions about an unstable state
 SAME = 0.6  # pairing of neighbouring modes that needs no look in between
@@ -254,7 +255,7 @@ def _beyond_zero(
 def _least_damped(
     modes: Eigenmodes, counts: Callable[[Eigenmodes], bool] | None = None
 ) -> Eigenmodes:
-    """The mode of largest growth among the oscillations in `SEARCHED`, if undamped one that counts.
+    """The mode of largest growth among the oscillations searched, if undamped one that counts.
 
     Where no mode counts, the least damped of those that decay.
     """
@@ -266,7 +267,7 @@ def _least_damped(
 
 
 def _searched(eigenvalues: Complexes) -> Indices:
-    """Indices of the oscillations in `SEARCHED`; of all where there is none."""
+    """Indices of the oscillations from `LOWEST` to 40 Hz; of all where there is none."""
     frequency = eigenvalues.imag / (2.0 * np.pi)
-    inside = np.flatnonzero((frequency >= SEARCHED[0]) & (frequency <= SEARCHED[1]))
+    inside = np.flatnonzero((frequency >= LOWEST) & (frequency <= SEARCHED[1]))
     return inside if len(inside) else np.arange(len(eigenvalues))

@@ -122,6 +122,34 @@ def test_a_narrow_range_of_instability_is_found_wherever_the_search_begins(peak,
         return oscillator(-1e-5 - 0.015 * ((speed - peak) / half) ** 2)(speed)
 
     assert loss_of_stability(stable, low, high).parameter is None
+    for at in (low + 0.15, high - 0.15):  # beside the ends, where one interval is not known
+        peak, half = at, 0.1
+        lost = loss_of_stability(unstable, low, high)
+        assert lost.parameter == pytest.approx(at - 0.1, abs=1e-4)
+
+
+@pytest.mark.parametrize("slope", [0.0125, 0.05])
+def test_slow_hunting_is_lost_where_its_growth_is_zero(slope):
+    """Growth 0.05 (V/22 - 1) at a frequency in proportion to the speed: 0.275 or 1.1 Hz at 22 m/s.
+
+    At speeds that are searched the slower one passes 0.3 Hz, where no growth is zero.
+    """
+
+    def growing(speed):
+        growth, rate = 0.05 * (speed / 22.0 - 1.0), 2.0 * np.pi * slope * speed
+        matrix = np.array([[growth, rate], [-rate, growth]])
+        return Linearisation(("x", "y"), matrix, np.zeros(2), speed)
+
+    steady = np.array([[-0.02, 20.0], [-20.0, -0.02]])  # another mode, of 3 Hz
+
+    def both(speed):
+        matrix = np.kron([[1, 0], [0, 0]], growing(speed).matrix)
+        matrix[2:, 2:] = steady
+        return Linearisation(tuple("xyzw"), matrix, np.zeros(4), speed)
+
+    lost = loss_of_stability(both, 5.0, 120.0)
+    assert lost.parameter == pytest.approx(22.0, rel=1e-6)
+    assert lost.modes[0].frequencies[0] == pytest.approx(22.0 * slope, rel=1e-6)
 
 
 @pytest.mark.parametrize(("speed", "millimetres"), [(75.0, 11.155), (70.0, 10.185), (68.0, 9.735)])
