@@ -223,10 +223,11 @@ def loss_of_stability(
     while passed < high:
         after = min(high, passed + min((high - low) / (points - 1), STEP * passed))
         after = high if high - after < 1e-9 * high else after
-        middle = passed if before < passed else 0.5 * (passed + after)
-        unstable = after if growth(after) >= 0.0 else _beyond_zero(growth, before, middle, after)
+        half, first = 0.5 * (passed + after), before == passed
+        span = (before, half if first else passed, after, low if first else None)
+        unstable = after if growth(after) >= 0.0 else _beyond_zero(growth, *span)
         if unstable is None and after == high:  # a peak in the last interval
-            unstable = _beyond_zero(growth, passed, 0.5 * (passed + after), after)
+            unstable = _beyond_zero(growth, passed, half, after, high)
         if unstable is not None:
             stable = passed if unstable > passed else before
             root = float(brentq(growth, stable, unstable, xtol=1e-7 * high, rtol=1e-12))
@@ -236,15 +237,24 @@ def loss_of_stability(
 
 
 def _beyond_zero(
-    growth: Callable[[float], float], before: float, middle: float, after: float
+    growth: Callable[[float], float],
+    before: float,
+    middle: float,
+    after: float,
+    end: float | None = None,
 ) -> float | None:
     """Where a peak about the middle one of three parameters is not negative, if it may be.
 
     A parabola rises over the largest of three values at equal distances by an eighth of what this
-    is above the least one, at most; more is looked into where peaks are sharper.
+    is above the least one, at most; more is looked into where peaks are sharper.  `end` of the
+    range: beyond it nothing is known, the slope there says whether the growth rises inwards.
     """
     low, peak, high = map(growth, (before, middle, after))
-    if peak < max(low, high) or 2.0 * peak - min(low, high) < 0.0:
+    looked = peak >= max(low, high) and 2.0 * peak - min(low, high) >= 0.0
+    if end is not None:  # whose tangent leads to zero on the way to the middle
+        inside = end + 0.01 * (middle - end)
+        looked |= growth(end) + 100.0 * (growth(inside) - growth(end)) >= 0.0
+    if not looked:
         return None
     found = minimize_scalar(
         lambda x: -growth(x), bounds=(before, after), method="bounded", options={"maxiter": 12}
