@@ -127,8 +127,11 @@ def critical_speed(
         if found.linear is not None and smooth.system.support.elastic:
             try:
                 rigid = prepared(law, contact, track.replace(support={"preset": "rigid"}))
-                lost = _loss_of_hunting(rigid, low, high).parameter
-                found.linear = replace(found.linear, speed_on_rigid_rails=lost)
+                lost = _loss_of_hunting(rigid, low, high)
+                found.linear = replace(found.linear, speed_on_rigid_rails=lost.parameter)
+                if lost.parameter is None:
+                    words = f"unstable at {low:g}" if lost.already else f"stable up to {high:g}"
+                    found.remarks.append(f"on rigid rails: {words} m/s")
             except ModelError as error:
                 found.remarks.append(f"on rigid rails: {error}")
     tell = progress or (lambda _: None)
@@ -258,13 +261,9 @@ def _linear(
         found.remarks += _stable_again(prepared, lost.parameter, high)
         return LinearLoss(lost.parameter, float(mode.frequencies[0]), name), stuck
     found.unstable_at_low = lost.already
-    if lost.already:
-        found.remarks.append(f"unstable at the lower end of the range: {words(lost.modes[0])}")
-    else:
-        found.remarks.append(
-            f"no linear critical speed from {low:g} to {high:g} m/s; least damped: "
-            f"{'; '.join(map(words, lost.modes))}"
-        )
+    why = f"no linear critical speed from {low:g} to {high:g} m/s; least damped"
+    why = "unstable at the lower end of the range" if lost.already else why
+    found.remarks.append(f"{why}: {'; '.join(map(words, lost.modes))}")
     return None, stuck
 
 

@@ -11,7 +11,7 @@ from selection import points
 import railsim
 from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
-from railsim.linear.eigenmodes import LossOfStability
+from railsim.linear.eigenmodes import LossOfStability, eigenmodes
 from railsim.linear.modes import modes
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
@@ -250,6 +250,25 @@ def test_without_critical_speed_in_the_range_the_least_damped_modes_are_told():
     )
     unstable = critical_speed(coach, RIGID, methods=("linear",), low=60.0, high=70.0)
     assert any("unstable at the lower end" in remark for remark in unstable.remarks)
+
+
+@pytest.mark.parametrize(
+    ("already", "words"), [(False, "stable up to 62"), (True, "unstable at 5")]
+)
+def test_without_a_critical_speed_on_rigid_rails_a_remark_says_so(monkeypatch, already, words):
+    """Its line was left out of the table, as where the rails of the track are rigid."""
+
+    def lost(prepared, *_):
+        modes = (eigenmodes(prepared.linearised(58.0)).taken([-1]),)
+        elastic = prepared.system.support.elastic
+        return LossOfStability(58.0 if elastic else None, already and not elastic, modes)
+
+    monkeypatch.setattr(railsim.stability.critical_speed, "_loss_of_hunting", lost)
+    monkeypatch.setattr(railsim.stability.critical_speed, "_over_amplitude", lambda *_: None)
+    coach, law = load_vehicle("coach_flexicoil"), railsim.Settings(creep_law="polach")
+    found = critical_speed(coach, low=5.0, high=62.0, methods="linear", settings=law)
+    assert (found.linear.speed, found.linear.speed_on_rigid_rails) == (58.0, None)
+    assert found.remarks == [f"on rigid rails: {words} m/s"]
 
 
 @pytest.mark.further
