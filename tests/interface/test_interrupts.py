@@ -122,7 +122,7 @@ def test_bar_says_what_comes_before_a_run(monkeypatch):
     said, fractions = [], []
 
     class Bar:
-        n = 0.0
+        n, disable = 0.0, False
 
         def __init__(self, *, desc, **how):
             said.append(desc)
