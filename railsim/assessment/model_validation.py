@@ -32,8 +32,7 @@ from railsim.definitions.vehicle.loads import DESIGN
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.measurement import Measurement, load_measurement
-from railsim.measurement.alignment import MOST as MOST_SHIFT
-from railsim.measurement.alignment import common_shift
+from railsim.measurement.alignment import MOST_SHIFT, common_shift
 from railsim.measurement.counterpart import amplified, check_channels, compared, series
 from railsim.measurement.likeness import suspicions
 from railsim.notation import SIDES

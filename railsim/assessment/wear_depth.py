@@ -16,11 +16,11 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import inclined_to_track, tape_circle_position
+from railsim.contact.gauges import wheel_gauge
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Wheelset
 from railsim.errors import Fault, Faults, argument_error, input_error
 from railsim.profiles import Profile
-from railsim.profiles.profile import FLANGE_BACK
 from railsim.result import Result
 
 SPACING = 0.25e-3  # m
@@ -228,16 +228,6 @@ def wheel_dimensions(profile: Profile) -> WheelDimensions:
     >>> [round(1e3 * v, 1) for v in (found.flange_height, found.flange_thickness)]
     [28.0, 32.5]
     """
-    y, z = np.asarray(profile.y), np.asarray(profile.z) - np.interp(0.0, profile.y, profile.z)
-    tip = int(np.argmax(z))
-    tread = y >= y[tip]
-
-    def face(depth: float) -> float:
-        """Innermost place of the flange's face at a depth."""
-        below = int(np.argmax(z[tread] < depth))
-        pair = slice(below - 1, below + 1)
-        return float(np.interp(-depth, -z[tread][pair], y[tread][pair]))
-
-    thick, outer = face(0.010), np.maximum.accumulate(z[tread][::-1])[::-1]
-    slope, hollow = thick - face(z[tip] - 0.002), float(np.max(outer - z[tread]))
-    return WheelDimensions(float(z[tip]), thick - FLANGE_BACK, slope, hollow)
+    tread = profile.z[int(np.argmax(profile.z)) :]
+    outer = np.maximum.accumulate(tread[::-1])[::-1]
+    return WheelDimensions(*wheel_gauge(profile), float(np.max(outer - tread)))

@@ -27,7 +27,7 @@ CLEAR = 0.6  # correlation from which a window counts
 AGREEING = 0.5  # share of the windows of a signal that must show one shift
 TOGETHER = 1.0 / 3.0  # share of the signals that must show it
 NEAR = 3.0  # m, of the line through all shifts
-MOST = 30.0  # m, largest shift that is looked for
+MOST_SHIFT = 30.0  # m, largest shift that is looked for
 AS_ALIKE = 0.05  # below the largest correlation
 WAVES = (3.0, 40.0)  # m, that an axlebox and the track's level share
 CURVATURES = ("curvature", "yaw_rate")
@@ -61,7 +61,7 @@ def common_shift(signals: Iterable[tuple[Floats, Floats, Floats, Floats]]) -> Sh
 
 
 def shift_of(
-    s: Floats, x: Floats, s_reference: Floats, reference: Floats, *, most: float = MOST
+    s: Floats, x: Floats, s_reference: Floats, reference: Floats, *, most: float = MOST_SHIFT
 ) -> Shift | None:
     """Return by how much the arc lengths of one signal must be changed to match another.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.contact.gauges import wheel_gauge
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.base import Remark, kept
 from railsim.definitions.elements.base import Element, FreeLength
@@ -18,8 +19,6 @@ from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
 from railsim.errors import ModelError, listed
-from railsim.profiles import Profile
-from railsim.profiles.profile import FLANGE_BACK
 
 if TYPE_CHECKING:
     from railsim.model.assembly import Model
@@ -86,7 +85,7 @@ def _without_supports(vehicle: Vehicle) -> list[Remark]:
         points |= {f"service.points.{name}": at.position for name, at in service.points.items()}
         points["service.floor_height"] = (0.0, 0.0, -service.floor_height)
     found = [*_bodies(flat, points), *_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
-    found += [*_by_text(_pulling(flat)), *_by_text(_dampers(flat))]
+    found += [*_by_text(_pulling(flat)), *_by_text(_coefficients(flat))]
     for name in vehicle.loads:
         of_load = _bodies(flatten(vehicle.model_copy(update={"load": name})), points)
         found += [Remark(f"loads.{name}: {r.key}", r.text) for r in of_load if r not in found]
@@ -122,8 +121,8 @@ def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
     texts: dict[str, list[str]] = {}
     for body in model.flat.of_kind("wheelset"):
         assert body.wheelset is not None
-        flanges = [_flange_thickness(model.profiles[name]) for name in body.wheelset.profile]
-        over = body.wheelset.back_to_back + sum(flanges)
+        thick = sum(wheel_gauge(model.profiles[name])[1] for name in body.wheelset.profile)
+        over = body.wheelset.back_to_back + thick
         if apart[k := int(np.argmin(apart))] < over:
             text = (
                 f"{1e3 * over:.1f} mm over its flanges, the rails are {1e3 * apart[k]:.1f} mm "
@@ -131,13 +130,6 @@ def narrow_remarks(model: "Model", gauge: float) -> list[Remark]:
             )
             texts.setdefault(text, []).append(body.name)
     return [gathered(text, names) for text, names in texts.items()]
-
-
-def _flange_thickness(wheel: Profile) -> float:
-    """Thickness of a flange 10 mm below the rolling circle, Sd of EN 15313 [m]."""
-    tip = int(np.argmax(wheel.z))
-    face = slice(tip, tip + int(np.argmax(wheel.z[tip:] < 0.005)))
-    return float(np.interp(-0.010, -wheel.z[face], wheel.y[face])) - FLANGE_BACK
 
 
 def gathered(what: str, names: Sequence[str]) -> Remark:
@@ -232,8 +224,8 @@ def _inertias(flat: FlatVehicle) -> Iterator[Remark]:
         yield gathered(f"{text}: is the mass in kg, the inertia in kg m2?", names)
 
 
-def _dampers(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
-    """Dampers with the damping of none, or that give way before they damp; friction in per cent."""
+def _coefficients(flat: FlatVehicle) -> Iterator[tuple[str, FlatElement]]:
+    """Friction above 1; dampings of no damper, and springs in series that give way before it."""
     for element in flat.elements:
         law = element.definition
         friction = float(np.max(getattr(law, "friction_coefficient", 0.0)))
