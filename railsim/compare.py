@@ -87,20 +87,15 @@ def conditions(results: Mapping[str, Result]) -> dict[str, list[str]]:
     each = list(results.values())
     tracks = [result.track() for result in each]
     on_track = differing(tracks)
-    return {
-        key: words
-        for key, words in {
-            "speed": [f"{result.speed:.6g}" for result in each],
-            "track": [track.name if on_track else "" for track in tracks],
-            **{f"track.{key}": words for key, words in on_track.items()},
-            **{
-                f"settings.{key}": words
-                for key, words in differing([result.settings() for result in each]).items()
-                if not key.startswith("outputs.")
-            },
-        }.items()
-        if "." in key or len(set(words)) > 1
+    whole = {
+        "speed": [f"{result.speed:.6g}" for result in each],
+        "track": [track.name if on_track else "" for track in tracks],
     }
+    found = {key: words for key, words in whole.items() if len(set(words)) > 1}
+    found |= {f"track.{key}": words for key, words in on_track.items()}
+    of_settings = differing([result.settings() for result in each])
+    kept = {key: words for key, words in of_settings.items() if not key.startswith("outputs.")}
+    return found | {f"settings.{key}": words for key, words in kept.items()}
 
 
 def condition_table(found: Mapping[str, Sequence[str]], labels: Iterable[str]) -> Table:

@@ -33,8 +33,7 @@ def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
 
     The others are compared with the first result; differences are those of magnitudes, and those
     along the track where the plan is the same.  What differs in speed, track and settings stands
-    first.  With --out the table and pictures of the leading
-    wheelset's quantities are written.
+    first.  With --out the table and pictures of the leading wheelset's quantities are written.
 
     Of one STUDY, a folder, the runs that differ in nothing but the vehicle are compared with each
     other; of several, the runs of the same name.
