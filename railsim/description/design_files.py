@@ -14,14 +14,13 @@ def mechanism_parts(mechanism: Mechanism) -> Parts:
     moved = driver.angle or driver.coordinate or " to ".join(driver.length or ())
     parts: Parts = [mechanism.name]
     parts += [f"  source: {mechanism.source}"] if mechanism.source else []
-    parts += [
-        f"  {len(mechanism.bodies)} bodies: {', '.join(mechanism.bodies)}",
-        f"  {len(mechanism.joints)} joints: {', '.join(mechanism.joints)}",
-        f"  driven by {moved}",
-    ]
-    for title in ("actuators", "elements", "cases", "catalogues"):
-        names = getattr(mechanism, title)
-        parts += [f"  {title}: {', '.join(names)}"] if names else []
+
+    def names(*tables: str) -> Parts:
+        found = ((table, getattr(mechanism, table)) for table in tables)
+        return [f"  {table}: {', '.join(keys)}" for table, keys in found if keys]
+
+    parts += [*names("bodies", "joints"), f"  driven by {moved}"]
+    parts += names("actuators", "elements", "cases", "catalogues")
     right = [Column(name, format=">") for name in ("value", "unit", "provenance")]
     rows = [
         [
