@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 
 import click
 import pytest
@@ -111,16 +110,13 @@ def test_missing_file_is_a_fault(capsys):
 # the command line as a whole ----------------------------------------------------------------------
 
 
-def test_help_answers_at_once_and_loads_nothing_heavy():
+def test_help_loads_nothing_heavy():
     code = (
         "import sys; from railsim.cli import main; main(['--help']);"
         "heavy = {'numba', 'matplotlib', 'pydantic', 'numpy', 'h5py'} & set(sys.modules);"
         "sys.exit(f'{heavy} loaded' if heavy else 0)"
     )
-    begin = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    # 0.3 s on a free machine; tests share theirs
-    assert time.perf_counter() - begin < 1.0
     assert done.returncode == 0, done.stderr
     assert "validate" in done.stdout
 
