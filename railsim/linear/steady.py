@@ -27,7 +27,6 @@ from railsim.kernels.track_frame import OMEGA
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import conditions, difference_quotients
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
-from railsim.notation import COMPONENTS
 
 RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
 GOOD_ENOUGH = 1e-5  # the same where rounding and the cells of the creep law let it be no smaller
@@ -72,7 +71,9 @@ class SteadyRolling:
                 break
             state, forces = better
         if not self._largest(forces) < GOOD_ENOUGH:
-            raise NotConverged(self._message(forces))
+            left = forces / self._inertias
+            words = self.model.index.largest_left(self._equations, left, 3)
+            raise NotConverged(f"no steady state; {words}")
         return state
 
     def evaluate(self, state: Floats) -> Floats:
@@ -154,18 +155,6 @@ class SteadyRolling:
                 if np.linalg.norm(found) < (1.0 - 0.1 * factor) * size:
                     return trial, found
         return None
-
-    def _message(self, forces: Floats) -> str:
-        n = self.model.index.n_bodies
-        rest = forces / self._inertias
-        parts = []
-        # those of a track or an air spring follow the bodies
-        of_bodies = np.flatnonzero(self._equations < internal_begin(n))
-        for k in of_bodies[np.argsort(-np.abs(rest[of_bodies]))[:3]]:
-            body, component = divmod(int(self._equations[k]) - velocity_begin(n), 6)
-            name = self.model.index.bodies[body]
-            parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
-        return "no steady state; largest remaining accelerations: " + ", ".join(parts)
 
 
 Systems = Callable[[float], tuple[System, float]]

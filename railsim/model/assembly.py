@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Indices
 from railsim.constants import GRAVITY
 from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
@@ -28,7 +28,7 @@ from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults, ModelError, input_error
 from railsim.kernels.aligned import CACHE_LINE, aligned
 from railsim.kernels.contact_table import N_PATCH
-from railsim.kernels.state import N_SCALARS, contact_begin
+from railsim.kernels.state import N_SCALARS, contact_begin, internal_begin, velocity_begin
 from railsim.kernels.status import LAW_NOT_FINITE, NOT_FINITE, STATUS
 from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE, TRACED, TRANSIENT_SIZE
 from railsim.kernels.system import (
@@ -50,6 +50,7 @@ from railsim.model.element_arrays import ElementArrays, LawBlocks
 from railsim.model.rail_ranges import PLAIN, RailRanges, rail_ranges
 from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
 from railsim.model.work import CONSTANT_SPEED, NO_CONTROLLERS, NO_SIGNALS, parts_of_wheel
+from railsim.notation import COMPONENTS
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.tables import track_tables
@@ -88,6 +89,17 @@ class Index:
             body = where % (6 * self.n_bodies) // 6
             names, where = self.bodies, min(body, self.n_bodies - 1)
         return STATUS[status][1].format(where=names[where])
+
+    def largest_left(self, equations: Sequence[int] | Indices, rest: Floats, most: int) -> str:
+        """Which of the accelerations `rest` of some rows are the largest, by body, in words."""
+        n = self.n_bodies
+        # those of a track or an air spring follow the bodies
+        of_bodies = np.flatnonzero(np.asarray(equations) < internal_begin(n))
+        parts = []
+        for k in of_bodies[np.argsort(-np.abs(rest[of_bodies]))[:most]]:
+            body, component = divmod(int(equations[k]) - velocity_begin(n), 6)
+            parts.append(f"{self.bodies[body]} {COMPONENTS[component]}'' = {rest[k]:.3g}")
+        return "largest remaining accelerations: " + ", ".join(parts)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from railsim.model.preloads import least_squares, with_preloads, with_these_prel
 from railsim.model.solutions import solution
 from railsim.model.time_step import empty_recorder, observed
 from railsim.model.work import components_of, level_track, work_arrays
-from railsim.notation import COMPONENTS, ROLL, SIDES, YAW, Z
+from railsim.notation import ROLL, SIDES, YAW, Z
 
 RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
 ONE_SIDED = 0.01  # least friction of a rail in the balance, as a share of the other's
@@ -312,7 +312,10 @@ class _Balance:
                 break
         self.residual = float(np.max(np.abs(rest)))
         if not self.residual < 1e3 * RESIDUAL:  # so that NaN counts too
-            raise ModelError(self._message(state, rest, change))
+            names = self._alternating(state, change)
+            both = f"alternating between two branches: {', '.join(names)}; " if names else ""
+            left = self.model.index.largest_left(self._equations, rest, 5)
+            raise ModelError(f"no static equilibrium; {both}{left}")
         return state
 
     def _over_kinks(
@@ -405,20 +408,6 @@ class _Balance:
         other = (patches[0] != patches[1]).any(axis=2)
         names += [f"{index.wheelsets[w]} {SIDES[side]} (contact)" for w, side in np.argwhere(other)]
         return list(dict.fromkeys(names))
-
-    def _message(self, state: Floats, rest: Floats, change: Floats) -> str:
-        n = self.model.index.n_bodies
-        of_bodies = np.flatnonzero(np.asarray(self._equations) < internal_begin(n))
-        parts = []
-        for k in of_bodies[np.argsort(-np.abs(rest[of_bodies]))[:5]]:
-            body, component = divmod(self._equations[k] - velocity_begin(n), 6)
-            name = self.model.index.bodies[body]
-            parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
-        names = self._alternating(state, change)
-        alternate = f"alternating between two branches: {', '.join(names)}; " if names else ""
-        return f"no static equilibrium; {alternate}largest remaining accelerations: " + ", ".join(
-            parts
-        )
 
 
 def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) -> Floats:

@@ -10,6 +10,7 @@ import json
 import os
 from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,32 +45,18 @@ def solution(
         return solve()
     key = hashlib.sha256(f"{program_hash()} {kind} {inputs}".encode()).hexdigest()[:32]
     path = folder / f"{key}.json"
-    data = stored(path)
-    if data is not None:
-        return _read(data)
-    if not shared:
-        found = solve()
-        if _new[kind] < MOST_NEW:
-            _new[kind] += 1
-            _keep(path, found)
-        return found
-    with alone(path.with_suffix(".lock")):
-        data = stored(path)
-        if data is not None:
-            return _read(data)
-        found = solve()
-        _keep(path, found)
+    found: dict[str, Any]
+    if (data := stored(path)) is None:
+        with alone(path.with_suffix(".lock")) if shared else nullcontext():
+            if not shared or (data := stored(path)) is None:  # not by one that was waited for
+                found = solve()
+                if shared or _new[kind] < MOST_NEW:
+                    _new[kind] += not shared
+                    _drop_old(path.parent)
+                    store(path, json.dumps(found).encode())
+                return found
+    found = json.loads(data)
     return found
-
-
-def _read(data: bytes) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(data)
-    return found
-
-
-def _keep(path: Path, found: dict[str, Any]) -> None:
-    _drop_old(path.parent)
-    store(path, json.dumps(found).encode())
 
 
 @cache

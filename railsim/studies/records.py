@@ -2,12 +2,13 @@
 
 import json
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import orjson
 
-from railsim.errors import input_error
+from railsim.errors import InputError, input_error
 from railsim.files.access import TABLE_BYTES, make_folder, read_text, write_text
 from railsim.text import plain
 
@@ -32,6 +33,18 @@ def read_record(path: Path) -> Record:
         raise input_error(str(path), "the record is damaged")
     record: Record = stored["record"]
     return record
+
+
+def kept_record(path: Path | None, remark: Callable[[str], None]) -> Record | None:
+    """Return a record stored before, if any; one that is damaged is removed, with a remark."""
+    if path is None or not path.exists():
+        return None
+    try:
+        return read_record(path)
+    except InputError as error:
+        remark(f"{error.faults[0]}: it is computed again")
+        path.unlink()
+        return None
 
 
 def _crc(record: Any) -> str:

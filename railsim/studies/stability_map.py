@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions import Settings, Track, Vehicle
-from railsim.errors import InputError, RailsimError
+from railsim.errors import RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import WorkerPool, available_cores
 from railsim.stability.critical_speed import checked, critical_speed
-from railsim.studies.records import Record, read_record, write_record
+from railsim.studies.records import Record, kept_record, write_record
 from railsim.table import Column, Table
 from railsim.version import __version__
 
@@ -59,13 +59,8 @@ def stability_map(
     for conicity in dict.fromkeys(point.at.get("conicity") for point in points):
         checked(Contact(*contact, conicity), **own)  # before the first point is computed
     paths = [_stored_path(folder, point, options) for point in points]
-    found: dict[int, Record] = {}
-    for number, path in enumerate(paths):
-        if path is not None and path.exists() and not overwrite:
-            try:
-                found[number] = read_record(path)
-            except InputError as error:
-                on_remark(f"{error.faults[0]}: it is computed again")
+    kept = {} if overwrite else {k: kept_record(path, on_remark) for k, path in enumerate(paths)}
+    found = {number: record for number, record in kept.items() if record is not None}
     progress(len(found) / len(points))
     waiting = {number: point for number, point in enumerate(points) if number not in found}
     count = min(workers or available_cores(), max(1, len(waiting)))

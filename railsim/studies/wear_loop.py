@@ -26,14 +26,14 @@ from railsim.definitions.limits import WheelLimits
 from railsim.definitions.settings import InitialState
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import Faults, InputError, ModelError, RailsimError, input_error
+from railsim.errors import Faults, ModelError, RailsimError, input_error
 from railsim.linear.circle import circle
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
 from railsim.simulation.conditions import SPEED_RANGE
-from railsim.studies.records import read_record, write_record
+from railsim.studies.records import kept_record, write_record
 from railsim.version import __version__
 
 AMPLITUDE = 3e-3  # m, at which EN 15302 compares equivalent conicities
@@ -210,10 +210,14 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
                 path = how.folder and how.folder / _file_name(
                     wearing, settings, how.step, law, worn
                 )
-                wear = _kept(path, remark) or _wear(wearing, settings, law, worn, at, part)
-                if path is not None and not path.exists():
-                    depths = {name: depth.tolist() for name, depth in wear.depths.items()}
-                    write_record(path, {"distance": at, "depths": depths, "hunts": wear.hunts})
+                if kept := kept_record(path, remark):
+                    depths = {name: np.asarray(depth) for name, depth in kept["depths"].items()}
+                    wear = _Wear(depths, kept["hunts"])
+                else:
+                    wear = _wear(wearing, settings, law, worn, at, part)
+                    if path is not None:
+                        lists = {name: depth.tolist() for name, depth in wear.depths.items()}
+                        write_record(path, {"distance": at, "depths": lists, "hunts": wear.hunts})
                 for route, words in wear.hunts.items():
                     if route not in hunting:
                         remark(f"after {wearing.amount(at)} on {route}: {words}")
@@ -332,20 +336,6 @@ def _others(wearing: Wearing, run: Run) -> list[Profile]:
     """Profiles of a run that do not wear."""
     names = _wheels(run.vehicle) | {*run.track.rail}
     return [load_profile(name) for name in names - {*wearing.names.values()}]
-
-
-def _kept(path: Path | None, remark: Callable[[str], None]) -> _Wear | None:
-    """Wear of a step that has been computed before; a damaged record is removed."""
-    if path is None or not path.exists():
-        return None
-    try:
-        record = read_record(path)
-    except InputError as error:
-        remark(f"{error.faults[0]}: it is computed again")
-        path.unlink()
-        return None
-    depths = {name: np.asarray(depth) for name, depth in record["depths"].items()}
-    return _Wear(depths, record["hunts"])
 
 
 def _wear(

@@ -3,7 +3,6 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,8 +18,8 @@ from railsim.errors import ModelError
 from railsim.kernels.state import velocity_begin
 from railsim.kernels.system import RADIUS
 from railsim.linear.vehicle import on_cones
-from railsim.model.assembly import assemble
-from railsim.model.equilibrium import RESIDUAL, _at_rest, _Balance, equilibrium
+from railsim.model.assembly import Index, assemble
+from railsim.model.equilibrium import RESIDUAL, _at_rest, equilibrium
 from railsim.profiles import load_profile
 
 DATA = Path(__file__).parents[1] / "data" / "vehicles"
@@ -71,14 +70,11 @@ def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
         assert found.model.system.contact.load == pytest.approx(np.full(2, weight / 4.0))
 
 
-def test_message_names_bodies_where_the_forces_of_elements_change_faster(monkeypatch):
+def test_message_names_bodies_where_the_forces_of_elements_change_faster():
     """Rates of internal forces, in N/s, are larger than any acceleration: they hid all bodies."""
-    balance = object.__new__(_Balance)
-    balance.model = SimpleNamespace(index=SimpleNamespace(n_bodies=2, bodies=("car", "frame")))
-    n = 2
-    balance._equations = np.array([6 * n + 2, 6 * n + 6 + 1, *(12 * n + np.arange(6))])
-    monkeypatch.setattr(_Balance, "_alternating", lambda *_: [])
-    message = balance._message(np.zeros(30), np.array([0.5, -2.0, *(1e6 * np.ones(6))]), 0.0)
+    index, n = Index(("car", "frame"), (), (), ()), 2
+    equations = np.array([6 * n + 2, 6 * n + 6 + 1, *(12 * n + np.arange(6))])
+    message = index.largest_left(equations, np.array([0.5, -2.0, *(1e6 * np.ones(6))]), 5)
     assert message.endswith("accelerations: frame y'' = -2, car z'' = 0.5")
 
 
