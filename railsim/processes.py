@@ -22,7 +22,7 @@ from multiprocessing.process import BaseProcess
 from types import ModuleType
 from typing import Any
 
-from railsim.threads import one_thread_each
+from railsim.threads import environment_kept, one_thread_each
 
 PRELOADED = "railsim.studies.worker"
 REQUESTS = tuple(
@@ -63,19 +63,14 @@ def workers_begin() -> Iterator[None]:
     which Python would import first.  And the script that calls railsim would be run again in each
     process, where it calls railsim again unless it has Python's guard: workers do not need it.
     """
-    before = os.environ.get("PYTHONSAFEPATH")
     script = sys.modules["__main__"]
-    os.environ["PYTHONSAFEPATH"] = "1"
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        with one_thread_each():
+    with environment_kept("PYTHONSAFEPATH"), one_thread_each():
+        os.environ["PYTHONSAFEPATH"] = "1"
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
             yield
-    finally:
-        sys.modules["__main__"] = script
-        if before is None:
-            del os.environ["PYTHONSAFEPATH"]
-        else:
-            os.environ["PYTHONSAFEPATH"] = before
+        finally:
+            sys.modules["__main__"] = script
 
 
 def worker_context() -> BaseContext:

@@ -21,15 +21,24 @@ def use_one_thread() -> None:
 
 
 @contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Let processes that are started within the block use one thread each."""
-    unset = [name for name in VARIABLES if name not in os.environ]
-    use_one_thread()
+def environment_kept(*names: str) -> Iterator[None]:
+    """Let variables of the environment be after the block what they were before."""
+    before = {name: os.environ.get(name) for name in names}
     try:
         yield
     finally:
-        for name in unset:
-            del os.environ[name]
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Let processes that are started within the block use one thread each."""
+    with environment_kept(*VARIABLES):
+        use_one_thread()
+        yield
 
 
 def keep_freed_memory() -> None:

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from railsim.definitions import Settings, Track, Vehicle
 from railsim.definitions.vehicle.laws import Law
 from railsim.errors import Fault, Faults
+from railsim.threads import environment_kept
 
 D = TypeVar("D", Vehicle, Track)
 PERMITTED = "RAILSIM_LAWS"
@@ -31,16 +32,10 @@ def allow(*sources: str) -> None:
 @contextmanager
 def allowed(everything: bool) -> Iterator[None]:
     """Permit all sources within a block, or change nothing."""
-    before = os.environ.get(PERMITTED)
-    if everything:
-        allow()
-    try:
+    with environment_kept(PERMITTED):
+        if everything:
+            allow()
         yield
-    finally:
-        if before is None:
-            os.environ.pop(PERMITTED, None)
-        else:
-            os.environ[PERMITTED] = before
 
 
 def is_allowed(source: str) -> bool:

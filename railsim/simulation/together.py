@@ -68,12 +68,9 @@ def simulate_together(
 
     results, errors = list[Result](), list[Exception]()
     for number, vehicle in enumerate(vehicles):
-        how: dict[str, Any] = {
-            "sink": sinks[number] if sinks else None,
-            "progress": partial(tell, number),
-        }
+        sink, part = sinks[number] if sinks else None, partial(tell, number)
         try:
-            results.append(simulate(vehicle, track, **conditions, **how))
+            results.append(simulate(vehicle, track, sink=sink, progress=part, **conditions))
         except Exception as error:
             error.add_note(f"this was vehicle {number + 1} of {count}")
             errors.append(error)
