@@ -3,9 +3,7 @@
 Between two chunks there is time for progress, Ctrl-C and for writing.
 """
 
-import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,7 +28,7 @@ from railsim.model.work import no_extremes, work_arrays
 from railsim.result import MemorySink, Sink
 from railsim.result.hunting import SEEN, thinned
 from railsim.simulation.outputs import OutputPlan
-from railsim.simulation.step_choice import StepChoice, duration
+from railsim.simulation.step_choice import StepChoice
 
 # Longest chunk in outputs, and in steps: some hundredths of a second of computing by the fast
 # scheme, and below a second by the other one
@@ -152,29 +150,9 @@ class TimeLoop:
             self._entries[function] = entry(function, self.system, self.work, *args)
         return result
 
-    def to_the_end(self, moved: Callable[[Floats], None]) -> None:
-        """Advance to the end; `moved` is called with the state after every chunk."""
-        run = self._run
-        while self.left() > 1e-9 or self.due:
-            begin = time.perf_counter()
-            choice = self.choice()
-            if run.ended:
-                return
-            run.status, run.where, rows = self._chunk(choice) if choice else self.last_record()
-            self.write(rows)
-            run.wall_time += time.perf_counter() - begin
-            moved(self.state)
-            self.begin_evaluation()
-            if run.status != RUNNING or run.ended:
-                return
-
-    def left(self) -> float:
-        """Time to the end at the present speed [s]."""
-        return self._run.prepared.left(self.state)
-
     def choice(self) -> tuple[float, int] | None:
         """Step and number of steps to the next output; none at the end, or where there is none."""
-        if self.left() <= 1e-9:
+        if self._run.prepared.left(self.state) <= ROUND_OFF:
             return None
         if self.spacing is not None:
             self.compiled(right_hand_sides, self.state[None], self.derivative[None])
@@ -190,86 +168,30 @@ class TimeLoop:
             run.error = error
         return None
 
-    def _chunk(self, choice: tuple[float, int] | None) -> tuple[int, int, int]:
-        """Advance by one chunk: status, where, number of records.
-
-        Where the speed varies the step is chosen anew at every output.
-        """
-        status, where, rows, steps = RUNNING, 0, 0, 0
-        while choice is not None:
-            step, every = choice
-            intervals = 1 if self.varies else min(ROWS, max(1, STEPS // every))
-            status, where, rows = self._intervals(step, every, intervals, rows)
-            steps += every
-            ends = status != RUNNING or rows >= ROWS or steps >= STEPS or self._evaluation_begins()
-            choice = None if ends or not self.varies else self.choice()
-        return status, where, rows
-
-    def _intervals(
-        self, step: float, every: int, intervals: int, rows: int
-    ) -> tuple[int, int, int]:
-        """Advance by some intervals between outputs after `rows` records of this chunk."""
-        if not self.evaluates:  # whose begin is the end of a chunk
-            before = self._run.prepared.evaluation - self.state[TIME]
-            intervals = min(intervals, max(1, math.ceil(before / (step * every) - ROUND_OFF)))
-        n_steps = min(intervals * every, math.ceil(self.left() / step * (1.0 - 1e-9)))
-        last = int(self.spacing is not None and n_steps == every)
-        goal = self.state[ARC_LENGTH] + (self.spacing or 0.0)
-        status, where, steps, rows = self.call(step, 0, n_steps - last, every, rows=rows)
-        if last and status == RUNNING:
-            # the last step of an interval of distance ends where the interval ends
-            rest = duration(
-                goal - self.state[ARC_LENGTH], self.state[SPEED], self.derivative[SPEED]
-            )
-            status, where, more, rows = self.call(rest, steps, 1, every, rows=rows)
-            steps += more
-        self.due = status == RUNNING and steps % every == 0
-        return status, where, rows
-
-    def _evaluation_begins(self) -> bool:
-        """Whether the part of the run that is evaluated begins here."""
-        begin = self._run.prepared.evaluation
-        return not self.evaluates and bool(self.state[TIME] >= begin - ROUND_OFF)
-
     def begin_evaluation(self) -> None:
         """Begin with new extremes where the part of the run begins that is evaluated."""
-        if not self._evaluation_begins():
-            return
-        take_extremes(self._run.extremes, self.work.extremes)
-        self.work.extremes[:] = no_extremes(self.work.extremes.shape[1])
-        self.evaluates = True
+        begin = self._run.prepared.evaluation
+        if not self.evaluates and self.state[TIME] >= begin - ROUND_OFF:
+            take_extremes(self._run.extremes, self.work.extremes)
+            self.work.extremes[:] = no_extremes(self.work.extremes.shape[1])
+            self.evaluates = True
 
     def last_record(self) -> tuple[int, int, int]:
         """Record the state at the end: status, where, number of records."""
         self.due = False
         memory = self.work.memory.copy()  # a run that goes on from here samples this instant itself
-        status, where, _, rows = self.call(1.0, 0, 0, 1, closing=1)
+        status, where, _, rows = self.call(1.0, Chunk(0, 0, 1, int(self.fresh), 1))
         self.work.memory[:] = memory
         return status, where, rows
 
-    def call(
-        self, step: float, first: int, n_steps: int, every: int, closing: int = 0, rows: int = 0
-    ) -> tuple[int, int, int, int]:
+    def call(self, step: float, chunk: Chunk) -> tuple[int, int, int, int]:
         """Call the time loop; its status, where, number of steps, of records with those before."""
         begin = time.thread_time()  # a library's idle threads may still be spinning
         divide_strikes(self.work, self.scheme, step, longest_part(self.system, self.state[SPEED]))
-        at, end = first, first + n_steps
-        while True:
-            # more than one call only within one output interval, which records at its begin:
-            # Ctrl-C is heard between calls
-            chunk = Chunk(at, min(STEPS, end - at), every, int(self.fresh), closing, rows)
-            status, where, steps, rows = self.call_once(step, chunk)
-            at += steps
-            self.fresh = self.fresh and steps == 0
-            if status != RUNNING or at >= end:
-                break
-        self._run.cpu_time += time.thread_time() - begin
-        return status, where, at - first, rows
-
-    def call_once(self, step: float, chunk: Chunk) -> tuple[int, int, int, int]:
-        """Call the time loop once."""
         arrays = self.state, self.derivative, self.stages, self.recorder
         status, where, steps, rows = self.compiled(time_loop, *arrays, self.scheme, step, chunk)
+        self.fresh = self.fresh and steps == 0
+        self._run.cpu_time += time.thread_time() - begin
         return status, where, steps, rows
 
     def write(self, rows: int) -> None:

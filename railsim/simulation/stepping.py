@@ -119,7 +119,6 @@ class Simulation:
         self._phase, self._missing, self._behind, self._rows = 0, 0.0, 0.0, 0
         self._written = -math.inf
         self._length, self._every, self._goal = 0.0, 1, 0.0
-        self._prepared_for, self._longest = math.nan, math.inf
         self._closed: Result | None = None
         self._begun: SavedState | None = None
         self._seen: Mapping[str, Floats] | None = None
@@ -197,7 +196,6 @@ class Simulation:
             dt = self._missing or self._next()
         elif not 0.0 < dt < math.inf:  # NaN is not
             raise argument_error("dt", f"found {dt} s", "a positive time")
-        begin = time.thread_time()
         self._seen = None
         left = float(dt) + self._taken_back() + self._behind
         while left > SHARE * self._length and self.running:
@@ -206,7 +204,6 @@ class Simulation:
                 break
             left -= self._part(left, whole)
         self._behind = left if self.running else 0.0
-        self._run.cpu_time += time.thread_time() - begin
         self._raise_error()
         return self.running
 
@@ -223,10 +220,7 @@ class Simulation:
         """Advance to an arc length [m] or by a time [s], else to the end; whether it goes on."""
         check_numbers(until=until, duration=duration)
         if until is None and duration is None:
-            if self._phase == 0 and self._missing == 0.0 and self.running and self._records:
-                self._to_the_end()
-            while self.running:
-                self.step(self._ahead())
+            self._to_the_end()
         elif until is None:
             return self.step(duration)
         else:
@@ -239,15 +233,20 @@ class Simulation:
         return self._missing + self.step_length * (1 if self._loop.varies else STEPS)
 
     def _to_the_end(self) -> None:
-        """Advance to the end by the chunks of `simulate`."""
-        self._flush()
-        self._seen = None
-
-        def moved(state: Floats) -> None:
-            left = self._run.prepared.left(state)
-            self._fraction.of_run(min(1.0, 1.0 - left / self._whole))
-
-        self._loop.to_the_end(moved)
+        """Advance to the end by whole steps, and hand on the records of up to `STEPS` at once."""
+        self._taken_back()
+        self._seen, self._behind = None, 0.0
+        while self.running:
+            begin, evaluated = time.perf_counter(), self._loop.evaluates
+            whole = self._next()
+            most = min(ROWS, max(1, STEPS // max(1, self._every)))
+            if not self._run.ended:
+                self._part(most * self._every * whole, whole)
+            if self._rows >= most or self._loop.evaluates != evaluated or not self.running:
+                self._flush()
+            self._run.wall_time += time.perf_counter() - begin
+            if self._records and self._rows == 0:
+                self._fraction.of_run(min(1.0, 1.0 - self._left() / self._whole))
         self._raise_error()
 
     def _left(self) -> float:
@@ -258,8 +257,6 @@ class Simulation:
         loop = self._loop
         if self._length == 0.0 or loop.varies:
             self._length, self._every = loop.choice() or (math.nan, 0)
-            self._longest = longest_part(loop.system, loop.state[SPEED])
-            self._prepared_for = math.nan
             self._goal = loop.state[ARC_LENGTH] + (loop.spacing or 0.0)
 
     def _next(self) -> float:
@@ -278,14 +275,14 @@ class Simulation:
         loop, every = self._loop, self._every
         if self._missing > 0.0:
             taken = self._missing if self._missing <= most + SHARE * whole else most
-            self._call(taken, 1, 1, NEVER)
+            self._call(taken, 1, 1, NEVER, whole=False)
             self._missing -= taken
             self._on_grid(int(self._missing <= SHORTEST))
             return taken
         steps = int(most / whole * (1.0 + ROUND_OFF) + SHARE)
         if steps == 0:
             self._begun = self.state
-            self._call(most, self._phase, 1, every)
+            self._call(most, self._phase, 1, every, whole=False)
             self._missing, loop.due = whole - most, False
             return most
         steps = min(steps, STEPS, max(1, math.ceil(self._left() / whole * (1.0 - 1e-9))))
@@ -311,19 +308,17 @@ class Simulation:
             if self._rows >= ROWS:
                 self._flush()
 
-    def _call(self, length: float, first: int, steps: int, every: int) -> int:
+    def _call(
+        self, length: float, first: int, steps: int, every: int, *, whole: bool = True
+    ) -> int:
         """Call the time loop; the number of steps that it has taken."""
         loop, run = self._loop, self._run
-        if length != self._prepared_for:
-            divide_strikes(loop.work, loop.scheme, length, self._longest)
-            self._prepared_for = length
-        kept = loop.work.vibration.copy() if length < self._length else 0.0  # of whole steps
+        kept = 0.0 if whole else loop.work.vibration.copy()  # of whole steps
         if not self._records:
             first, every = first + 1, NEVER
         chunk = Chunk(first, steps, every, int(loop.fresh), 0, self._rows)
-        run.status, run.where, taken, self._rows = loop.call_once(length, chunk)
-        loop.fresh = loop.fresh and taken == 0
-        if length < self._length:
+        run.status, run.where, taken, self._rows = loop.call(length, chunk)
+        if not whole:
             loop.work.vibration[:] = kept
         if run.status != RUNNING:
             self._flush()
@@ -420,7 +415,7 @@ class Simulation:
         (work, recorder), state = self._probe, loop.state.copy()
         work.memory[:] = loop.work.memory
         work.rail_motion[:] = loop.work.rail_motion
-        divide_strikes(work, loop.scheme, length, self._longest)
+        divide_strikes(work, loop.scheme, length, longest_part(loop.system, loop.state[SPEED]))
         status, where, _, _ = time_loop(
             loop.system,
             work,
