@@ -18,7 +18,7 @@ from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import AGAIN
+from railsim.kernels.system import Work
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
@@ -96,16 +96,14 @@ class Run:
     # what shows whether it hunts, see `railsim.result.hunting`
     swings: MemorySink = field(default_factory=lambda: MemorySink(only=SEEN))
 
-    # from its end on
+    # of its time loop
     state: Floats = field(init=False)  # where it is, float64[n_state]
-    memory: Floats = field(init=False)  # of laws, commands and samples there
-    # loaded contact patches, and those out of the creep law's range; look-ups beyond the yaw of the
-    # contact table
-    events: Integers = field(init=False)
-    parts: Integers = field(init=False)  # counts of steps, see `railsim.kernels.system`
-    again: int = field(init=False)  # how often the contact of one wheelset was evaluated again
-    unloaded: Floats = field(init=False)  # s in which each wheel carried nothing
-    vibration: Floats = field(init=False)  # of the wheel loads, see `railsim.kernels.vibration`
+    work: Work = field(init=False)  # counts, and memory of laws, commands and samples
+
+    @property
+    def events(self) -> Integers:
+        """Loaded patches, those out of the creep law's range; look-ups beyond the table's yaw."""
+        return np.asarray(self.work.events[:, [0, 1, 4]].sum(axis=0))
 
     @property
     def ended(self) -> bool:
@@ -134,8 +132,8 @@ class TimeLoop:
         self.work.memory[:] = prepared.memory
         self.derivative = np.zeros_like(self.state)
         self.stages = np.zeros((3, len(self.state)))
-        # whether nothing was before the state, and whether it is to be recorded
-        self.fresh, self.due = prepared.fresh, True
+        run.state, run.work = self.state, self.work
+        self.fresh = prepared.fresh  # whether nothing was before the state
         self.evaluates = self.state[TIME] >= prepared.evaluation - ROUND_OFF
         self.varies = prepared.steps.varies
         # equal steps of distance while the speed changes: the last step of an interval ends there
@@ -178,7 +176,6 @@ class TimeLoop:
 
     def last_record(self) -> tuple[int, int, int]:
         """Record the state at the end: status, where, number of records."""
-        self.due = False
         memory = self.work.memory.copy()  # a run that goes on from here samples this instant itself
         status, where, _, rows = self.call(1.0, Chunk(0, 0, 1, int(self.fresh), 1))
         self.work.memory[:] = memory
@@ -210,7 +207,7 @@ class TimeLoop:
     def saved(self) -> SavedState:
         """All that the run goes on from, a copy."""
         counted = tuple(getattr(self.work, name).copy() for name in COUNTED)
-        grid = self.fresh, self.due, self.evaluates, float(self.derivative[SPEED])
+        grid = self.fresh, self.evaluates, float(self.derivative[SPEED])
         return SavedState(self.state.copy(), counted, grid)
 
     def restore(self, saved: SavedState) -> None:
@@ -218,18 +215,13 @@ class TimeLoop:
         self.state[:] = saved.motion
         for name, values in zip(COUNTED, saved.counted, strict=True):
             getattr(self.work, name)[...] = values
-        self.fresh, self.due, self.evaluates, self.derivative[SPEED] = saved.grid[-4:]
+        self.fresh, self.evaluates, self.derivative[SPEED] = saved.grid[-3:]
 
     def give_back(self) -> None:
-        """Let the run have its state and counts."""
-        run, work = self._run, self.work
-        run.state, run.memory = self.state, work.memory
-        run.events = work.events[:, [0, 1, 4]].sum(axis=0)
-        run.again = int(work.events[:, AGAIN].sum())
-        run.parts, run.unloaded, run.vibration = work.parts, work.unloaded, work.vibration
-        take_extremes(run.extremes, work.extremes)
+        """Let the run have its extremes to the end."""
+        take_extremes(self._run.extremes, self.work.extremes)
         if self.evaluates:
-            take_extremes(run.evaluated, work.extremes)
+            take_extremes(self._run.evaluated, self.work.extremes)
 
 
 def take_extremes(before: Floats, later: Floats) -> None:

@@ -8,7 +8,7 @@ import time
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.kernels.state import TIME
 from railsim.kernels.status import DERAILED, LAW_NOT_FINITE, ROLL_RANGE, STATUS, WHEEL_LIFT
-from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS
+from railsim.kernels.system import AGAIN, DIVIDED, EVALUATIONS, STEPS
 from railsim.notation import ROLL, Z
 from railsim.result import Result
 from railsim.result.hunting import hunting
@@ -52,17 +52,17 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: TakenUp | None) -> R
         "cpu_time": run.cpu_time,
         "patches_evaluated": int(run.events[0]),
         "patches_out_of_range": int(run.events[1]),
-        "steps": int(run.parts[STEPS]),
-        "steps_divided": int(run.parts[DIVIDED]),
-        "evaluations": int(run.parts[EVALUATIONS]),
-        "contacts_evaluated_again": run.again,
+        "steps": int(run.work.parts[STEPS]),
+        "steps_divided": int(run.work.parts[DIVIDED]),
+        "evaluations": int(run.work.parts[EVALUATIONS]),
+        "contacts_evaluated_again": int(run.work.events[:, AGAIN].sum()),
         "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
     }
     Q0, groups = prepared.balance.Q0, {"state": {"end": run.state}}
     if before is not None:
         groups["state"] |= {"start": before.motion, "start_memory": prepared.memory}
-    if len(run.memory) > 1:
-        groups["state"]["memory"] = run.memory
+    if len(run.work.memory) > 1:
+        groups["state"]["memory"] = run.work.memory
     if settings.outputs.low_pass is None:  # else the peaks are those of what is stored, filtered
         groups["peaks"] = run_extremes(of_peaks, Q0)
     result = run.sink.close(attributes, {"Q0": Q0}, prepared.model.profiles, groups)

@@ -73,10 +73,10 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             float(run.state[SPEED]),
         ),
         *beyond_experience(extremes, Q0, wheelsets),
-        lifted_wheels(extremes, run.unloaded, wheelsets),
+        lifted_wheels(extremes, run.work.unloaded, wheelsets),
         stability(swings, extremes, duration) if hunts or not uneven else "",
         vibration(
-            run.vibration,
+            run.work.vibration,
             Q0,
             wheelsets,
             irregular=irregular,
@@ -85,10 +85,10 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             elastic=bool(support.elastic),
             hunts=hunts,
         ),
-        alternation(run.vibration, Q0, wheelsets, int(run.parts[DIVIDED])),
+        alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2])),
-        unsettled_rails(int(run.parts[UNSETTLED])),
+        unsettled_rails(int(run.work.parts[UNSETTLED])),
         uneven_wheels_on(support) if uneven else "",
     ]
     return tuple(dict.fromkeys(filter(None, found)))

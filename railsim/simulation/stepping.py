@@ -166,8 +166,7 @@ class Simulation:
         run = copy(self._run)
         run.extremes = run.extremes.copy()
         if self._closed is None:
-            run.state = self._loop.state
-            take_extremes(run.extremes, self._loop.work.extremes)
+            take_extremes(run.extremes, run.work.extremes)
         return verdict(run)
 
     @property
@@ -283,7 +282,7 @@ class Simulation:
         if steps == 0:
             self._begun = self.state
             self._call(most, self._phase, 1, every, whole=False)
-            self._missing, loop.due = whole - most, False
+            self._missing = whole - most
             return most
         steps = min(steps, STEPS, max(1, math.ceil(self._left() / whole * (1.0 - 1e-9))))
         if loop.varies:  # the last step of an interval of distance has its own length
@@ -302,7 +301,6 @@ class Simulation:
         if steps:
             self._missing = 0.0
             self._phase = (self._phase + steps) % self._every
-            self._loop.due = self._phase == 0
             if self._phase == 0:
                 self._loop.begin_evaluation()
             if self._rows >= ROWS:
@@ -465,8 +463,8 @@ class Simulation:
         """End the run where it is, and return its result."""
         if self._closed is None:
             loop = self._loop
-            due = self._phase == 0 and self._missing == 0.0 and loop.due
-            if due and self._records and self._run.status == RUNNING:
+            due = self._phase == 0 and self._missing == 0.0 and self._run.status == RUNNING
+            if due and self._records:
                 self._flush()
                 self._run.status, self._run.where, self._rows = loop.last_record()
             self._flush()
