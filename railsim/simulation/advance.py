@@ -4,7 +4,7 @@ Between two chunks there is time for progress, Ctrl-C and for writing.
 """
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import Work
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
@@ -80,11 +79,12 @@ class Preparation:
 
 @dataclass(eq=False)
 class Run:
-    """A run on its way."""
+    """A run on its way: its time loop, what that reads and writes, and where it is."""
 
     prepared: Preparation
     plan: OutputPlan
     sink: Sink
+    settings: InitVar[Settings]
     status: int = RUNNING  # how it ended, see `railsim.kernels.status`
     where: int = 0  # likewise
     cpu_time: float = 0.0  # what the time loop took [s]
@@ -96,9 +96,27 @@ class Run:
     # what shows whether it hunts, see `railsim.result.hunting`
     swings: MemorySink = field(default_factory=lambda: MemorySink(only=SEEN))
 
-    # of its time loop
-    state: Floats = field(init=False)  # where it is, float64[n_state]
-    work: Work = field(init=False)  # counts, and memory of laws, commands and samples
+    def __post_init__(self, settings: Settings) -> None:
+        prepared, model = self.prepared, self.prepared.model
+        wheelsets = len(model.index.wheelsets)
+        # largest and smallest values so far, see `railsim.kernels.extremes`
+        self.extremes: Floats = no_extremes(wheelsets)
+        self.evaluated: Floats = no_extremes(wheelsets)  # since the evaluation began
+        self.swings.begin(self.plan.coordinates)
+        self.scheme = SCHEMES[settings.scheme]
+        self.recorder = self.plan.recorder(ROWS)
+        self.system = rolling(model.system, model.wheels, model.check, model.rails)
+        self.work = work_arrays(self.system)
+        self.state: Floats = prepared.state.copy()
+        self.work.memory[:] = prepared.memory
+        self.derivative = np.zeros_like(self.state)
+        self.stages = np.zeros((3, len(self.state)))
+        self.fresh = prepared.fresh  # whether nothing was before the state
+        self.evaluates = self.state[TIME] >= prepared.evaluation - ROUND_OFF
+        self.varies = prepared.steps.varies
+        # equal steps of distance while the speed changes: the last step of an interval ends there
+        self.spacing = settings.output_spacing if self.varies else None
+        self._entries: dict[object, Any] = {}
 
     @property
     def events(self) -> Integers:
@@ -110,35 +128,9 @@ class Run:
         """Whether it has ended before its end, but for what the time loop says."""
         return self.error is not None or bool(self.stopped)
 
-    def __post_init__(self) -> None:
-        wheelsets = len(self.prepared.model.index.wheelsets)
-        # largest and smallest values so far, see `railsim.kernels.extremes`
-        self.extremes: Floats = no_extremes(wheelsets)
-        self.evaluated: Floats = no_extremes(wheelsets)  # since the evaluation began
-        self.swings.begin(self.plan.coordinates)
-
-
-class TimeLoop:
-    """The time loop of a run: what it reads and writes, and where it is."""
-
-    def __init__(self, run: Run, settings: Settings) -> None:
-        self._run = run
-        prepared, model = run.prepared, run.prepared.model
-        self.scheme = SCHEMES[settings.scheme]
-        self.recorder = run.plan.recorder(ROWS)
-        self.system = rolling(model.system, model.wheels, model.check, model.rails)
-        self.work = work_arrays(self.system)
-        self.state = prepared.state.copy()
-        self.work.memory[:] = prepared.memory
-        self.derivative = np.zeros_like(self.state)
-        self.stages = np.zeros((3, len(self.state)))
-        run.state, run.work = self.state, self.work
-        self.fresh = prepared.fresh  # whether nothing was before the state
-        self.evaluates = self.state[TIME] >= prepared.evaluation - ROUND_OFF
-        self.varies = prepared.steps.varies
-        # equal steps of distance while the speed changes: the last step of an interval ends there
-        self.spacing = settings.output_spacing if self.varies else None
-        self._entries: dict[object, Any] = {}
+    def left(self) -> float:
+        """Time to its end at the present speed [s]."""
+        return self.prepared.left(self.state)
 
     def compiled(self, function: Any, *args: object) -> Any:
         """Call a compiled function of system and work arrays, without a search for types."""
@@ -150,27 +142,27 @@ class TimeLoop:
 
     def choice(self) -> tuple[float, int] | None:
         """Step and number of steps to the next output; none at the end, or where there is none."""
-        if self._run.prepared.left(self.state) <= ROUND_OFF:
+        if self.left() <= ROUND_OFF:
             return None
         if self.spacing is not None:
             self.compiled(right_hand_sides, self.state[None], self.derivative[None])
-        run, speed = self._run, self.state[SPEED]
+        speed = self.state[SPEED]
         try:
-            return run.prepared.steps.at(speed, self.derivative[SPEED])
+            return self.prepared.steps.at(speed, self.derivative[SPEED])
         except RailsimError as error:  # no equilibrium at this speed, or no stable step
-            if self.state[TIME] > run.prepared.state[TIME]:
-                run.stopped = f"the run cannot go on at {speed:.3g} m/s: {error}"
+            if self.state[TIME] > self.prepared.state[TIME]:
+                self.stopped = f"the run cannot go on at {speed:.3g} m/s: {error}"
             else:
-                run.error = error
+                self.error = error
         except Exception as error:
-            run.error = error
+            self.error = error
         return None
 
     def begin_evaluation(self) -> None:
         """Begin with new extremes where the part of the run begins that is evaluated."""
-        begin = self._run.prepared.evaluation
+        begin = self.prepared.evaluation
         if not self.evaluates and self.state[TIME] >= begin - ROUND_OFF:
-            take_extremes(self._run.extremes, self.work.extremes)
+            take_extremes(self.extremes, self.work.extremes)
             self.work.extremes[:] = no_extremes(self.work.extremes.shape[1])
             self.evaluates = True
 
@@ -188,21 +180,20 @@ class TimeLoop:
         arrays = self.state, self.derivative, self.stages, self.recorder
         status, where, steps, rows = self.compiled(time_loop, *arrays, self.scheme, step, chunk)
         self.fresh = self.fresh and steps == 0
-        self._run.cpu_time += time.thread_time() - begin
+        self.cpu_time += time.thread_time() - begin
         return status, where, steps, rows
 
     def write(self, rows: int) -> None:
-        """Hand the records of a chunk to the run's sink."""
+        """Hand the records of a chunk to the sink."""
         if rows == 0:
             return
-        run = self._run
         try:
-            chunk = run.plan.chunk(self.recorder, rows, run.prepared.balance.Q0)
-            run.swings.append(thinned(chunk))
-            run.sink.append(chunk)
-            run.stopped = run.stopped or chunk.wrong
+            chunk = self.plan.chunk(self.recorder, rows, self.prepared.balance.Q0)
+            self.swings.append(thinned(chunk))
+            self.sink.append(chunk)
+            self.stopped = self.stopped or chunk.wrong
         except Exception as error:
-            run.error = error
+            self.error = error
 
     def saved(self) -> SavedState:
         """All that the run goes on from, a copy."""
@@ -217,11 +208,11 @@ class TimeLoop:
             getattr(self.work, name)[...] = values
         self.fresh, self.evaluates, self.derivative[SPEED] = saved.grid[-3:]
 
-    def give_back(self) -> None:
-        """Let the run have its extremes to the end."""
-        take_extremes(self._run.extremes, self.work.extremes)
+    def take_last_extremes(self) -> None:
+        """Take those to the end into the extremes."""
+        take_extremes(self.extremes, self.work.extremes)
         if self.evaluates:
-            take_extremes(self._run.evaluated, self.work.extremes)
+            take_extremes(self.evaluated, self.work.extremes)
 
 
 def take_extremes(before: Floats, later: Floats) -> None:

@@ -171,7 +171,7 @@ def begin(
     stored = StoredPeaks(sink, prepared.evaluation)
     sink = filtering(stored, settings)
     sink.begin(plan.coordinates, plan.quantities)
-    run = Run(prepared, plan, sink, wall_time=time.perf_counter() - began)
+    run = Run(prepared, plan, sink, settings, wall_time=time.perf_counter() - began)
     # which holds neither the sink nor the run: a circle would keep the tables in memory
     largest, Q0 = stored.largest, prepared.balance.Q0
     of_part = run.extremes, run.evaluated

@@ -33,7 +33,7 @@ from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
 from railsim.profiles import Profile
 from railsim.result import Hdf5Sink, MemorySink, Result, Sink
-from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, SavedState, TimeLoop, take_extremes
+from railsim.simulation.advance import ROUND_OFF, ROWS, STEPS, SavedState, take_extremes
 from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.conditions import Inputs, check_numbers, own_speed, state_before
 from railsim.simulation.ending import end, verdict
@@ -114,8 +114,7 @@ class Simulation:
         DOING.info("")
         self._vehicle, self._inputs, self._before, self._run = vehicle, inputs, before, run
         self._records = record is not False
-        self._loop = TimeLoop(run, settings)
-        self._whole = max(run.prepared.left(run.prepared.state), SHORTEST)
+        self._whole = max(run.left(), SHORTEST)
         self._phase, self._missing, self._behind, self._rows = 0, 0.0, 0.0, 0
         self._written = -math.inf
         self._length, self._every, self._goal = 0.0, 1, 0.0
@@ -127,17 +126,17 @@ class Simulation:
     @property
     def time(self) -> float:
         """Time [s]."""
-        return float(self._loop.state[TIME])
+        return float(self._run.state[TIME])
 
     @property
     def distance(self) -> float:
         """Arc length of the reference body [m]."""
-        return float(self._loop.state[ARC_LENGTH])
+        return float(self._run.state[ARC_LENGTH])
 
     @property
     def speed(self) -> float:
         """Speed of the reference body [m/s]."""
-        return float(self._loop.state[SPEED])
+        return float(self._run.state[SPEED])
 
     @property
     def step_length(self) -> float:
@@ -149,7 +148,8 @@ class Simulation:
     @property
     def running(self) -> bool:
         """Whether the run goes on."""
-        return self._run.status == RUNNING and not self._run.ended and self._left() > ROUND_OFF
+        run = self._run
+        return run.status == RUNNING and not run.ended and run.left() > ROUND_OFF
 
     @property
     def status(self) -> str:
@@ -229,49 +229,46 @@ class Simulation:
 
     def _ahead(self) -> float:
         """Time of a good number of whole steps, fewer where the speed changes."""
-        return self._missing + self.step_length * (1 if self._loop.varies else STEPS)
+        return self._missing + self.step_length * (1 if self._run.varies else STEPS)
 
     def _to_the_end(self) -> None:
         """Advance to the end by whole steps, and hand on the records of up to `STEPS` at once."""
         self._taken_back()
         self._seen, self._behind = None, 0.0
         while self.running:
-            begin, evaluated = time.perf_counter(), self._loop.evaluates
+            begin, evaluated = time.perf_counter(), self._run.evaluates
             whole = self._next()
             most = min(ROWS, max(1, STEPS // max(1, self._every)))
             if not self._run.ended:
                 self._part(most * self._every * whole, whole)
-            if self._rows >= most or self._loop.evaluates != evaluated or not self.running:
+            if self._rows >= most or self._run.evaluates != evaluated or not self.running:
                 self._flush()
             self._run.wall_time += time.perf_counter() - begin
             if self._records and self._rows == 0:
-                self._fraction.of_run(min(1.0, 1.0 - self._left() / self._whole))
+                self._fraction.of_run(min(1.0, 1.0 - self._run.left() / self._whole))
         self._raise_error()
-
-    def _left(self) -> float:
-        return self._run.prepared.left(self._loop.state)
 
     def _begin_interval(self) -> None:
         """Choose step and number of steps to the next output where the speed changes."""
-        loop = self._loop
-        if self._length == 0.0 or loop.varies:
-            self._length, self._every = loop.choice() or (math.nan, 0)
-            self._goal = loop.state[ARC_LENGTH] + (loop.spacing or 0.0)
+        run = self._run
+        if self._length == 0.0 or run.varies:
+            self._length, self._every = run.choice() or (math.nan, 0)
+            self._goal = run.state[ARC_LENGTH] + (run.spacing or 0.0)
 
     def _next(self) -> float:
         """Length of the next step of the grid [s]."""
-        loop = self._loop
+        run = self._run
         if self._phase == 0 and self._missing == 0.0:
             self._begin_interval()
-        if loop.spacing is None or self._phase < self._every - 1 or self._run.ended:
+        if run.spacing is None or self._phase < self._every - 1 or run.ended:
             return self._length
         # the last step of an interval of distance ends where the interval ends
-        s, v = loop.state[ARC_LENGTH], loop.state[SPEED]
-        return time_for(self._goal - s, v, loop.derivative[SPEED])
+        s, v = run.state[ARC_LENGTH], run.state[SPEED]
+        return time_for(self._goal - s, v, run.derivative[SPEED])
 
     def _part(self, most: float, whole: float) -> float:
         """Take whole steps, or a part of one, within a time `most` [s]; the time taken."""
-        loop, every = self._loop, self._every
+        run, every = self._run, self._every
         if self._missing > 0.0:
             taken = self._missing if self._missing <= most + SHARE * whole else most
             self._call(taken, 1, 1, NEVER, whole=False)
@@ -284,13 +281,13 @@ class Simulation:
             self._call(most, self._phase, 1, every, whole=False)
             self._missing = whole - most
             return most
-        steps = min(steps, STEPS, max(1, math.ceil(self._left() / whole * (1.0 - 1e-9))))
-        if loop.varies:  # the last step of an interval of distance has its own length
-            one = int(loop.spacing is not None and self._phase < every - 1)
+        steps = min(steps, STEPS, max(1, math.ceil(run.left() / whole * (1.0 - 1e-9))))
+        if run.varies:  # the last step of an interval of distance has its own length
+            one = int(run.spacing is not None and self._phase < every - 1)
             steps = min(steps, every - self._phase - one)
         elif self._records:
             steps = min(steps, (ROWS - self._rows) * every - self._phase)
-        if not loop.evaluates:
+        if not run.evaluates:
             steps = min(steps, every - self._phase)
         taken = self._call(whole, self._phase, steps, every)
         self._on_grid(taken)
@@ -302,7 +299,7 @@ class Simulation:
             self._missing = 0.0
             self._phase = (self._phase + steps) % self._every
             if self._phase == 0:
-                self._loop.begin_evaluation()
+                self._run.begin_evaluation()
             if self._rows >= ROWS:
                 self._flush()
 
@@ -310,14 +307,14 @@ class Simulation:
         self, length: float, first: int, steps: int, every: int, *, whole: bool = True
     ) -> int:
         """Call the time loop; the number of steps that it has taken."""
-        loop, run = self._loop, self._run
-        kept = 0.0 if whole else loop.work.vibration.copy()  # of whole steps
+        run = self._run
+        kept = 0.0 if whole else run.work.vibration.copy()  # of whole steps
         if not self._records:
             first, every = first + 1, NEVER
-        chunk = Chunk(first, steps, every, int(loop.fresh), 0, self._rows)
-        run.status, run.where, taken, self._rows = loop.call(length, chunk)
+        chunk = Chunk(first, steps, every, int(run.fresh), 0, self._rows)
+        run.status, run.where, taken, self._rows = run.call(length, chunk)
         if not whole:
-            loop.work.vibration[:] = kept
+            run.work.vibration[:] = kept
         if run.status != RUNNING:
             self._flush()
         return int(taken)
@@ -325,8 +322,8 @@ class Simulation:
     def _flush(self) -> None:
         """Hand what has been recorded to the sink."""
         if self._rows:
-            self._written = float(self._loop.recorder.state[self._rows - 1, TIME])
-        self._loop.write(self._rows)
+            self._written = float(self._run.recorder.state[self._rows - 1, TIME])
+        self._run.write(self._rows)
         self._rows = 0
 
     def _raise_error(self) -> None:
@@ -353,12 +350,12 @@ class Simulation:
             raise argument_error("actuator", found, allowed)
         if not math.isfinite(value):
             raise argument_error("value", f"found {value}", "a finite number")
-        loop, number = self._loop, names.index(actuator)
-        memory = loop.work.memory
-        if value == memory[loop.system.actuators.which[number, COMMAND]]:
+        run, number = self._run, names.index(actuator)
+        memory = run.work.memory
+        if value == memory[run.system.actuators.which[number, COMMAND]]:
             return
         plain = getattr(send, "py_func", send)
-        if not plain(loop.system.actuators, memory, number, float(value), self.time):
+        if not plain(run.system.actuators, memory, number, float(value), self.time):
             found = "more commands than one every 0.25 ms are on their way"
             raise argument_error("actuator", found, "fewer commands", actuator)
         self._seen = self._begun = None
@@ -373,9 +370,9 @@ class Simulation:
         displacement, velocity : float64[wheelset, side, 2]
             Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
         """
-        if self._loop.system.support.elastic:
+        if self._run.system.support.elastic:
             raise argument_error("set_rails", "a track with a support", "rigid rails")
-        motion = self._loop.work.rail_motion
+        motion = self._run.work.rail_motion
         before = motion.copy()
         motion[..., :2], motion[..., 2:] = displacement, velocity
         if not np.array_equal(motion, before):
@@ -393,7 +390,7 @@ class Simulation:
         signals = self._run.prepared.model.index.signals
         values = self._present()
         if name in signals:
-            base = self._loop.system.signals.which[signals.index(name), BASE]
+            base = self._run.system.signals.which[signals.index(name), BASE]
             return float(self._probe[0].memory[base + VALUE])
         if name in values:
             value = np.asarray(values[name])
@@ -407,23 +404,23 @@ class Simulation:
         """Quantities at the present state, evaluated beside the loop."""
         if self._seen is not None:
             return self._seen
-        loop, run, length = self._loop, self._run, self.step_length
+        run, length = self._run, self.step_length
         if self._probe is None:
-            self._probe = work_arrays(loop.system), run.plan.recorder(1)
-        (work, recorder), state = self._probe, loop.state.copy()
-        work.memory[:] = loop.work.memory
-        work.rail_motion[:] = loop.work.rail_motion
-        divide_strikes(work, loop.scheme, length, longest_part(loop.system, loop.state[SPEED]))
+            self._probe = work_arrays(run.system), run.plan.recorder(1)
+        (work, recorder), state = self._probe, run.state.copy()
+        work.memory[:] = run.work.memory
+        work.rail_motion[:] = run.work.rail_motion
+        divide_strikes(work, run.scheme, length, longest_part(run.system, run.state[SPEED]))
         status, where, _, _ = time_loop(
-            loop.system,
+            run.system,
             work,
             state,
             np.zeros_like(state),
-            loop.stages,
+            run.stages,
             recorder,
-            loop.scheme,
+            run.scheme,
             length,
-            Chunk(0, 0, 1, int(loop.fresh), 1),
+            Chunk(0, 0, 1, int(run.fresh), 1),
         )
         if status != RUNNING:
             run.status, run.where = status, where
@@ -436,41 +433,41 @@ class Simulation:
     @property
     def state(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        saved, run = self._loop.saved(), self._run
+        run, saved = self._run, self._run.saved()
         grid = (self._phase, self._missing, self._behind, self._length, self._every, self._goal)
         return replace(saved, grid=(*grid, run.status, run.where, *saved.grid), begun=self._begun)
 
     @state.setter
     def state(self, saved: SavedState) -> None:
-        loop = self._loop
-        if saved.motion.shape != loop.state.shape:
+        run = self._run
+        if saved.motion.shape != run.state.shape:
             found = f"a state of {saved.motion.size} values"
-            allowed = f"{loop.state.size} values, those of this vehicle and track"
+            allowed = f"{run.state.size} values, those of this vehicle and track"
             raise argument_error("state", found, allowed)
-        recorded = loop.recorder.state[: self._rows, TIME]
+        recorded = run.recorder.state[: self._rows, TIME]
         if self._records and saved.motion[TIME] < self._written + SHORTEST:
             found = "an instant before what is recorded already"
             raise argument_error("state", found, "record=False")
         self._rows = int(np.searchsorted(recorded, saved.motion[TIME] - SHORTEST))
-        loop.restore(saved)
+        run.restore(saved)
         self._phase, self._missing, self._behind, self._length, self._every, self._goal = (
             saved.grid[:6]
         )
-        self._run.status, self._run.where = saved.grid[6:8]
+        run.status, run.where = saved.grid[6:8]
         self._seen, self._begun = None, saved.begun
 
     def result(self) -> Result:
         """End the run where it is, and return its result."""
         if self._closed is None:
-            loop = self._loop
-            due = self._phase == 0 and self._missing == 0.0 and self._run.status == RUNNING
+            run = self._run
+            due = self._phase == 0 and self._missing == 0.0 and run.status == RUNNING
             if due and self._records:
                 self._flush()
-                self._run.status, self._run.where, self._rows = loop.last_record()
+                run.status, run.where, self._rows = run.last_record()
             self._flush()
             self._raise_error()
-            loop.give_back()
-            self._closed = end(self._run, self._vehicle, self._inputs, self._before)
+            run.take_last_extremes()
+            self._closed = end(run, self._vehicle, self._inputs, self._before)
         return self._closed
 
     def __enter__(self) -> Self:
