@@ -123,7 +123,7 @@ def _follow(
         return
     try:
         for now in shooting.followed(before, ARC_STEP, within):
-            if before.tangent[-1] * now.tangent[-1] < 0.0 and before.amplitude > 0.0:
+            if before.tangent[-1] * now.tangent[-1] < 0.0:
                 length = float(np.linalg.norm(now.tangent)) * ARC_STEP
                 found.folds.append(_point(shooting.fold(before, now, length)))
             points.append(_point(now))

@@ -370,8 +370,6 @@ def _by_ramp(
             )
     if lowest is None:
         found.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {found.high:g} m/s")
-    elif lowest.speed <= found.low:
-        found.remarks.append(f"ramp: hunts still at the lower end, {found.low:g} m/s")
     if branch.points[0].speed < found.high:
         top = branch.points[0].speed
         found.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
@@ -421,8 +419,6 @@ def _by_diagram(
         found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
     if lowest is None and reached is not None:
         found.remarks.append(f"bifurcation: nothing hunts {tried} at any of the {points} speeds")
-    elif lowest is not None and lowest.speed <= found.low:
-        found.remarks.append(f"bifurcation: hunts still at the lower end, {found.low:g} m/s")
 
 
 def _by_continuation(
@@ -431,7 +427,8 @@ def _by_continuation(
     followed = followed_branches(motion, begins, found.branches, (found.low, found.high), progress)
     found.branches += followed.branches
     found.remarks += followed.remarks
-    ends = list(followed.folds)
+    # a branch that is left unfinished ends at its slowest motion or further down
+    ends = [*followed.folds, *(point for one in followed.branches for point in one.points)]
     if begins.parameter is not None and followed.begins is not None:
         rising = followed.begins.speed > begins.parameter - 0.5 * RESOLUTION
         found.onset = "supercritical" if rising else "subcritical"
@@ -488,7 +485,10 @@ def _conclude(
 
 
 def _remark_range(found: CriticalSpeed, vehicle: Vehicle) -> None:
-    """Say where the search ends below the speed that a vehicle is to be judged at."""
+    """Say where hunting goes on below the range, or a vehicle is to be judged above it."""
+    for method, point in found.nonlinear.items():
+        if point is not None and point.speed <= found.low:
+            found.remarks.append(f"{method}: hunts still at the lower end, {found.low:g} m/s")
     if vehicle.service is None:
         return
     needed = MARGIN * vehicle.service.admissible_speed

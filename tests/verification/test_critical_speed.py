@@ -19,7 +19,14 @@ from railsim.plot.stability import bifurcation_figure
 from railsim.stability import continuation
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
-from railsim.stability.critical_speed import OF_CONICITY, _by_ramp, _speeds, critical_speed
+from railsim.stability.critical_speed import (
+    OF_CONICITY,
+    _by_continuation,
+    _by_ramp,
+    _remark_range,
+    _speeds,
+    critical_speed,
+)
 from railsim.stability.diagram import diagram
 from railsim.stability.motion import Stretch
 from railsim.stability.ramp import ramp, sustained
@@ -510,6 +517,26 @@ def test_a_branch_ends_at_a_number_an_amplitude_or_a_speed(monkeypatch, birth, h
     found, _ = continued(monkeypatch, birth, **how)
     assert sum(len(branch.points) for branch in found.branches) == count
     assert [words in remark for remark in found.remarks] == ([True] if words else [])
+
+
+@pytest.mark.parametrize(
+    ("low", "last", "slowest", "words"),
+    [(50.0, np.inf, 56.0, []), (50.0, 1.6, 56.25, ["to 56.25 m/s only"]),
+     (57.5, np.inf, 56.25, ["hunts still at the lower end, 57.5 m/s"])],
+)  # fmt: skip
+def test_a_branch_that_is_left_before_its_fold_goes_on_to_its_slowest_motion(
+    monkeypatch, low, last, slowest, words
+):
+    """It is born at 60 m/s and turns back at 56: no critical speed of 60 m/s."""
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=low, high=64.0)
+    monkeypatch.setattr(continuation, "_birth", lambda *_: (Parabola(last=last), Parabola().at(0)))
+    lost = LossOfStability(60.0, False, (SimpleNamespace(frequencies=[5.0]),))
+    _by_continuation(found, None, lost, lambda _: None)
+    _remark_range(found, SimpleNamespace(service=None))
+    assert found.nonlinear["continuation"].speed == slowest
+    assert found.onset == "subcritical"
+    assert len(found.remarks) == len(words)
+    assert all(end in said for said, end in zip(found.remarks, words, strict=True))
 
 
 def test_a_branch_of_runs_is_followed_once_and_where_it_is_not_known_yet(monkeypatch):
