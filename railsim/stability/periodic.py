@@ -6,12 +6,13 @@ of the system.  Newton's method solves for u = (x, T, V) with two more condition
     f(x_0) . (x - x_0) = 0        phase: no shift along the motion from the last one, x_0
     t . (u - u_0) = ds            pseudo arc length along the tangent t (Keller 1977)
 
+Between two changes s the matrix is updated with the residual r after s, J + r s^T/(s . s).
 The eigenvalues of dPhi_T/dx are the Floquet multipliers: one is 1, and the motion is stable while
 all others lie within the unit circle.  A branch that turns back in V has a fold there; of the two
 motions at one speed beside it, one is unstable.
 
-Sources: Keller (1977), Numerical solution of bifurcation and nonlinear eigenvalue problems; for
-rail vehicles True and Kaas-Petersen (1983), Schupp (2004).
+Sources: Broyden (1965), Mathematics of Computation 19; Keller (1977), Numerical solution of
+bifurcation and nonlinear eigenvalue problems; True and Kaas-Petersen (1983), Schupp (2004).
 """
 
 from collections.abc import Callable, Iterator
@@ -27,7 +28,7 @@ from railsim.errors import ModelError
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
 MOST_ITERATIONS = 20
 MOST_MATRICES = 4  # formed until then; each costs as much as the flow of all components
-SLOW = 0.3  # ratio of two changes from which on the matrix is formed again
+SLOW = 0.6  # ratio of two changes from which on the matrix, else updated, is formed again
 QUICK = 8  # iterations after which the next step may be longer
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients
@@ -167,11 +168,12 @@ class Shooting:
         # the tangent leads on also where only the speed is given
         lead = float(now.tangent @ direction)
         u = base + now.tangent * length / lead if abs(lead) > LEAD else base + length * direction
-        matrix = now.matrix
+        matrix, change = now.matrix, np.zeros(len(u))
         before, formed = np.inf, 0
         for iteration in range(1, MOST_ITERATIONS + 1):
             if matrix is not None:
                 residual = self._ends(u[None])[0] - u[:-2]
+                matrix = matrix + np.outer(residual, change) / max(change @ change, 1e-30)
             elif formed < MOST_MATRICES:
                 residual, matrix = self._periodicity(u)
                 formed += 1
