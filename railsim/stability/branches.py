@@ -145,7 +145,8 @@ def first_beyond(branches: Sequence[Branch], limit: float, column: str, high: fl
 
 
 def _beyond(points: Sequence[Point], limit: float, column: str) -> Iterator[float]:
-    for point, neighbour in [*pairwise(points), *pairwise(points[::-1])]:
+    alone = zip(points, points, strict=True)
+    for point, neighbour in [*alone, *pairwise(points), *pairwise(points[::-1])]:
         value, other = getattr(point, column), getattr(neighbour, column)
         if point.hunts and value > limit:
             yield point.speed

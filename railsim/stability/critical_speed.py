@@ -475,6 +475,7 @@ def _conclude(
     if only_ramp := not branches:
         kept = [[p for p in one.points if p.speed >= one.end] for one in found.branches]
         branches = [Branch("ramp", points) for points in kept]
+    branches += [Branch("sustained", [point]) for point in found.nonlinear.values() if point]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.searched_to)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.searched_to)
     if only_ramp and lowest is not None:
