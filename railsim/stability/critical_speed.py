@@ -28,6 +28,7 @@ from railsim.linear.harmonic import ContactPath
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
+from railsim.notation import COMPONENTS
 from railsim.profiles import Profile
 from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.continuation import followed_branches
@@ -322,19 +323,17 @@ def _conicities(geometry: ContactGeometry) -> Floats:
 def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
     """The mode in whose shape hunting is excited: of several the least damped.
 
-    Where none is a hunting mode, the one whose wheelsets move most against all else.
+    Where none is a hunting mode, one whose wheelsets move across by half of all else at least.
     """
     found = oscillations(eigenmodes(prepared.linearised(speed)), SEARCHED[1])
-    hunts = _hunts(prepared)
+    hunts, names = _hunts(prepared), found.linearisation.names
     hunting = [k for k in range(len(found.eigenvalues)) if hunts(found.taken([k]))]
-    if hunting:
-        return found.taken([min(hunting, key=lambda k: found.damping_ratios[k])])
-    names = found.linearisation.names
     lateral = [names.index(f"{wheelset}.y") for wheelset in prepared.model.index.wheelsets]
-    positions = [k for k, name in enumerate(names) if name.endswith(".y")]
-    size = np.abs(found.shapes)
-    share = np.max(size[:, lateral], axis=1) / np.max(size[:, positions], axis=1)
-    return found.taken([int(np.argmax(share))])
+    # m and rad: a symmetric mode has lateral motions by rounding only
+    positions = [k for k, name in enumerate(names) if name.rpartition(".")[2] in COMPONENTS]
+    most, all_else = (np.abs(found.shapes)[:, at].max(axis=1) for at in (lateral, positions))
+    hunting = hunting or np.flatnonzero(most / all_else > 0.5 * np.max(most / all_else)).tolist()
+    return found.taken([min(hunting, key=lambda k: found.damping_ratios[k])])
 
 
 def _by_ramp(
