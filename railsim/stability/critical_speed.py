@@ -45,7 +45,7 @@ AMPLITUDE_LIMIT = 3e-3  # m
 POINTS = 16  # speeds of a diagram
 LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
-NEAR = (0.8, 1.25)  # times the linear critical speed: where most speeds of a diagram stand ...
+NEAR = (0.8, 1.25)  # times the speeds where rest is left: where most of a diagram's stand ...
 SHARE = 0.75  # ... this share of them
 # Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
 # what is left to the end of hunting; the range may be narrow.
@@ -155,7 +155,8 @@ def critical_speed(
             if method == "ramp":
                 _by_ramp(found, motion, begins, stuck, excitations, share)
             elif method == "bifurcation":
-                _by_diagram(found, motion, begins.parameter, points, excitations, share)
+                unstable = [v for v in (stuck, begins.parameter) if v is not None]
+                _by_diagram(found, motion, unstable, points, excitations, share)
             else:
                 _by_continuation(found, motion, begins, share)
         except (LeftRange, ModelError) as error:
@@ -385,12 +386,12 @@ def _far_above(speed: float) -> float:
     return max(speed + 2.0, 1.05 * speed)
 
 
-def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[float]:
+def _speeds(found: CriticalSpeed, unstable: Sequence[float], points: int) -> list[float]:
     """Speeds of a diagram: most of them where branches begin and end, the others above."""
     low, high = found.low, found.high
-    if begins is None:
+    if not unstable:
         return list(np.linspace(low, high, points).tolist())
-    least, most = max(low, NEAR[0] * begins), min(high, NEAR[1] * begins)
+    least, most = max(low, NEAR[0] * min(unstable)), min(high, NEAR[1] * max(unstable))
     if most >= high or points < 4:
         return list(np.linspace(least, high, points).tolist())
     near = round(SHARE * points)
@@ -401,22 +402,22 @@ def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[flo
 def _by_diagram(
     found: CriticalSpeed,
     motion: VehicleMotion,
-    begins: float | None,
+    unstable: Sequence[float],
     points: int,
     excitations: Sequence[float],
     progress: Progress,
 ) -> None:
-    speeds = _speeds(found, begins, points)
+    speeds = _speeds(found, unstable, points)
     branches = diagram(motion, speeds, progress, excitations, found.low)
+    if not branches[0].points:
+        raise LeftRange(f"the vehicle derails at {speeds[0]:.4g} m/s, the lowest speed")
     found.nonlinear["bifurcation"] = lowest = lowest_of(branches)
     found.branches += branches
     found.jumps = jumps(branches)
-    reached, tried = max((p.speed for p in branches[0].points), default=None), _after(excitations)
-    if reached is None:
-        found.remarks.append("bifurcation: the vehicle derails at the lower end")
-    elif reached < speeds[-1]:
+    reached, tried = max(p.speed for p in branches[0].points), _after(excitations)
+    if reached < speeds[-1]:
         found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
-    if lowest is None and reached is not None:
+    if lowest is None:
         found.remarks.append(f"bifurcation: nothing hunts {tried} at any of the {points} speeds")
 
 

@@ -13,6 +13,7 @@ from railsim.errors import ModelError
 from railsim.kernels.support import LEARNT
 from railsim.linear.eigenmodes import LossOfStability, eigenmodes
 from railsim.linear.modes import modes
+from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
 from railsim.plot.stability import bifurcation_figure
@@ -28,11 +29,12 @@ from railsim.stability.critical_speed import (
     critical_speed,
 )
 from railsim.stability.diagram import diagram
-from railsim.stability.motion import Stretch
+from railsim.stability.motion import LeftRange, Stretch
 from railsim.stability.ramp import ramp, sustained
 from railsim.stability.result import Conicity, CriticalSpeed
 from railsim.stability.vehicle_flow import VehicleFlow
 
+CRITICAL = railsim.stability.critical_speed
 RIGID = load_track("straight").replace(support={"preset": "rigid"})
 
 
@@ -66,8 +68,12 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
 
 
 def test_three_quarters_of_a_diagrams_speeds_lie_near_the_linear_critical_speed():
-    """12 of 16 from 0.8 to 1.25 times 60 m/s, the others in equal steps above."""
-    speeds = _speeds(SimpleNamespace(low=20.0, high=120.0), 60.0, 16)
+    """12 of 16 from 0.8 to 1.25 times 60 m/s, the others in equal steps above.
+
+    Where a sway is undamped at 40 m/s as long as friction sticks, from 0.8 times that.
+    """
+    assert _speeds(SimpleNamespace(low=20.0, high=120.0), [40.0, 60.0], 16)[0] == 32.0
+    speeds = _speeds(SimpleNamespace(low=20.0, high=120.0), [60.0], 16)
     assert speeds[:12] == pytest.approx(np.linspace(48.0, 75.0, 12))
     assert speeds[12:] == pytest.approx([86.25, 97.5, 108.75, 120.0])
 
@@ -154,6 +160,49 @@ def test_a_ramp_goes_on_in_a_narrow_range_too(half):
     _by_ramp(found, Cycles(growth, 5.0), begins, None, (1e-3, 3e-3), lambda _: None)
     assert found.nonlinear["ramp"].speed == pytest.approx(17.0, abs=0.3)
     assert found.remarks == []
+
+
+def test_without_a_hunting_mode_one_that_moves_the_wheelsets_is_excited(monkeypatch):
+    """A pitching car moves them by rounding only: in its shape 8 mm of them derail any vehicle.
+
+    Undamped oscillators of 1 to 4 Hz, the pitch coupled to the wheelset by 1e-14; the one of 3 Hz
+    is a sway that moves the wheelset by a tenth; of the others the one of less damping counts.
+    """
+    bodies = ("carbody.pitch", "wheelset.y", "carbody.y", "wheelset.yaw")
+    names = (*bodies, *(f"{name}'" for name in bodies))
+    stiffness = np.diag((2.0 * np.pi * np.array([1.0, 2.0, 3.0, 4.0])) ** 2)
+    stiffness[1, [0, 2, 3]] = 1e-14, 20.0, 400.0
+    damping = np.diag([0.1, 1.0, 0.2, 0.3])
+    matrix = np.block([[np.zeros((4, 4)), np.eye(4)], [-stiffness, -damping]])
+    at = Linearisation(names, matrix, np.zeros(8), 20.0)
+    index = SimpleNamespace(wheelsets=("wheelset",))
+    prepared = SimpleNamespace(linearised=lambda _: at, model=SimpleNamespace(index=index))
+    for named, frequency in (((), 4.0), ((2.0, 3.0), 3.0)):
+        hunts = lambda mode, named=named: round(mode.frequencies[0]) in named  # noqa: E731
+        monkeypatch.setattr(CRITICAL, "_hunts", lambda _, hunts=hunts: hunts)
+        (found,) = CRITICAL._hunting_shape(prepared, 20.0).frequencies
+        assert found == pytest.approx(frequency, rel=0.01)
+
+
+def test_a_diagram_that_derails_at_its_lowest_speed_has_found_nothing(monkeypatch):
+    """It said that nothing hunts up to the highest speed."""
+    monkeypatch.setattr(CRITICAL, "diagram", lambda *_: [Branch("up"), Branch("down")])
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=70.0)
+    with pytest.raises(LeftRange, match="derails at 5 m/s, the lowest speed"):
+        CRITICAL._by_diagram(found, None, [], 16, (1e-3,), None)
+    assert not found.nonlinear
+
+
+def test_what_a_ramp_alone_finds_counts_for_the_limits():
+    """8.6 mm at 25.6 m/s by the ramp, where the diagram has 9.5 mm from 54.3 m/s on."""
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=120.0)
+    slow, fast = Point(25.6, 8.6e-3, 0.9, 1e3), Point(54.3, 9.5e-3, 1.9, 40e3)
+    found.nonlinear = {"ramp": slow, "bifurcation": fast}
+    found.branches = [Branch("ramp", [fast, slow], 25.6), Branch("up", [fast])]
+    begins = SimpleNamespace(Q0=np.full((4, 2), 7e4), already=False, parameter=83.2)
+    CRITICAL._conclude(found, load_vehicle("coach_manchester"), begins, begins)
+    assert found.amplitude_limit.speed == 25.6
+    assert found.instability_limit.speed == 54.3
 
 
 def test_motions_that_die_above_a_range_of_hunting_are_no_hunting():
