@@ -51,6 +51,10 @@ if TYPE_CHECKING:
 
 S = TypeVar("S")
 UNLOADING = "unloading (Q0 - Q)/Q0"
+LIFTED = (
+    "unloading above 1: the wheel lifts; rails draw held wheelsets down, and its negative load is "
+    "the force needed for that"
+)
 
 
 @dataclass(frozen=True)
@@ -203,6 +207,8 @@ def stationary(
     both = found(name, lambda: [on_cant(balance, track, s * cant, held=held) for s in (1.0, -1.0)])
     values += _lean(name, balance.model, flat.reference, both or [], cant, limits)
     remarks = (*balance.remarks, *left_out(vehicle, track, settings, model))
+    if any(value.quantity == UNLOADING and value.value > 1.0 for value in values):
+        remarks += (LIFTED,)
     if vehicle.loads:
         remarks = (f"load case: {vehicle.load or DESIGN}", *remarks)
     if limits.gauge is not None and abs(track.gauge - limits.gauge.value) > WIDENED:

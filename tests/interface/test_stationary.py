@@ -182,6 +182,7 @@ def test_guiding_with_a_wheel_that_twist_lifts_is_no_pass(monkeypatch):
     assert level.exceeded
     assert combined.exceeded
     assert "no load" in str(found.table())
+    assert any("the wheel lifts" in remark for remark in found.remarks)
 
 
 @pytest.mark.usefixtures("guided")
