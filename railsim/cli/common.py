@@ -54,7 +54,7 @@ def values(names: str, words: str, metavar: str, **more: Any) -> Callable[[F], F
     """Return an option with several values, see `values_of`."""
 
     def parsed(ctx: Any, param: click.Parameter, text: str | None) -> list[float] | None:
-        return values_of(text, param.opts[0]) if text else None
+        return values_of(text, param.opts[0]) if text is not None else None
 
     return option(names, words, metavar, callback=parsed, **more)
 

@@ -306,6 +306,7 @@ def test_curving_over_a_grid(capsys, tmp_path):
             ["critical-speed", "coach_manchester", "--amplitude", "0.003"],
             "--amplitude goes with --linearisation harmonic",
         ),
+        (["critical-speed", "coach_manchester", "--excitation", ""], "--excitation: found ''"),
         (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
         (
             ["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"],
