@@ -241,7 +241,7 @@ def curving(
     both = track.friction_at(0.0)
     radii, deficiencies = _several(radius), _several(cant_deficiency)
     mus = _several(friction) if friction is not None else [float(np.mean(both))]
-    check_grid(radii, cant, deficiencies, mus)
+    check_grid(radii, cant, deficiencies, () if friction is None else mus)
     search = _Search(vehicle, track, cant, settings or Settings(), profiles)
     if friction is None and mus[0] > 0.0:
         search.shares = both / mus[0]

@@ -438,6 +438,18 @@ def test_steady_curving_in_time_has_neither_given_forces_nor_a_speed_profile(mon
     np.testing.assert_allclose(in_time.Y, found.Y, atol=50.0)
 
 
+def test_friction_of_the_rails_is_not_refused_as_an_option(monkeypatch):
+    """A track may be without friction; `stationary`, which has no such option, named --friction."""
+
+    def searched(*_):
+        raise ModelError("searched")
+
+    monkeypatch.setattr(curving, "_Search", searched)
+    track = railsim.load_track("straight", ["friction=0.0"])
+    with pytest.raises(ModelError, match="searched"):
+        railsim.curving(railsim.load_vehicle("coach_manchester"), track, radius=[1000.0])
+
+
 def test_a_cant_deficiency_in_millimetres_is_refused(capsys):
     """1 m is 6.5 m/s2, beyond what any vehicle stands upright in."""
     given = ["curving", "coach_manchester", "--radius", "300", "--cant-deficiency", "0.1,100"]
