@@ -1,6 +1,7 @@
 """The profiles that a vehicle or a track names: whether they are there and of the right kind."""
 
 from collections.abc import Iterator
+from hashlib import sha256
 
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.file_definition import FileDefinition
@@ -19,6 +20,12 @@ def used_profiles(definition: FileDefinition) -> Iterator[tuple[str, str, Kind]]
     elif isinstance(definition, Vehicle):
         for key, name in dict.fromkeys(_wheel_profiles(definition, ())):
             yield key, name, "wheel"
+
+
+def profile_hashes(*definitions: FileDefinition) -> dict[str, str]:
+    """Return a hash of the points of every profile of some definitions, by name."""
+    names = sorted({name for one in definitions for _, name, _ in used_profiles(one)})
+    return {name: sha256(load_profile(name).key()).hexdigest() for name in names}
 
 
 def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:

@@ -19,7 +19,7 @@ from railsim.files.key_paths import AXES
 from railsim.files.overrides import split_overrides
 from railsim.files.sources import OVERRIDE
 from railsim.profiles import load_profile
-from railsim.profiles.used import profile_faults, used_profiles
+from railsim.profiles.used import profile_faults, profile_hashes
 from railsim.simulation.conditions import check_agreement, check_range, initial_speed
 from railsim.studies.spec import RunSpec
 from railsim.version import __version__
@@ -59,17 +59,13 @@ class Case:
         Definitions with their defaults, the points of the profiles and the version of railsim; not
         the name, the labels or the analyses of the finished run.
         """
-        used = (*used_profiles(self.vehicle), *used_profiles(self.track))
         inputs = {
             "railsim": __version__,
             "vehicle": self.vehicle.to_toml(),
             "track": self.track.to_toml(),
             **self.conditions,
             "settings": self.settings.to_toml(),
-            "profiles": {
-                name: hashlib.sha256(load_profile(name).key()).hexdigest()
-                for name in sorted({name for _, name, _ in used})
-            },
+            "profiles": profile_hashes(self.vehicle, self.track),
         }
         return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 

@@ -18,6 +18,7 @@ from railsim.definitions import Settings, Track, Vehicle
 from railsim.errors import RailsimError
 from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import WorkerPool, available_cores
+from railsim.profiles.used import profile_hashes
 from railsim.stability.critical_speed import checked, critical_speed
 from railsim.studies.records import Record, kept_record, write_record
 from railsim.table import Column, Table
@@ -105,6 +106,7 @@ def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) 
     if folder is None:
         return None
     files = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
+    files.append(profile_hashes(point.vehicle, point.track))
     text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
 

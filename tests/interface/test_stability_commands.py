@@ -105,6 +105,22 @@ def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path):
     assert {path: path.read_bytes() for path in (folder / "points").iterdir()} == whole
 
 
+def test_a_point_of_a_map_is_not_that_of_a_profile_file_before_its_change(tmp_path):
+    """The vehicle names the file only: points kept for a new wheel were taken for a worn one."""
+    wheel, kept = tmp_path / "wheel.csv", set()
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
+    for worn in (0.0, 0.5):  # mm off the tread
+        new = railsim.load_profile("S1002")
+        points = np.column_stack([1e3 * new.y, 1e3 * new.z - worn])
+        np.savetxt(wheel, points, delimiter=",", header="y_mm,z_mm", comments="")
+        coach = railsim.load_vehicle("coach_manchester", [f"{key}={wheel}"])
+        point = stability_map.MapPoint(
+            {}, coach, railsim.load_track("straight"), railsim.Settings()
+        )
+        kept |= {stability_map._stored_path(tmp_path, point, {}) for _ in range(2)}
+    assert len(kept) == 2
+
+
 @pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.further
 def test_map_over_any_key_of_the_files(capsys, tmp_path):
