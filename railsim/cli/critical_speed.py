@@ -23,7 +23,7 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @cli.option("--from low", "Lowest speed in m/s, or with a unit.", "V", cli.as_speed, default=5.0)
 @cli.option("--to high", "Highest speed in m/s, or with a unit.", "V", cli.as_speed, default=120.0)
 @cli.option("--points", "Speeds of a bifurcation diagram.", "N", int, default=16)
-@cli.values("--excitation excitations", "Disturbances tried, in m; default: 1 to 8 mm.", "A,B,...")
+@cli.values("--excitation excitations", "Disturbances tried, in m; default: 1 to 11 mm.", "A,B,...")
 @cli.linearisation_options
 @cli.values("--conicity", "Straight cones as wheels; several: a map.", "G or A:B:N")
 @cli.values("--friction", "Friction; several values: a map.", "MU or A:B:N")

@@ -305,8 +305,7 @@ def _conicity(prepared: LinearVehicle) -> Conicity | None:
     """
     body = prepared.model.flat.of_kind("wheelset")[0]
     assert body.wheelset is not None
-    geometry = geometry_of(body.wheelset, prepared.track, prepared.model.profiles)
-    if geometry is None:
+    if (geometry := geometry_of(body.wheelset, prepared.track, prepared.model.profiles)) is None:
         return None
     values = _conicities(geometry)
     known = np.isfinite(values)
@@ -350,7 +349,8 @@ def _by_ramp(
     found.nonlinear["ramp"] = lowest  # kept if a further one leaves the rails
     unstable = found.low if begins.already else begins.parameter
     end = found.high if lowest is None else lowest.speed
-    for at in sorted(v for v in (stuck, unstable) if v is not None and end > _far_above(v)):
+    above = (v for v in (stuck, unstable) if v and end > (v if v is stuck else _far_above(v)))
+    for at in sorted(above):  # the sway of stuck friction is another motion, however near
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
         reach = min(ABOVE * at, end - at)
         tops = [at + share * reach for share in ONWARDS]
@@ -486,7 +486,7 @@ def _conclude(
 
 
 def _remark_range(found: CriticalSpeed, vehicle: Vehicle) -> None:
-    """Say where hunting goes on below the range, or a vehicle is to be judged above it."""
+    """Say what hunts below the range, or where a vehicle is to be judged above it."""
     for method, point in found.nonlinear.items():
         if point is not None and point.speed <= found.low:
             found.remarks.append(f"{method}: hunts still at the lower end, {found.low:g} m/s")

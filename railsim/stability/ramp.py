@@ -17,7 +17,8 @@ from railsim.stability.motion import LeftRange, Motion, Stretch
 Progress = Callable[[float], None]
 
 WINDOW = 1.0  # s, over which an amplitude is taken
-EXCITATIONS = (1e-3, 3e-3, 6e-3, 8e-3)  # m, disturbances; those that derail are halved
+# m, disturbances, the largest beyond the clearance of flanges; those that derail are halved
+EXCITATIONS = (1e-3, 3e-3, 6e-3, 8e-3, 11e-3)
 SMALL = 1e-5  # m, disturbance at the lower end of a diagram
 HOLD = 10.0  # s, for the oscillation to settle above the critical speed
 BRAKING = 0.5  # m/s2, to see where about hunting dies
