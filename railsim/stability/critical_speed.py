@@ -365,13 +365,13 @@ def _by_ramp(
         if at == unstable:
             words = " and ".join(f"{top:.4g}" for top in tops)
             found.remarks.append(
-                f"ramp: rest is unstable at {at:.4g} m/s, but nothing lasts that is excited "
-                f"at {words} m/s (bifurcation)"
+                f"ramp: rest is unstable at {at:.4g} m/s, but what is excited at {words} m/s dies "
+                "or derails (bifurcation)"
             )
+    top = branch.points[0].speed
     if lowest is None:
-        found.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {found.high:g} m/s")
-    if branch.points[0].speed < found.high:
-        top = branch.points[0].speed
+        found.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {top:.4g} m/s")
+    if top < found.high:
         found.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
 
 

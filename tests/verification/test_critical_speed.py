@@ -228,6 +228,23 @@ def test_a_ramp_goes_on_with_the_sway_of_stuck_friction_however_near():
     assert found.nonlinear["ramp"].speed == pytest.approx(47.0, abs=0.2)
 
 
+def test_what_derails_at_the_highest_speed_is_not_said_to_die_there():
+    """It derails above 50 m/s, and dies below."""
+
+    class Derailing(Cycles):
+        def stretch(self, state, begin, end, duration):
+            if begin > 50.0:
+                raise LeftRange("off the rails")
+            return super().stretch(state, begin, end, duration)
+
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=55.0)
+    begins, dying = LossOfStability(None, False, ()), Derailing(lambda _: -1.0, 5.0)
+    _by_ramp(found, dying, begins, None, (3e-3,), lambda _: None)
+    nothing, derails = found.remarks
+    assert nothing.endswith("at 49.64 m/s")
+    assert derails == "ramp: the vehicle derails above 49.64 m/s"
+
+
 def test_motions_that_die_above_a_range_of_hunting_are_no_hunting():
     """Excited by 1 to 6 mm all dies above 35 m/s; it lasts from 17 to 30 m/s."""
 
