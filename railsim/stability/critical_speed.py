@@ -186,7 +186,7 @@ def checked(
     if not faults:
         words = f"less than the highest, {fastest:g} m/s"
         faults.require(slowest < fastest, "low", f"found {slowest:g} m/s", words, "--from")
-    faults.require(2 <= points <= 200, "points", f"found {points}", "2 to 200")
+    faults.require(points in range(2, 201), "points", f"found {points!r}", "2 to 200")
     wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
     words = f"found {wrong[0]:g} m" if wrong else "no size"
     allowed, fine = f"{SMALL:g} to {LARGEST_EXCITATION:g} m", len(excitations) and not wrong

@@ -67,6 +67,12 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
 
 
+@pytest.mark.parametrize("wrong", [4.5, "5", 1, 201])
+def test_a_number_of_speeds_that_is_none_is_refused_before_anything_is_computed(wrong):
+    with pytest.raises(railsim.InputError, match=f"points: found {wrong!r}; 2 to 200"):
+        CRITICAL.checked(Contact("tangent", 3e-3, None), ["bifurcation"], 5.0, 120.0, wrong)
+
+
 def test_three_quarters_of_a_diagrams_speeds_lie_near_the_linear_critical_speed():
     """12 of 16 from 0.8 to 1.25 times 60 m/s, the others in equal steps above.
 
