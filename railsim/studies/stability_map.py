@@ -105,7 +105,7 @@ def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
 def _stored_path(folder: Path | None, point: MapPoint, options: dict[str, Any]) -> Path | None:
     if folder is None:
         return None
-    files = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
+    files: list[Any] = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
     files.append(profile_hashes(point.vehicle, point.track))
     text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
