@@ -19,7 +19,16 @@ from math import sqrt
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_CHECK, W_CHECK_GAMMA
-from railsim.kernels.rails import ASIDE, ASIDE_SLOPE, MIDDLE_Y, RAIL_SLOPE, ROLL, SLOPE_Y
+from railsim.kernels.rails import (
+    ASIDE,
+    ASIDE_SLOPE,
+    MIDDLE_Y,
+    RAIL_BEND,
+    RAIL_SLOPE,
+    ROLL,
+    ROLL_SLOPE,
+    SLOPE_Y,
+)
 from railsim.kernels.state import ARC_LENGTH, velocity_begin
 from railsim.kernels.support import SKIP
 
@@ -77,7 +86,8 @@ def check_rail(system, work, speed, state, w, c, flangeway, slope):
         return
     lead = reach * yaw * (abs(yaw) + 2.0 * SMALL_YAW) / (size * size)
     # rates of the Euler angles were left here by the kinematics
-    roll_rate, yaw_rate = work.acceleration[b, 3], work.acceleration[b, 5]
+    roll_rate = work.acceleration[b, 3] - speed * work.plane[w, ROLL_SLOPE]
+    yaw_rate = work.acceleration[b, 5] - speed * work.rail[w, side, RAIL_BEND]
     y_rate = state[v + 1] - speed * (work.plane[w, SLOPE_Y] + work.rail[w, side, ASIDE_SLOPE])
     p_rate = lead * yaw_rate - speed * slope - sign * (y_rate - below * roll_rate)
     N = contact.check[c, STIFFNESS] * p + contact.check[c, DAMPING] * p_rate

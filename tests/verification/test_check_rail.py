@@ -1,5 +1,7 @@
 """Check rails: first contact with sections of a real one, forces against equilibrium, mirror."""
 
+from types import SimpleNamespace as Record
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,9 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.track.check_rail import CheckRail
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
+from railsim.kernels import check_rails as kernel
+from railsim.kernels import rails
+from railsim.kernels.contact_columns import W_CHECK, WHEEL_COLUMNS
 from railsim.model.check_rails import check_rails, flange_back, standing_at
 from railsim.profiles import Profile, load_profile
 from railsim.simulation import simulate
@@ -86,6 +91,42 @@ def test_check_rail_relieves_the_outer_rail_in_a_sharp_curve():
     wear = guided["check_rail_T_gamma"][at_end, 0, 1].mean()
     reach = np.sqrt((0.46 + 0.028) ** 2 - 0.46**2) / 0.46
     assert 0.9 * 0.3 * N * reach < wear < 1.02 * 0.3 * N * reach
+
+
+@pytest.mark.parametrize("right", [-1.0, 1.0])
+def test_force_is_stiffness_and_damping_of_the_penetration(right):
+    """N = k p + c p', where rails widen, lean and bend and the flangeway is flared: p over time."""
+    speed, z_c, reach, q = 8.0, 0.474, 0.12, -0.045
+    side = int(right > 0.0)
+
+    def at(t):
+        """Wheelset's y, roll, yaw; rails' middle, distance aside, lean, slope; flangeway."""
+        s = speed * t
+        under = 0.001 + 0.004 * s, 0.002 + 0.003 * s, 0.003 - 0.006 * s, 0.002 + 0.005 * s
+        return 0.002 + 0.03 * t, 0.01 + 0.2 * t, right * (0.02 + 0.5 * t), *under, 0.04 - 0.01 * s
+
+    def penetration(t):
+        y, roll, yaw, middle, aside, lean, slope, flangeway = at(t)
+        y, psi = right * (y - middle - aside - z_c * (roll - lean)), abs(yaw - slope)
+        return -(q + flangeway + y) + reach * psi**2 / (psi + kernel.SMALL_YAW)
+
+    contact = Record(body=[0], check=np.array([[side, 0.0, 0.0, 5e7, 5e4, 0.3]]))
+    contact.check_wheel = np.array([[[q, z_c, reach, 0.68]]])
+    work = Record(rail_force=np.zeros((1, 6)), force_rate=np.zeros(1))
+    work.wheel = np.zeros((1, 2, WHEEL_COLUMNS))
+    work.plane, work.rail = np.zeros((1, rails.PLANE_SIZE)), np.zeros((1, 2, rails.RAIL_SIZE))
+    state, work.acceleration = np.zeros(12), np.zeros((1, 6))
+    state[1], state[3], state[5], *now, flangeway = at(0.0)
+    state[7], work.acceleration[0, 3], work.acceleration[0, 5] = 0.03, 0.2, right * 0.5
+    work.plane[0, [rails.MIDDLE_Y, rails.SLOPE_Y]] = now[0], 0.004
+    work.plane[0, [rails.ROLL, rails.ROLL_SLOPE]] = now[2], -0.006
+    of_rail = [rails.ASIDE, rails.ASIDE_SLOPE, rails.RAIL_SLOPE, rails.RAIL_BEND]
+    work.rail[0, side, of_rail] = now[1], 0.003, now[3], 0.005
+    system = Record(contact=contact, bodies=Record(kind=np.zeros(1)))
+    kernel.check_rail.py_func(system, work, speed, state, 0, 0, flangeway, -0.01)
+    rate = (penetration(1e-5) - penetration(-1e-5)) / 2e-5
+    expected = 5e7 * penetration(0.0) + 5e4 * rate
+    assert work.wheel[0, side, W_CHECK] == pytest.approx(expected, rel=1e-9)
 
 
 def test_check_rail_in_the_mirror():
