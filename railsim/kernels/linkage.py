@@ -25,7 +25,7 @@ SLOT       n (r_1 - r_2) - c = 0, n turning with the body of point 2;
 PARALLEL   theta_1 - theta_2 - angle = 0; value 0 is the angle
 =========  ======================================================================
 
-A prismatic joint is a SLOT and a PARALLEL.  Drivers: ANGLE theta_1 - theta_2 - c, LENGTH
+A prismatic joint is a SLOT and a PARALLEL.  Drivers: ANGLE theta_1 - c, LENGTH
 |r_1 - r_2| - c, COORDINATE x or y of r_1 less c.
 """
 
@@ -192,9 +192,8 @@ def drive(linkage, lane, q, s, Phi, J, row, one, two):
     kind, p1, p2 = linkage.driver[0], linkage.driver[1], linkage.driver[2]
     c = linkage.driver_value[lane]
     if kind == ANGLE:
-        Phi[row] = q[p1, 2] - q[p2, 2] - c - s
+        Phi[row] = q[p1, 2] - c - s
         add_row(J, row, p1, 0.0, 0.0, 1.0)
-        add_row(J, row, p2, 0.0, 0.0, -1.0)
         return
     b1 = linkage.point_body[p1]
     locate(linkage, lane, q, b1, p1, one)
