@@ -6,6 +6,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from dynamics import rotation
 from rig import Rig
 from test_drives import MASS, RADIUS, TORQUE, WHEELSET, bogie, on_wheels, run, traction
 
@@ -86,6 +87,22 @@ def test_an_actuator_along_a_line_pulls_along_it_where_it_is_now():
     # 12/13 of 2 m/s along the line: 1 kW over that
     found = rig.forces(np.zeros(6), [0.0, 0.0, -2.0, 0.0, 0.0, 0.0])
     assert np.linalg.norm(found[:3]) == pytest.approx(1e3 * 13.0 / 24.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("acts", ["x", "y", "z", "roll", "pitch", "yaw"])
+def test_an_actuator_along_or_about_an_axis_of_its_body_turns_with_it(acts):
+    """It acts along a column of C = Rz(yaw) Rx(roll) Ry(pitch); its power is F v along it."""
+    roll, pitch, yaw = 0.3, -0.2, 0.5
+    about, k = divmod(["x", "y", "z", "roll", "pitch", "yaw"].index(acts), 3)
+    axis = (rotation(yaw, 2) @ rotation(roll, 0) @ rotation(pitch, 1))[:, k]
+    own = slice(3 * about, 3 * about + 3)
+    rig = Rig(kind="actuator", acts=acts, power_limit=1e3)
+    rig.work.memory[rig.system.actuators.which[0, COMMAND]] = 1300.0
+    rig.state[6 * rig.frame + 3 : 6 * rig.frame + 6] = roll, pitch, yaw
+    for speed, force in ((0.0, 1300.0), (2.0, 500.0)):
+        rate = np.zeros(6)
+        rate[own] = speed * axis
+        assert rig.forces(np.zeros(6), rate)[own] == pytest.approx(force * axis, abs=1e-6)
 
 
 def test_an_actuator_along_a_line_needs_two_points():

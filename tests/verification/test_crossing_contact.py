@@ -4,6 +4,7 @@ The range is cut to the transfer from wing to nose, whose tables take some secon
 """
 
 import csv
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,17 @@ import pytest
 from dynamics import Settings, advance, energy, undamped
 from scipy.optimize import brentq
 
-from railsim.contact.curves import inclined_to_track
+from railsim.contact.curves import inclined_to_track, wheel_curve
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.kernels import contact_columns as column
 from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.support import HEIGHTS
 from railsim.kernels.system import RADIUS
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.model.time_step import empty_recorder
 from railsim.model.uneven_wheels import rolling
 from railsim.model.work import work_arrays
 from railsim.profiles import load_profile
@@ -134,6 +138,34 @@ def test_transfer_from_wing_to_nose(wheel, equal):
         assert y == pytest.approx(row["ycp_tr_mm"] + 1e3 * ASIDE, abs=0.5)
 
 
+def test_beyond_the_tables_a_flange_goes_on_climbing_along_its_force(wheel):
+    """Without friction, under a constant load: dz/dy = -Y/Q; the tables end 12 mm aside."""
+    smooth, track = copy(wheel), wheel.system.track
+    rail = track.rail * np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])[:, None]
+    smooth.system = wheel.system._replace(track=track._replace(rail=rail))
+
+    def height(y):
+        return brentq(lambda z: smooth.at(239.0, y, z)[0][2] - 10e3, -50.0, 0.0, xtol=1e-9)
+
+    one, other = height(14.0), height(16.0)
+    (_, Y, Q), patches = smooth.at(239.0, 15.0, 0.5 * (one + other))
+    assert len(patches) == 1
+    assert Y / Q > 1.0
+    assert 0.5 * (other - one) == pytest.approx(-Y / Q, rel=0.01)
+
+
+def test_where_the_rail_slopes_less_of_the_wheel_is_below_its_axle(wheel):
+    """By a slope tan t the wheel touches r cos t below its axle: here 12 to 23 um less than r."""
+    curve = wheel_curve(load_profile("S1002", "wheel"), 0.46, 0.75, 1e-4)
+    for y, rails in ((0.0, {TREAD}), (0.97, {TREAD, 3 + ROOT})):
+        patches = wheel.under(10e3, 239.0, y)[2]
+        assert set(patches) == rails
+        for patch in patches.values():
+            r = np.interp(patch[column.FOOT_Y] - 0.75, curve.y, curve.r)
+            below = r / np.sqrt(1.0 + patch[column.RISE] ** 2)
+            assert patch[column.FOOT_Z] == pytest.approx(below, abs=1e-6)
+
+
 def test_force_across_is_that_of_the_wheels_cone(wheel, equal):
     """CONTACT's patch forces, the wing's at the angle of the cone of 1:15: within 100 N.
 
@@ -221,6 +253,25 @@ def test_constant_sections_are_plain_rail():
     mine = simulate(coach, track.replace(sections=[part]), **HOW)
     other = simulate(coach, track, **HOW)
     np.testing.assert_allclose(mine["Q"], other["Q"], rtol=1e-10)
+
+
+def test_foreseen_rate_of_a_rails_height_is_that_of_the_height():
+    """On elastic rails; by differences, of 40 steps but those over a kink of the path."""
+    settings, h = load_settings().with_values({"creep_law": "table"}), 2e-4
+    model = assemble(load_vehicle("coach_manchester"), crossing(), settings)
+    system = rolling(model.system, model.wheels, model.check, model.rails)
+    state, body = equilibrium(model, 20.0).state.copy(), int(system.contact.body[0])
+    state[-2:] = NOSE - 0.1 - system.frame_offset[system.bodies.frame[body]], 20.0
+    work, recorder = work_arrays(system), empty_recorder(model, 1)
+    derivative, stages, found = np.zeros_like(state), np.zeros((3, len(state))), []
+    for fresh in [1] + 40 * [0]:
+        chunk = Chunk(1, 1, 1 << 40, fresh=fresh)
+        time_loop(system, work, state, derivative, stages, recorder, FAST, h, chunk)
+        found.append(work.support_step[0, [HEIGHTS + 1, HEIGHTS + 3]])
+    height, rate = np.transpose(found[1:])
+    quotient = np.diff(height) / h
+    assert np.ptp(quotient) > 1e-5
+    assert np.median(np.abs(0.5 * (rate[1:] + rate[:-1]) / quotient - 1.0)) < 0.01
 
 
 def test_crossing_in_the_mirror():

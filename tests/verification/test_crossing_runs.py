@@ -131,6 +131,17 @@ def largest_over(track, **settings):
     return np.array([Q.max(), Y.max(), low_passed(Q, 4000.0, 90.0).max()])
 
 
+def test_contacts_evaluated_again_are_counted_once():
+    """The last axle over the nose: as many patches as outputs at every step show."""
+    how = {"step": 2e-4, "output_rate": 5000.0, "outputs": {"contact_patches": True}}
+    settings = load_settings().with_values(how)
+    coach = load_vehicle("coach_manchester")
+    result = simulate(coach, crossing(), speed=20.0, start=60.2, until=61.2, settings=settings)
+    assert result.attributes["contacts_evaluated_again"] > 100
+    loaded = np.count_nonzero(result["patch_N"] > 0.0)
+    assert result.attributes["patches_evaluated"] == loaded
+
+
 def test_forces_do_not_depend_on_the_step():
     """Half the step: within 2 %."""
     np.testing.assert_allclose(

@@ -121,7 +121,9 @@ def bogie_under_a_held_car():
 @pytest.fixture(scope="module")
 def through_the_curve():
     """A bogie under a held car from the straight into a canted curve."""
-    return railsim.simulate(bogie_under_a_held_car(), CURVE, speed=20.0, start=290.0, until=400.0)
+    how = {"speed": 20.0, "start": 290.0, "until": 400.0}
+    settings = Settings.model_validate({"outputs": {"elements": ["*secondary*"]}})
+    return railsim.simulate(bogie_under_a_held_car(), CURVE, settings=settings, **how)
 
 
 def test_a_fixed_car_stays_in_the_moving_track_frame(through_the_curve):
@@ -130,6 +132,12 @@ def test_a_fixed_car_stays_in_the_moving_track_frame(through_the_curve):
     car = list(result.coordinates["body"]).index("carbody")
     assert np.ptp(result.body_position[:, car], axis=0) == pytest.approx(0.0, abs=0.0)
     assert result.body_velocity[:, car] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_fixed_car_turns_with_the_curve(through_the_curve):
+    """Mid-curve it and the bogie turn alike: dampers between them take nothing; 100 W otherwise."""
+    assert len(through_the_curve.coordinates["element"]) == 6
+    assert through_the_curve.element_power[-1] == pytest.approx(0.0, abs=1e-2)
 
 
 def test_a_fixed_car_has_the_acceleration_of_its_position_in_the_curve(through_the_curve):

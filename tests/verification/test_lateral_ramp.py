@@ -20,8 +20,12 @@ from railsim.kernels.contact_table import (
     B1,
     D_B1,
     FURTHEST_W,
+    G_ROLL,
+    G_Y,
     K2,
+    K2_ROLL,
     K2_Y,
+    K_ROLL,
     K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
@@ -88,13 +92,13 @@ def test_smooth_and_sharp_ramps_below_60_mrad_have_no_remark():
     assert not any("contact table" in remark for remark in result.remarks)
 
 
-def looked_up(contact, patch, j, share, t=0.5):
+def looked_up(contact, patch, j, share, t=0.5, table=0):
     """Fields of a patch in cell `j` of y at no roll, at a share of the table's last yaw squared."""
     _, _, n_w, n_roll, _, _ = contact.values.shape
     weights, out = np.empty(N_WEIGHT), np.empty(LOOK_UP_SIZE)
     cell_weights(contact, t, 0.0, 1.0, weights)
     tw = 1.0 + (share - 1.0) * contact.w[-1] / (contact.w[-1] - contact.w[-2])
-    look_up(contact, 0, patch, j + 1, n_roll // 2, n_w - 2, tw, weights, out)
+    look_up(contact, table, patch, j + 1, n_roll // 2, n_w - 2, tw, weights, out)
     return out
 
 
@@ -137,6 +141,19 @@ def test_gradients_of_continued_patches_are_those_of_their_stiffness(contact):
             assert found[gradient] == pytest.approx(quotient, rel=1e-4, abs=1e-6 * abs(quotient))
         limited += 1
     assert limited > 3
+
+
+def test_wheels_of_two_radii_roll_about_their_own(contact):
+    """Tables are over y - r roll: from r to r' slopes over roll grow by (r - r') d/dy."""
+    r, other = contact.shear[0], 0.42
+    both = contact._replace(
+        values=np.concatenate([contact.values[:1]] * 2), shear=np.array([r, other])
+    )
+    for patch, j in every_patch(contact)[::40]:
+        one, two = (looked_up(both, patch, j, 0.9, table=table) for table in (0, 1))
+        for over_y, over_roll in ((G_Y, G_ROLL), (K_Y, K_ROLL), (K2_Y, K2_ROLL)):
+            expected = one[over_roll] + (r - other) * one[over_y]
+            assert two[over_roll] == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.further

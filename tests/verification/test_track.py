@@ -1,12 +1,16 @@
 """The track against analytic geometry: circles, clothoids (Fresnel integrals), crests, cant."""
 
+from types import SimpleNamespace as Record
+
 import numpy as np
 import pytest
+from dynamics import absolute_frame
 from scipy.special import fresnel
 
 from railsim.definitions.loading import load_track
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rounded_profile import RoundedProfile
+from railsim.kernels.track_frame import OMEGA, OMEGA_S, TrackTables
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables, usual_cell_length
 
@@ -54,6 +58,20 @@ def curve(direction=1.0, **more):
         ],
         **more,
     )
+
+
+def test_a_frame_turns_as_its_axes_do():
+    """Of random angles: omega = vee(A^T dA/ds) and its derivative, by differences over s."""
+    coefficients = np.random.default_rng(3).normal(size=(1, 6, 4))
+    tables = TrackTables(0.0, 2.0, coefficients, np.zeros((1, 6, 4)), 0, 1.5)
+    s, h = 0.5, 1e-5
+    before, here, after = (absolute_frame(Record(track=tables), at) for at in (s - h, s, s + h))
+    axes = [found[3:12].reshape(3, 3) for found in (before, here, after)]
+    assert axes[1] @ axes[1].T == pytest.approx(np.eye(3), abs=1e-14)
+    turn = axes[1].T @ (axes[2] - axes[0]) / (2.0 * h)
+    assert here[OMEGA : OMEGA + 3] == pytest.approx([turn[2, 1], turn[0, 2], turn[1, 0]], abs=1e-6)
+    change = (after - before)[OMEGA : OMEGA + 3] / (2.0 * h)
+    assert here[OMEGA_S : OMEGA_S + 3] == pytest.approx(change, abs=1e-6)
 
 
 @pytest.mark.parametrize("radius", [250.0, -400.0])
