@@ -19,18 +19,10 @@ from math import sqrt
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_CHECK, W_CHECK_GAMMA
-from railsim.kernels.rails import (
-    ASIDE,
-    ASIDE_SLOPE,
-    MIDDLE_Y,
-    RAIL_BEND,
-    RAIL_SLOPE,
-    ROLL,
-    ROLL_SLOPE,
-    SLOPE_Y,
-)
 from railsim.kernels.state import ARC_LENGTH, velocity_begin
 from railsim.kernels.support import SKIP
+
+from .rails import ASIDE, ASIDE_SLOPE, MIDDLE_Y, RAIL_BEND, RAIL_SLOPE, ROLL, ROLL_SLOPE, SLOPE_Y
 
 # columns of Contact.check: side, first and last row of its flangeway, stiffness [N/m], damping
 # [N s/m], coefficient of friction

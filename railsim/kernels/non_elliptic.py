@@ -154,7 +154,6 @@ def non_elliptic_axes(zone, first, last, centre, A, B, ellipse, load, E_star, st
     """
     # the approach at which the averaged ellipse carries the load, twice corrected
     delta = ellipse[2] * load ** (2.0 / 3.0)
-    N = a = b = 0.0
     for _ in range(3):
         patch = kik_piotrowski(zone, first, last, centre, delta, E_star, strips)
         N, a, b = corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips)

@@ -1,11 +1,14 @@
 """Remarks on a run that ended, from what it counted."""
 
 import logging
+from types import SimpleNamespace as Record
 
 import numpy as np
 import pytest
 
 import railsim
+from railsim.kernels import vibration as kernel
+from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
 from railsim.result.stored import lost_peak
@@ -106,6 +109,22 @@ def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(of, cau
     assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
     assert "above" not in remark
     assert cause in remark
+
+
+@pytest.mark.parametrize("frequency", [30.0, 60.0, 150.0])
+def test_a_wave_of_the_wheel_load_is_found_as_it_is(frequency, monkeypatch):
+    """Behind a Butterworth filter: f^2/sqrt(f^4 + 40^4) of it, tan(pi f h) for f."""
+    monkeypatch.setattr(kernel, "note_alternation", kernel.note_alternation.py_func)
+    h, amplitude = 1e-3, 5e3
+    work = Record(wheel=np.zeros((1, 2, WHEEL_COLUMNS)), vibration=np.zeros((1, 2, VIBRATION)))
+    for k in range(2000):
+        work.wheel[0, 1, W_Q] = 5e4 + amplitude * np.sin(2.0 * np.pi * frequency * k * h)
+        kernel.watch.py_func(work, kernel.high_pass.py_func(h), h, 0.0)
+    squared, at_cut = (np.tan(np.pi * f * h) ** 2 for f in (frequency, 40.0))
+    passed = amplitude * squared / np.hypot(squared, at_cut)
+    assert not work.vibration[0, 0, [AMPLITUDE, FREQUENCY]].any()
+    assert work.vibration[0, 1, AMPLITUDE] == pytest.approx(passed, rel=0.1)
+    assert work.vibration[0, 1, FREQUENCY] == pytest.approx(frequency, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import pytest
 from dynamics import Settings, evaluate, load_vehicle, steady
 
 from railsim.definitions.loading import load_track
+from railsim.kernels.contact_columns import J_NORMAL, J_SLIP
 from railsim.kernels.contact_table import FLANGE, FLANGE_ROOT, TREAD
 from railsim.kernels.support import (
     D_Y_SLIP,
@@ -81,6 +82,24 @@ def test_a_yawed_wheelset_slips_along_the_inclined_patch(curving):
         found = derivative(system, state, 6 * system.contact.body[w] + 5, 1e-6)[w, side] / -SPEED
         about = 80e3 if own[PATCHES] == GUIDING else 25e3
         assert own[D_Y_SLIP : D_Y_SLIP + 2] == pytest.approx(found, abs=about)
+
+
+def test_damping_by_the_contacts_is_the_slope_of_their_forces():
+    """On rigid rails, of y, z and roll over their rates, guiding and not: within 15 % of each."""
+    coach, track = load_vehicle("coach_manchester"), load_track("curve_r250")
+    track = track.replace(support={"preset": "rigid"})
+    state = simulate(coach, track, speed=SPEED, start=390.0, duration=0.1).groups["state"]["end"]
+    system, upper = steady(coach, track, Settings(), SPEED).model.system, np.triu_indices(3)
+    for b in system.contact.body:
+        row, across = evaluate(system, state)[0].contact_jacobian[b].copy(), np.zeros((3, 3))
+        across[upper] = across.T[upper] = row[J_SLIP:J_NORMAL]
+        found, forces = across + row[J_NORMAL : J_NORMAL + 9].reshape(3, 3), []
+        for change in np.vstack([np.eye(3), -np.eye(3)]) * 1e-5:
+            trial = state.copy()
+            trial[6 * (len(system.bodies.kind) + b) + 1 :][:3] += change
+            forces.append(evaluate(system, trial)[0].rail_force[b, 1:4].copy())
+        expected = (np.array(forces[3:]) - forces[:3]).T / 2e-5
+        assert found == pytest.approx(expected, abs=0.15 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(("vehicle", "speed"), [("coach_manchester", 30.0), ("wagon_y25", 25.0)])

@@ -1,6 +1,7 @@
 """Runs over the shipped crossing: impact against an independent wheel, resolution, leaving it."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from railsim.contact.curves import wheel_curve
 from railsim.contact.rail_sections import rail_parts, rigid_gaps
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.section_files import SectionList
+from railsim.kernels import table_ends
+from railsim.kernels.status import FALLEN, RUNNING, WHEEL_LIFT
 from railsim.model import rail_ranges
 from railsim.profiles import load_profile
 from railsim.result.filters import low_passed
@@ -132,14 +135,16 @@ def largest_over(track, **settings):
 
 
 def test_contacts_evaluated_again_are_counted_once():
-    """The last axle over the nose: as many patches as outputs at every step show."""
+    """The last axle over the nose: as many patches as outputs at every step show; a/b to 20."""
     how = {"step": 2e-4, "output_rate": 5000.0, "outputs": {"contact_patches": True}}
     settings = load_settings().with_values(how)
     coach = load_vehicle("coach_manchester")
     result = simulate(coach, crossing(), speed=20.0, start=60.2, until=61.2, settings=settings)
     assert result.attributes["contacts_evaluated_again"] > 100
-    loaded = np.count_nonzero(result["patch_N"] > 0.0)
-    assert result.attributes["patches_evaluated"] == loaded
+    loaded = result["patch_N"] > 0.0
+    assert result.attributes["patches_evaluated"] == np.count_nonzero(loaded)
+    beyond = np.count_nonzero(result["patch_a"][loaded] > 20.0 * result["patch_b"][loaded])
+    assert result.attributes["patches_out_of_range"] == beyond > 0
 
 
 def test_forces_do_not_depend_on_the_step():
@@ -197,6 +202,27 @@ def test_flange_that_climbs_goes_on():
     run = thrown(0.006, 0.9, crossing())
     assert run.status == "complete"
     assert np.abs(run["wheelset_lateral"][:, 0]).max() > 0.0125
+
+
+@pytest.mark.parametrize(
+    ("nearest", "below", "status"),
+    [
+        (-1.0, 0.03, FALLEN),
+        (-1.0, 0.0, RUNNING),  # in a gap, as between wing and nose
+        (-1.0, -0.06, WHEEL_LIFT),
+        (-0.01, -0.06, RUNNING),  # near a rail that is higher than the plain one
+    ],
+)
+def test_wheel_beside_all_rails_is_lifted_where_it_is_above_them_all(
+    nearest, below, status, monkeypatch
+):
+    """`nearest`: from the highest rail down to the wheel; `below` the plain rail [m]."""
+    monkeypatch.setattr(table_ends, "plain_gap", lambda *_: 0.3)
+    wheel, rails = (
+        SimpleNamespace(z=0.3 + below - 0.7 * 0.01, roll=0.01),
+        SimpleNamespace(lever=[0.7]),
+    )
+    assert table_ends.without_rail.py_func(rails, 0, wheel, nearest) == status
 
 
 @FURTHER
