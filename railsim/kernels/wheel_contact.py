@@ -313,9 +313,12 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
         for patch in range(first, first + N_PATCH):
             if approach[patch] == 0.0:
                 k = patch * LOOK_UP_SIZE
-                shear = rails.shear[0]
-                g_y = work.look_up[k + G_Y]
+                shear, g_y = rails.shear[0], work.look_up[k + G_Y]
                 work.look_up[k] += aside * g_y + turned * (work.look_up[k + G_ROLL] + shear * g_y)
+                if aside != 0.0:  # beyond the tables the stiffness does not change any more
+                    for y, roll in ((K_Y, K_ROLL), (K2_Y, K2_ROLL)):
+                        work.look_up[k + roll] += shear * work.look_up[k + y]
+                        work.look_up[k + y] = 0.0
                 raise_gap(work.look_up, k, bump, patch, shear)
                 work.stiffness[first + patch] = work.look_up[k + 1]
                 work.stiffness[first + patch + N_PATCH] = work.look_up[k + 2]
