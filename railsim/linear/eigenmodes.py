@@ -155,7 +155,7 @@ def _ordered(modes: Eigenmodes, indices: Indices) -> Eigenmodes:
     """Modes of given indices, NaN where there is none (-1)."""
     there = indices >= 0
     size, n = len(indices), modes.shapes.shape[1]
-    values = np.full(size, np.nan, dtype=complex)
+    values = np.full(size, complex(np.nan, np.nan))
     shapes, left = np.full((2, size, n), np.nan, dtype=complex)
     values[there] = modes.eigenvalues[indices[there]]
     shapes[there], left[there] = modes.shapes[indices[there]], modes.left[indices[there]]
