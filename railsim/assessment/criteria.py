@@ -131,8 +131,8 @@ class Measured:
             wheel = section.wheel(side)
             if side is not None and wheel not in self.wheels:
                 continue
-            value = self.value(signal.in_section(k, section, self.window), section.turn)
-            if value:
+            values = signal.in_section(k, section, self.window)
+            if len(values) and (value := self.value(values, section.turn)):
                 found[f"{label} {wheel}".rstrip()] = value
         return found
 
