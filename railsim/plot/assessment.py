@@ -17,7 +17,7 @@ from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits
 from railsim.errors import input_error
-from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, distinct, key, note, styled
+from railsim.plot.style import BESIDE, DISTINCT, LIMIT, Picture, broken, distinct, key, note, styled
 from railsim.text import unformatted
 
 LEAST_SPEEDS = 3  # for curves over the speed
@@ -61,7 +61,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
             worst = assessment.worst_in(zone)
             shares = [100.0 * worst[name][1].share if name in worst else np.nan for name in rules]
             rows = np.arange(len(rules)) + (k - 0.5 * (len(assessments) - 1)) * width
-            label = _verdicts(assessment) if ax is axes[0] else None
+            label = _verdicts(assessment, figure) if ax is axes[0] else None
             ax.barh(rows, shares, 0.9 * width, color=distinct(k), label=label)
             most = max(most, 1.1 * float(np.nanmax([0.0, *shares])))
             for row, share in zip(rows, shares, strict=True):
@@ -82,9 +82,10 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     return figure
 
 
-def _verdicts(assessment: Assessment) -> str:
+def _verdicts(assessment: Assessment, figure: Figure) -> str:
     parts = [f"{WORDS[name]} {verdict.value}" for name, verdict in assessment.verdicts.items()]
-    return f"{assessment.vehicle}: {assessment.verdict}\n{', '.join(parts)}"
+    lines = f"{assessment.vehicle}: {assessment.verdict}", ", ".join(parts)
+    return "\n".join(broken(line, figure.get_figwidth() - 0.5) for line in lines)
 
 
 @styled()
@@ -112,7 +113,6 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
                     _sections(ax, report, looks)
             ax.axhline(100.0, color=LIMIT, lw=1.0)
             ax.set_ylim(bottom=0.0)
-            ax.set_title(f"zone {zone}", loc="right", fontsize=9)
         axes[0].set_ylabel("section value / limit (%)")
     words = {row.criterion.name: row.criterion.words for zone in reports for row in zone.rows}
     handles = [key(words[name], **look) for name, look in looks.items()]
@@ -127,8 +127,11 @@ def _by_zone(
     figure = Picture(max(6.8, 1.2 + 2.8 * len(zones)), height)
     grid = figure.subplots(len(assessments), len(zones), squeeze=False, **how)
     for axes, assessment in zip(grid, assessments, strict=True):
-        # above the zones, and as wide as all of them
-        axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
+        # above the zones, and as wide as all of them: those of the zones make room for it
+        name = broken(assessment.vehicle, figure.get_figwidth() - 0.6)
+        axes[0].set_title(f"{name}\n", loc="left", fontsize=9).set_in_layout(False)
+        for ax, zone in zip(axes, zones, strict=True):
+            ax.set_title("\n" * (name.count("\n") + 1) + f"zone {zone}", loc="right", fontsize=9)
     for ax in grid[-1]:
         ax.set_xlabel(x)
     return figure, grid
@@ -168,6 +171,7 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
         for ax, zone in zip(axes, zones, strict=True):
             if zone not in own:
                 ax.set_axis_off()
+                ax.set_title("", loc="right")
                 continue
             for report in assessment.zones:
                 if report.zone == zone:
@@ -175,7 +179,6 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
                     _regression(ax, report, own[zone], colour)
             row = own[zone]
             ax.axhline(row.criterion.scale * row.limit, color=LIMIT, lw=1.0)
-            ax.set_title(f"zone {zone}", loc="right", fontsize=9)
             unit = row.criterion.unit.replace("-", "1")
             ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
     looks: dict[str, Any] = {"regression": {}, "upper bound": {"ls": "--"}}

@@ -20,11 +20,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation
 
 from railsim.arrays import Floats
 from railsim.definitions.track.section import Section
 from railsim.files.access import PICTURES, check_file, whole_file
+from railsim.text import unformatted
 
 STYLE: Any = {
     "axes.axisbelow": True, "axes.edgecolor": "0.35", "axes.grid": True, "axes.labelsize": 9,
@@ -48,9 +50,11 @@ PALER = 0.5  # share of the colour beside white in the second round of `DISTINCT
 SIDE_LINES = {"left": "-", "right": (0, (4.0, 1.6))}
 SHADES = {"CLO": "0.95", "CIR": "0.90"}
 LETTERS = 10.0  # of a title on an inch
+SMALL = 1.3 * LETTERS  # letters of other words on an inch
 LETTER = 4.0  # width of a letter of a section's name, in axes not yet laid out [points]
 
 LIMIT = "#b3122b"
+HALO = (withStroke(linewidth=2.5, foreground="white"),)  # of words on lines
 
 # coordinates of what stands at the upper edge of axes, of what stands at their sides
 ABOVE, BESIDE = ("data", "axes fraction"), ("axes fraction", "data")
@@ -164,6 +168,11 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
     for middle, _, words in sorted(names):
         note(axes, words, (middle, 1.0), (0, 2), "center", "bottom", **look)
     axes.set_title(axes.get_title(loc="left"), pad=14.0)
+
+
+def broken(words: str, width: float) -> str:
+    """Return words without formatting in lines that have room on a width [inches]."""
+    return fill(unformatted(words), int(SMALL * width))
 
 
 def note(

@@ -23,7 +23,7 @@ from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
-from railsim.plot.assessment import assessment_figure
+from railsim.plot.assessment import assessment_figure, sections_figure
 from railsim.profiles import load_profile
 from railsim.result import Result
 
@@ -212,6 +212,32 @@ def test_sections_outside_the_conditions_do_not_count_unless_asked():
     assert any("cant deficiency" in note for note in report.notes)
     (found,) = assess(run, all_sections=True)
     assert len(next(z for z in found.zones if z.zone == "4").values) == 11
+
+
+def test_sections_shorter_than_a_mean_have_none():
+    """1 m of a curve, asked for with all sections, ended in an IndexError: means are over 2 m."""
+    short = made(track(*curve(300.0, 200.0), cant=0.12), 20.0, until=217.0)
+    (found,) = assess(short, all_sections=True)
+    (values,) = next(z for z in found.zones if z.zone == "4").values
+    assert values.section.end - values.section.begin < 2.0
+    assert not {"sum_Y", "Y_over_Q"} & {name for name, _ in values.values}
+
+
+def test_a_long_name_of_a_vehicle_is_within_its_pictures():
+    """It was cut off at the edge, and the axes under it had a gap between them."""
+    coach = railsim.load_vehicle("coach_manchester")
+    text = coach.replace(name=f"{coach.name}, $1 to $2, " * 4).to_toml()
+    run = made(track(*curve(300.0, 200.0), cant=0.12), 20.0, vehicle=text)
+    found = assess(run, all_sections=True)
+    for draw in (assessment_figure, sections_figure):
+        figure = draw(found)
+        figure.draw_without_rendering()
+        texts = [t for each in figure.legends for t in each.texts]
+        texts += [
+            axes.title if not axes.get_title("left") else axes._left_title for axes in figure.axes
+        ]
+        assert max(t.get_window_extent().x1 for t in texts) <= figure.bbox.x1
+        assert min(axes.get_window_extent().width for axes in figure.axes) > 150
 
 
 def linear(speed=23.0, length=800.0):
