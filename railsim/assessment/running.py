@@ -70,11 +70,10 @@ def _kind(result: Result) -> tuple[str, ...]:
     vehicle, track = result.vehicle(), result.track()
     condition = (vehicle.service.condition if vehicle.service else None) or ""
     spectra = [str(getattr(part, "spectrum", part.type)) for part in track.irregularities]
-    friction = " / ".join(f"{mu:g}" for mu in track.frictions)
     rails = " / ".join(dict.fromkeys(track.rail))
     return (
         condition, vehicle.load or ("" if condition else DESIGN),
-        ", ".join(dict.fromkeys(spectra)) or "smooth", f"friction {friction}",
+        ", ".join(dict.fromkeys(spectra)) or "smooth", f"friction {track.friction_words}",
         f"{rails}, inclination {track.inclination:g}, gauge {track.gauge:g} m",
     )  # fmt: skip
 

@@ -70,11 +70,10 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
 
 def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
     slope = f"1:{1.0 / track.inclination:g}" if track.inclination else "upright"
-    friction = "by table" if track.friction_table else either(track.friction)
     lines = [
         track.name,
         f"  {track.length:g} m, gauge {1e3 * track.gauge:g} mm, rail {either(track.rail)} "
-        f"{slope}, friction {friction}, rounded over {track.rounding:g} m",
+        f"{slope}, friction {track.friction_words}, rounded over {track.rounding:g} m",
     ]
     if track.speed is not None:
         lines.append(f"  permitted speed {track.speed:g} m/s ({3.6 * track.speed:.0f} km/h)")

@@ -55,9 +55,7 @@ def conditions(track: Track, settings: Settings) -> dict[str, str]:
     for key, one in (("law", settings), ("linear_law", smooth_law(settings))):
         law = CREEP_LAWS[one.creep_law]
         words[key] = law.label + (" {} x {} cells".format(*one.fastsim_grid) if law.grid else "")
-    sides = np.unique(track.friction)
-    friction = "from a table" if track.friction_table else "/".join(f"{mu:g}" for mu in sides)
-    return {"rails": track.support.preset, **words, "friction": friction}
+    return {"rails": track.support.preset, **words, "friction": track.friction_words}
 
 
 @dataclass(frozen=True)

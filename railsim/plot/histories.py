@@ -114,9 +114,10 @@ def _figure(
 
 
 def title(result: Result) -> str:
-    """Return what a figure of a result is called: vehicle, track, speed, and an early end."""
-    names = unformatted(result.vehicle().name_with_load), unformatted(result.track().name)
-    return f"{names[0]}\n{names[1]} · {result.speed_words}{result.end_words}"
+    """Return what a figure of a result is called: vehicle, track, friction, speed, an early end."""
+    vehicle, track = unformatted(result.vehicle().name_with_load), result.track()
+    where = f"{unformatted(track.name)} · friction {track.friction_words}"
+    return f"{vehicle}\n{where} · {result.speed_words}{result.end_words}"
 
 
 def _draw(
@@ -130,7 +131,7 @@ def _draw(
         if by == "wheelset" and "side" in line.labels:
             colour = style.DISTINCT[0] if side == "left" else style.DISTINCT[1]
         elif "wheelset" in line.labels:
-            colour = wheelsets[line.labels["wheelset"]]
+            colour = wheelsets[line.labels["wheelset"]] if by == "wheel" else "0.25"
         else:
             colour = style.distinct(index)
         values, above = line.values[window] * quantity.scale, 3.0 - 0.01 * index
@@ -189,8 +190,8 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     shown = value * quantity.scale
     axes.axhline(shown, color=style.LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
     shift, va = ((-3, 2.5), "bottom") if value < 0 else ((-3, -2.5), "top")
-    look = {"frame": style.BESIDE, "fontsize": 7.5, "color": style.LIMIT}
-    style.note(axes, words, (1.0, shown), shift, "right", va, **look)
+    look = {"fontsize": 7.5, "color": style.LIMIT, "path_effects": style.HALO}
+    style.note(axes, words, (1.0, shown), shift, "right", va, frame=style.BESIDE, **look)
 
 
 def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:

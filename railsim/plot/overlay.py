@@ -128,9 +128,14 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
 
 
 def _shared(results: Sequence[Result]) -> str:
-    """What of vehicle, track and speed is the same for all results."""
-    told = [(r.vehicle().name_with_load, r.track().name, r.speed_words) for r in results]
-    same = [names[0] for names in zip(*told, strict=True) if len(set(names)) == 1]
+    """What of vehicle, track, friction and speed is the same for all results."""
+    tracks = [run.track() for run in results]
+    told = (
+        [run.vehicle().name_with_load for run in results], [track.name for track in tracks],
+        [f"friction {track.friction_words}" for track in tracks],
+        [run.speed_words for run in results],
+    )  # fmt: skip
+    same = [names[0] for names in told if len(set(names)) == 1]
     return " · ".join(map(unformatted, same))
 
 

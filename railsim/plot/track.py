@@ -148,7 +148,7 @@ def _constants(track: Track) -> str:
     tilt = f"1:{1.0 / track.inclination:.3g}" if track.inclination else "upright"
     words = [f"gauge {1e3 * track.gauge:g} mm", f"rail {rail} {tilt}"]
     if track.friction_table is None:
-        words.append(f"friction {' / '.join(f'{mu:g}' for mu in dict.fromkeys(track.friction))}")
+        words.append(f"friction {track.friction_words}")
     words.append(f"support {track.support.preset}")
     if track.speed is not None:
         words.append(f"permitted {3.6 * track.speed:.0f} km/h")

@@ -8,12 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
-from matplotlib.patheffects import withStroke
 
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle.outlines import body_boxes
-from railsim.plot.style import Picture, distinct, key, note, styled
+from railsim.plot.style import HALO, Picture, distinct, key, note, styled
 from railsim.text import unformatted
 
 View = tuple[int, int]  # axes of the vehicle along the width and the height of the page
@@ -105,8 +104,8 @@ def _name_bodies(axes: Axes, together: dict[tuple[float, float], list[str]], abo
         near = sum(abs(x - a) < NEAR[0] and abs(y - b) < NEAR[1] for a, b in written)
         written.append((x, y))
         shift = (0, above + 9 * near)
-        label = note(axes, unformatted(words), (x, y), shift, "center", color=BODY, zorder=6)
-        label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
+        look: Any = {"color": BODY, "zorder": 6, "path_effects": HALO}
+        note(axes, unformatted(words), (x, y), shift, "center", **look)
 
 
 def _draw_element(

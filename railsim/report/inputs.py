@@ -99,8 +99,7 @@ def what_was_run(
         section.drawings.append(Drawing(name, words, Markup(vehicle_svg(vehicle)), kinds))
     for name, variants in tracks.items():
         rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
-        values = sorted({mu for track in variants for mu in track.frictions})
-        friction = ", ".join(f"{mu:g}" for mu in values)
+        friction = ", ".join(dict.fromkeys(track.friction_words for track in variants))
         unusual = dict.fromkeys(
             str(remark) for track in variants for remark in track_remarks(track)
         )

@@ -115,7 +115,7 @@ def test_friction_and_widening_along_the_track_are_shown(capsys, tmp_path):
         "gauge_widening = [[0.0, 0.0], [50.0, 0.012]]\n"
     )
     text = "\n".join(lines_of(capsys, str(path)))
-    assert "friction by table" in text
+    assert "friction 0.3," in text
     assert "gauge widened by up to 12 mm" in text
     assert "about the inner rail" in text
 

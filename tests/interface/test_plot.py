@@ -75,6 +75,26 @@ def test_title_says_how_a_run_ended_early():
         assert histories(example_result(status=status)).get_suptitle().endswith(words)
 
 
+def test_title_says_the_friction_left_and_right():
+    """Runs on dry and on wet rails had the same title."""
+    for given, words in (("0.12", "0.12"), ("[0.35, 0.15]", "0.35 / 0.15")):
+        run = example_result()
+        facts = {"track_toml": load_track("straight", [f"friction={given}"]).to_toml()}
+        facts = {**run.attributes, **facts}
+        run = Result({n: run[n] for n in run}, run.quantities, run.coordinates, facts)
+        assert f" · friction {words} · 20 m/s" in histories(run).get_suptitle()
+        assert f"friction {words}" in overlay({"a": run, "b": run}).get_suptitle()
+    table = load_track("straight", ["friction_table=[[0, 0.4, 0.2], [9, 0.1, 0.3]]"])
+    assert table.friction_words == "0.1 to 0.4"
+
+
+def test_what_a_wheelset_has_once_is_not_drawn_as_its_left_wheel(result):
+    """With axes for each wheelset the colours of the legend are those of the wheels."""
+    for axes in histories(result, ["sum_Y"], by="wheelset").axes:
+        (line,) = drawn(axes)
+        assert to_hex(line.get_color()) not in {to_hex(colour) for colour in DISTINCT}
+
+
 def test_of_a_grid_the_lowest_axes_and_the_first_of_each_row_are_labelled():
     """Five of two rows of three, and two of one row."""
     for count, below, beside in ((5, [2, 3, 4], [0, 3]), (2, [0, 1], [0])):
@@ -458,7 +478,7 @@ def test_overlay_says_what_its_results_share_and_which_ended_early(result):
     words = [text.get_text() for text in figure.legends[0].texts]
     assert words[:2] == ["one", "other · derailed"]
     vehicle, track = result.vehicle().name, result.track().name
-    assert figure.get_suptitle() == f"{vehicle} · {track}"
+    assert figure.get_suptitle().split() == f"{vehicle} · {track} · friction 0.4".split()
 
 
 def test_overlay_shades_what_the_longest_run_passed_and_over_time_of_one_speed_only(result):

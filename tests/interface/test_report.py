@@ -387,6 +387,14 @@ def test_a_drawn_track_has_its_curvature_and_cant_to_scale_and_wide_curves_their
     assert [cant[s] for s in (100.0, 350.0, 900.0)] == [164.0, 140.0, 116.0]
 
 
+def test_friction_beside_a_drawn_track_is_that_of_its_left_and_right_rail():
+    """Of 0.35 left and 0.15 right "0.15, 0.35" was told."""
+    (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": example_result()})
+    wet = [used.track.model_copy(update={"friction": one}) for one in ((0.35, 0.15), (0.4, 0.4))]
+    section = what_was_run([used._replace(track=track) for track in wet], {}, {})
+    assert "Friction 0.35 / 0.15, 0.4; rails" in section.drawings[-1].words
+
+
 def test_remarks_on_a_track_stand_beside_its_drawing_and_names_once():
     result = example_result()
     (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": result})

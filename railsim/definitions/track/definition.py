@@ -144,6 +144,11 @@ class Track(FileDefinition, Plottable):
             values = min(occurring), max(occurring)
         return tuple(dict.fromkeys(values))
 
+    @property
+    def friction_words(self) -> str:
+        """Coefficient of friction, as left / right where they differ; of a table the range."""
+        return (" to " if self.friction_table else " / ").join(f"{mu:g}" for mu in self.frictions)
+
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:
         """Put measured irregularities, sections of rails and sources of laws into the tables."""
