@@ -197,8 +197,8 @@ def _write(
     from railsim.text import unformatted
 
     _, right = found.pairs
-    names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in found.pairs)
-    title = unformatted(" / ".join(names))
+    names = " / ".join(dict.fromkeys(pair.words for pair in found.pairs))
+    title, gauge = unformatted(names), f", gauge {1e3 * right.gauge:g} mm"
     other = found.with_other_normal() if found.exact else None
     labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
     content = (
@@ -206,9 +206,9 @@ def _write(
         tables.conicity_table(found),
         tables.patch_table(found),
         plot.profiles_figure(found.geometry, found.pairs),
-        plot.functions_figure(found.geometry, title),
-        plot.conicity_figure({" / ".join(names): (found.amplitudes, found.conicity)}),
-        plot.patches_figure(found.contacts, found.load, found.exact, other, labels),
+        plot.functions_figure(found.geometry, title + gauge),
+        plot.conicity_figure({names + gauge: (found.amplitudes, found.conicity)}),
+        plot.patches_figure(found.contacts, found.load, found.exact, other, labels, f", {title}"),
     )
     for name, one in zip((*TABLES, *PICTURES), content, strict=True):
         output.write(name, one)

@@ -37,6 +37,12 @@ class Pair:
     inclination: float
     back_to_back: float
 
+    @property
+    def words(self) -> str:
+        """Profiles and the inclination of the rail."""
+        slope = f"1:{1.0 / self.inclination:.4g}" if self.inclination else "upright"
+        return f"{self.wheel.name} on {self.rail.name} {slope}"
+
     def table(self, radii: tuple[float, float], normal: Normal) -> ContactTable:
         """Return the contact table of the right wheel of a wheelset with these radii [m]."""
         return cached_contact_table(

@@ -54,7 +54,7 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
     for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
         axes = figure.add_subplot(grid[0, side])
         _draw_pair(axes, geometry, pair, side)
-        axes.set_title(unformatted(f"{name}: {pair.wheel.name} on {pair.rail.name}"))
+        axes.set_title(unformatted(f"{name}: {pair.words}"))
         if side == 0:  # within the rail's head
             look = {"fontsize": 6.5, "frame": "axes fraction"}
             note(axes, EXPLAINED, (0.43, 0.16), (0, 0), "center", "center", **look)
@@ -213,12 +213,13 @@ def patches_figure(
     exact: Mapping[float, ExactContact] | None = None,
     other: Mapping[float, LoadedContact] | None = None,
     labels: tuple[str, str] = ("contact table", "second table"),
+    where: str = "",
 ) -> Figure:
     """Contact patches of the right wheel, seen from above, one picture for each displacement.
 
     `contacts` ([m]): From the contact table. `load`: Wheel load, for the title [N]. `exact` ([m]):
     Pressure by boundary elements, drawn beneath. `other` ([m]): From a second table, drawn dashed.
-    `labels`: What both tables are called.
+    `labels`: What both tables are called. `where`: End of the title.
     """
     columns = 4
     rows = -(-len(contacts) // columns)
@@ -226,7 +227,7 @@ def patches_figure(
     right = 0.90 if exact else 0.99
     edges = 0.06, 0.45 / height, right, 1.0 - 0.85 / height, 0.08, 0.32
     figure = Picture(9.6, height, edges=edges)
-    title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN"
+    title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN{where}"
     figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
     _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
     axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
