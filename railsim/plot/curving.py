@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from railsim.arrays import Floats, Indices
-from railsim.plot.style import Picture, distinct, note, say, styled, wheelset_colours
+from railsim.plot.style import Picture, distinct, note, say, signed, styled, wheelset_colours
 from railsim.stability.curving import MEAN, METHODS, TIME, Curving
 
 LEFT, RIGHT = 0, 1
@@ -34,10 +34,11 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     axes = figure.add_subfigure(rows[0]).subplots(2, 2)
     order = np.argsort(found.radius)
     radius = found.radius[order]
-    guiding = 1e-3 * np.abs(_leading_outer(found, found.Y))
+    outwards = -1e-3 * np.sign(found.radius)[:, None, None]
+    guiding = outwards * _leading_outer(found, found.Y)
     for one, values, words in (
         (axes[0, 0], 1e3 * found.attack[..., 0], "angle of attack, leading wheelset (mrad)"),
-        (axes[0, 1], guiding, "guiding force Y of the leading outer wheel (kN)"),
+        (axes[0, 1], guiding, "guiding force $Y$ of the leading outer wheel, outwards (kN)"),
         (axes[1, 0], found.T_gamma.sum((-2, -1)), r"wear number $T\gamma$ of all wheels (N)"),
     ):
         _lines(one, found, order, values, words)
@@ -74,7 +75,7 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
         axes.grid(visible=False)
         shown = wear[:, :, m]
         picture = axes.pcolormesh(columns, rows, shown.T, shading="nearest", vmin=0.0, vmax=largest)
-        axes.set_xticks(columns, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
+        axes.set_xticks(columns, [signed(value) for value in radius], fontsize=7.5, rotation=45)
         axes.set_yticks(rows, [f"{value:g}" for value in deficiency])
         if shown.size <= NUMBERS:
             _numbers(axes, shown, largest)
@@ -86,7 +87,7 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
 def _numbers(axes: Axes, values: Floats, largest: float) -> None:
     """Values in their fields, readable on dark and on light."""
     for (r, i), value in np.ndenumerate(values):
-        words = f"{value:.0f}" if np.isfinite(value) else "none"
+        words = signed(round(value)) if np.isfinite(value) else "none"
         colour = "black" if value > 0.6 * largest or not np.isfinite(value) else "white"
         note(axes, words, (r, i), (0, 0), "center", "center", color=colour)
 
@@ -147,11 +148,15 @@ def _plan(axes: Axes, found: Curving) -> None:
     # to the right is downwards
     axes.set(xlim=(np.min(x) - 2.0, np.max(x) + 2.0), ylim=(1.9, -1.9), aspect="equal")
     axes.set(xticks=[], yticks=[], anchor="W")  # room for the title of a short vehicle
-    radius = f"{found.radius[r]:g}".replace("-", "\N{MINUS SIGN}")
     axes.set_title(
-        f"Wheelsets at R {radius} m (first deficiency and friction) from above, "
-        f"running to the right; angle of attack and displacement magnified {EXAGGERATED:g} times"
+        f"Wheelsets at R {signed(found.radius[r])} m, {_first(found)}, from above, running to the "
+        f"right; angles and displacements magnified {EXAGGERATED:g} times"
     )
+
+
+def _first(found: Curving) -> str:
+    """Friction and cant deficiency of what is shown for one of them alone."""
+    return f"friction {found.friction[0]:g}, cant deficiency {1e3 * found.cant_deficiency[0]:g} mm"
 
 
 def _steering(axes: Axes, found: Curving, order: Indices) -> None:
@@ -160,5 +165,5 @@ def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     for w, name in enumerate(found.wheelsets):
         both = _parted(found.radius[order], 1e3 * found.lateral[order, 0, 0, w])
         axes.plot(*both, color=colours[name], marker=".", ms=4, label=name)
-    axes.set_title("lateral displacement (mm), first deficiency and friction")
+    axes.set_title(f"lateral displacement (mm), {_first(found)}")
     axes.legend(fontsize=7.5)

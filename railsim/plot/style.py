@@ -170,6 +170,11 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
     axes.set_title(axes.get_title(loc="left"), pad=14.0)
 
 
+def signed(value: float) -> str:
+    """Return a number with a minus sign as on the axes."""
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
+
+
 def broken(words: str, width: float) -> str:
     """Return words without formatting in lines that have room on a width [inches]."""
     return fill(unformatted(words), int(SMALL * width))

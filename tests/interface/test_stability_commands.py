@@ -268,6 +268,24 @@ def test_a_map_says_how_many_points_have_no_critical_speed():
     assert axes.get_ylim()[1] > 70.0
 
 
+def test_picture_of_curving_has_the_guiding_force_outwards_with_its_sign():
+    """Magnitudes were drawn: a wheel that is pulled off its rail looked like one that guides."""
+    wheels, sets, each = np.zeros((2, 1, 1, 1, 2)), np.zeros((2, 1, 1, 1)), np.zeros((2, 1, 1))
+    Y = wheels.copy()
+    Y[0, ..., 1], Y[1, ..., 0] = 5e3, 2e3  # to the right: outwards in a left-hand curve alone
+    grid = np.array([-300.0, 300.0]), np.array([0.0]), np.array([0.2])
+    of_wheels = wheels, Y, wheels, wheels, wheels, wheels
+    found = curving.Curving(
+        *grid, 0.15, each[..., 0], each.astype(int) + 1, *of_wheels, sets, sets, sets, sets, each,
+        ("axle",), (), (0.0,), "wagon",
+    )  # fmt: skip
+    (axes,) = (ax for ax in found.plot().axes if "guiding force" in ax.get_title(loc="left"))
+    drawn = axes.lines[0].get_ydata()
+    np.testing.assert_allclose(drawn[np.isfinite(drawn)], [5.0, -2.0])
+    titles = [ax.get_title(loc="left") for ax in found.plot().axes]
+    assert "lateral displacement (mm), friction 0.2, cant deficiency 0 mm" in titles
+
+
 def test_curving_over_a_grid(capsys, tmp_path):
     folder = tmp_path / "curving"
     assert (
