@@ -98,11 +98,12 @@ def _map(
     axes = {name: values for name, values in ranges.items() if len(values) > 1}
     units = {name: unit_of_input(points[0], name) for name in axes}
     shown = {f"{name} ({units[name]})" if units[name] else name: axes[name] for name in axes}
-    title = f"{points[0].vehicle.name_with_load}: critical speed"
+    table = map_table(found, units)
+    title = f"{points[0].vehicle.name_with_load}: critical speed\n{table.caption}"
     output.write(FILES[0], found)
     output.write(FILES[1], lambda: map_figure(shown, map_speeds(found), title))
     remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
-    output.answer(found, [map_table(found, units)], remarks)
+    output.answer(found, [table], remarks)
 
 
 def _ranges(

@@ -86,7 +86,9 @@ def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
 
 def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     """What there is without a branch: linear critical speeds over amplitude, the conicity."""
-    words = "no linear critical speed in the range"
+    words = f"no linear critical speed from {found.low:g} to {found.high:g} m/s"
+    if found.unstable_at_low:
+        words = f"unstable at {found.low:g} m/s, the lower end of the range"
     if found.linear is not None:
         words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
     figure = Picture(8.4, 4.4, f"{title}\n{words}")
@@ -117,7 +119,8 @@ def _mark(axes: Axes, found: CriticalSpeed) -> None:
                 axes.axvline(speed, color="0.1", lw=0.9, ls=dashes, label=label)
     line = found.linear_over_amplitude
     if line is not None and line.smallest is not None:
-        speeds = np.array(line.speed, dtype=float)
+        # not at amplitudes of which the lower end of the range is unstable already
+        speeds = np.array([s if s and s > found.low else np.nan for s in line.speed])
         sizes = 1e3 * np.array(line.amplitude)
         words = "linear, harmonic, over amplitude"
         axes.plot(speeds, sizes, color="0.1", lw=0.9, ls=":", label=words)
@@ -205,6 +208,6 @@ def twist_figure(loops: Mapping[str, TwistLoop], limit: float, title: str) -> Fi
         note(panel, f"limit {limit:g}", (1.0, limit), (-3, 2.5), "right", "bottom", **look)
         panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
         panel.set(title=f"{name},\nwheelset {wheelset + 1} {SIDES[side]}")
-        panel.set(xlabel="of the twist (%)")
+        panel.set(xlabel="share of the full twist (%)")
     panels[0].set_ylabel("$(Q_0 - Q)/Q_0$")
     return figure

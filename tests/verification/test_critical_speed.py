@@ -31,7 +31,7 @@ from railsim.stability.critical_speed import (
 from railsim.stability.diagram import diagram
 from railsim.stability.motion import LeftRange, Stretch
 from railsim.stability.ramp import ramp, sustained
-from railsim.stability.result import Conicity, CriticalSpeed
+from railsim.stability.result import Conicity, CriticalSpeed, OverAmplitude
 from railsim.stability.vehicle_flow import VehicleFlow
 
 CRITICAL = railsim.stability.critical_speed
@@ -98,6 +98,18 @@ def test_conicities_of_all_amplitudes_in_the_picture_are_in_it():
     axes = bifurcation_figure(found).axes[1]
     assert axes.get_ylim() == (0.0, 6.0)
     assert axes.get_xlim() == pytest.approx((0.0, 1.1 * 0.2))
+
+
+def test_picture_of_a_vehicle_unstable_at_the_lower_end_says_so():
+    """It said that there is no critical speed, and drew the lower end as one."""
+    line = OverAmplitude([1e-4, 1e-3, 2e-3], [5.0, 7.0, None], [None, 2.0, None])
+    where = {"rails": "rigid", "friction": "0.4", "law": "fastsim"}
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, low=5.0, high=90.0)
+    found.unstable_at_low, found.linear_over_amplitude = True, line
+    figure = bifurcation_figure(found)
+    assert figure.get_suptitle().endswith("unstable at 5 m/s, the lower end of the range")
+    (drawn,) = figure.axes[0].lines
+    np.testing.assert_array_equal(drawn.get_xdata(), [np.nan, 7.0, np.nan])
 
 
 def test_diagram_follows_what_hunts_below_its_lowest_speed():
