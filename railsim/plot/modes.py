@@ -62,7 +62,8 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
 def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> None:
     words = f"{locus.key} ({locus.unit})" if locus.unit else locus.key
     damping.axhline(0.0, color=LIMIT, lw=0.8)
-    damping.set(xlabel=words, ylabel="damping ratio (%)", title="Damping; below zero unstable")
+    damping.set(xlabel=words, ylabel="damping ratio (%)")
+    damping.set_title(f"Damping of oscillations below {SHOWN:g} Hz; below zero unstable")
     damping.set_ylim(max(-30.0, damping.get_ylim()[0]), min(60.0, damping.get_ylim()[1]))
     damping.plot([], [], color="0.65", lw=0.9, label="bogies, wheelsets")
     damping.legend(ncol=1, loc="upper left", bbox_to_anchor=(1.0, 1.02), fontsize=7.5)
@@ -138,5 +139,5 @@ def _shape(axes: Axes, mode: Mode) -> None:
     axes.set_yticks(rows, names, fontsize=6.5)
     axes.set(ylim=(max(len(names), LEAST_BARS) - 0.5, -0.5), xlim=(0.0, None))
     axes.grid(visible=False, axis="y")
-    damping = f"damping {100.0 * mode.damping_ratio:.2f} %"
-    axes.set_title(f"{mode.name}: {mode.natural_frequency:.3g} Hz, {damping}", fontsize=8.5)
+    damping = f"damping {100.0 * mode.damping_ratio:.2f} %".replace("-", "\N{MINUS SIGN}")
+    axes.set_title(f"{mode.name}: f₀ {mode.natural_frequency:.3g} Hz, {damping}", fontsize=8.5)
