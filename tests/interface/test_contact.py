@@ -55,16 +55,14 @@ def test_json_has_the_names_units_and_signs_of_the_interface(capsys):
     assert conicity[0.003] == pytest.approx(0.177, abs=0.002)  # PHYSICS.md: about 0.18
 
 
-@pytest.mark.usefixtures("small_contact_tables")
-@pytest.mark.parametrize(
-    ("inclination", "words"), [(0.025, "1:40"), (0.05, "1:20"), (0, "upright")]
-)
-def test_pictures_of_a_contact_name_the_inclination_of_the_rail(inclination, words):
+def test_pictures_of_a_contact_name_the_inclination_of_the_rail():
     """The conicity of 1:20 and that of 1:40 had the same title."""
-    pair = Pair(load_profile("S1002"), load_profile("60E1"), 1.435, inclination, 1.36)
-    assert pair.words == f"S1002 on 60E1 {words}"
+    profiles = load_profile("S1002"), load_profile("60E1")
+    for inclination, words in ((0.025, "1:40"), (0.05, "1:20"), (0.0, "upright")):
+        assert Pair(*profiles, 1.435, inclination, 1.36).words == f"S1002 on 60E1 {words}"
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_pictures_and_tables_are_written_and_kept(tmp_path, capsys):
     """Also those of a worn wheel over a new one, which exceeds its limits."""
     out = tmp_path / "contact"
