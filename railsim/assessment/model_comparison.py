@@ -153,6 +153,11 @@ class ModelValidation:
     remarks: tuple[str, ...] = ()
 
     @property
+    def title(self) -> str:
+        """What is compared with what."""
+        return f"{self.vehicle} against {', '.join(self.runs)}"
+
+    @property
     def verdict(self) -> str:
         """Fail where one quantity fails, pass where all pass."""
         found = {one.verdict for one in self.comparisons}

@@ -10,10 +10,13 @@ from railsim.arrays import Floats
 from railsim.assessment.model_comparison import ModelValidation, Overlay
 from railsim.definitions.measurement import quantity_of
 from railsim.identification.identified import Channel, Identified
-from railsim.plot.style import grid_of, styled
+from railsim.plot.style import DISTINCT, LIMIT, broken, grid_of, styled
+from railsim.text import unformatted
 
 MOST = 12  # channels of a picture
 LONGEST = 20_000  # values of a line
+BOTH = {"measured": "k", "simulated": DISTINCT[1]}
+LIMITS = "dashed: limit of the mean; dotted: twice that of the standard deviation"
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
 
 
@@ -30,7 +33,8 @@ def _written(unit: str) -> str:
 def scatter(validation: ModelValidation) -> Figure:
     """Draw simulated over measured section values with the bands of the mean and the deviation."""
     shown = validation.comparisons
-    figure, grid = grid_of(len(shown), 3, 8.0, 2.5, 0.6)
+    title = f"{unformatted(validation.title)}\n{LIMITS}"
+    figure, grid = grid_of(len(shown), 3, 8.0, 2.5, 1.0, title)
     for axes, one in zip(grid, shown, strict=True):
         scale = one.quantity.column.scale
         both = scale * np.array([(pair.measured, pair.simulated) for pair in one.pairs]).T
@@ -40,10 +44,10 @@ def scatter(validation: ModelValidation) -> Figure:
         for limit, style in ((one.mean_limit, "--"), (2.0 * one.limit, ":")):
             for sign in (-1.0, 1.0):
                 axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
-        axes.plot(*both, ".", color="C3" if one.verdict == "fail" else "C0")
+        axes.plot(*both, ".", color=LIMIT if one.verdict == "fail" else DISTINCT[0])
         axes.set(xlim=ends, ylim=ends)
         unit = f" ({_written(one.quantity.column.unit)})" if one.quantity.column.unit else ""
-        axes.set_title(f"{one.quantity.name}: {one.verdict}", fontsize="small")
+        axes.set_title(broken(f"{one.quantity.words}: {one.verdict}", 2.3), fontsize="small")
         axes.set_xlabel(f"measured{unit}", fontsize="small")
         axes.set_ylabel(f"simulated{unit}", fontsize="small")
     return figure
@@ -57,13 +61,14 @@ def differences(validation: ModelValidation) -> Figure:
     for axes, one in zip(grid, shown, strict=True):
         x = np.array([pair.difference for pair in one.pairs]) / one.limit
         reach = max(1.2, 1.05 * float(np.abs(x).max()))
-        colour = "C3" if one.verdict == "fail" else "C0"
+        colour = LIMIT if one.verdict == "fail" else DISTINCT[0]
         axes.hist(x, np.linspace(-reach, reach, 25).tolist(), color=colour)
         for limit in (-2 / 3, 2 / 3):
             axes.axvline(limit, color="0.5", linewidth=0.8, linestyle="--")
         axes.axvline(one.mean / one.limit, color="k", linewidth=1.0)
-        axes.set_title(one.quantity.name, fontsize="small")
+        axes.set_title(broken(one.quantity.words, 1.7), fontsize="small")
         axes.set_xlabel("difference / limit", fontsize="small")
+        axes.set_ylabel("number", fontsize="small")
     return figure
 
 
@@ -77,7 +82,7 @@ def overlays(validation: ModelValidation) -> Figure:
         first, last = np.searchsorted(one.s, (middle - NEAR, middle + NEAR))
         return one.s, slice(first, last, max(1, (last - first) // LONGEST))
 
-    return _over_arc(shown, part, {"measured": "k", "simulated": "C1"}, 0.7)
+    return _over_arc(shown, part, BOTH, 0.7)
 
 
 def _over_arc(
@@ -104,10 +109,14 @@ def spectra(validation: ModelValidation) -> Figure:
     shown = _first(validation.overlays)
     figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.6)
     for axes, one in zip(grid, shown, strict=True):
-        for name, colour in (("measured", "k"), ("simulated", "C1")):
-            axes.loglog(*_density(one, getattr(one, name)), color=colour, lw=0.9, label=name)
+        scale, unit = _shown(one.quantity)
+        for name, colour in BOTH.items():
+            axes.loglog(
+                *_density(one, scale * getattr(one, name)), color=colour, lw=0.9, label=name
+            )
         axes.set_title(one.name, fontsize="small")
         axes.set_xlabel("frequency (Hz)", fontsize="small")
+        axes.set_ylabel(f"PSD (({unit})²/Hz)", fontsize="small")
     grid[0].legend(fontsize="small")
     return figure
 
@@ -129,7 +138,7 @@ def fits(found: Identified) -> Figure:
         middle = len(one.at) // 2
         return one.at, slice(middle, middle + int(4.0 / one.step))
 
-    lines = {"measured": "k", "before": "C0", "after": "C1"}
+    lines = {"measured": "k", "before": DISTINCT[4], "after": DISTINCT[1]}
     return _over_arc(_first(found.channels), part, lines, 0.8)
 
 
@@ -146,7 +155,7 @@ def residual_spectra(found: Identified) -> Figure:
         inside = (f >= low) & (f <= high)
         summed = np.cumsum(power[inside]) / max(float(power[inside].sum()), 1e-300)
         axes.plot([low, high], [0.0, 1.0], color="0.6", linewidth=0.8)
-        axes.plot(f[inside], summed, color="C0" if one.is_white else "C3")
+        axes.plot(f[inside], summed, color=DISTINCT[0] if one.is_white else LIMIT)
         white = "white" if one.is_white else "not white"
         axes.set_title(f"{one.name}: {white}", fontsize="small")
         axes.set_ylabel("share of the power", fontsize="small")

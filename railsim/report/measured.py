@@ -113,9 +113,8 @@ def of_validation(found: ModelValidation, more: Sequence[Drawing] = ()) -> Part:
         Section("Pictures", drawings=[*drawn(validation_figures(found)), *more]),
         Section("Values of the sections", [UNITS], [found.section_table()]),
     ]
-    title = f"{found.vehicle} against {', '.join(found.runs)}"
     method = (*VALIDATION, found.edition)
-    return Part(title, text, found.verdict not in words, found.remarks, sections, method)
+    return Part(found.title, text, found.verdict not in words, found.remarks, sections, method)
 
 
 def identification_figures(found: Identified) -> dict[str, Figure]:

@@ -10,9 +10,16 @@ import pytest
 from click.testing import CliRunner
 
 import railsim
-from railsim.assessment.model_comparison import QUANTITIES, Comparison, ModelValidation, Pair
+from railsim.assessment.model_comparison import (
+    QUANTITIES,
+    Comparison,
+    ModelValidation,
+    Overlay,
+    Pair,
+)
 from railsim.assessment.model_validation import matching
 from railsim.cli import railsim as command_line
+from railsim.plot import validation as plots
 
 FOLDER = Path(__file__).parents[2] / "examples" / "measured_run"
 sys.path.insert(0, str(FOLDER))
@@ -40,6 +47,23 @@ def test_mean_and_deviation_of_twelve_sections_by_hand():
     by_hand = 1e3 * ((34.25 - 12.5**2 / 12.0) / 11.0) ** 0.5
     assert found.deviation == pytest.approx(by_hand, rel=1e-12)
     assert (found.sections, found.verdict) == (12, "pass")
+
+
+def test_pictures_name_quantities_in_words_and_densities_with_their_units():
+    """Titles were keys such as Y_qst, the spectra had no vertical axis."""
+    one = comparison(1e3 * np.array(MEASURED), 1e3 * np.array(SIMULATED))
+    s = np.arange(3000.0)
+    overlay = Overlay("run", "Q1L", "Q:1:left", s, 100.0, 1e3 * np.sin(s), 1e3 * np.sin(s))
+    found = ModelValidation("coach", ("run",), (one,), (overlay,), "")
+    figure = plots.scatter(found)
+    title = figure.axes[0].get_title(loc="left").replace("\n", " ")
+    assert title == "guiding force, quasi-static: pass"
+    assert figure.get_suptitle().startswith("coach against run\n")
+    axes = plots.spectra(found).axes[0]
+    assert axes.get_ylabel() == "PSD ((kN)²/Hz)"
+    # a sine of 1 kN of 1/(2 pi) samples: its mean square is 0.5 kN²
+    f, power = axes.lines[0].get_data()
+    assert np.trapezoid(power, f) == pytest.approx(0.5, rel=0.02)
 
 
 def test_mean_and_deviation_decide_each_and_eleven_sections_do_not():
