@@ -144,12 +144,13 @@ def _by_runs(
     ended = [status_words(name, r) for name, r in runs.items() if r.status != "complete"]
     remarks += [f"{words}; only the part before that is assessed" for words in ended]
     about = vehicle, standard, tuple(runs)
+    driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
     if standard == "wear":
         wear = {name: wear_report(record, law) for name, record in records.items()}
         if (model := next(iter(wear.values()))[0].model) != WholeLifeRailModel():
             counted = f"threshold {model.threshold:g} N, counted: {model.counted}"
             remarks.append(f"Whole Life Rail Model of {law}: {counted}")
-        return Assessment(*about, wear=wear, remarks=tuple(remarks))
+        return Assessment(*about, wear=wear, remarks=tuple(remarks), driven=driven)
     if standard == "safety":
         safety = {name: safety_report(record) for name, record in records.items()}
         return Assessment(*about, safety=safety, remarks=tuple(remarks))
@@ -162,7 +163,6 @@ def _by_runs(
     if not classes.mean_comfort.checked:
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
     said_once = tuple(dict.fromkeys(remarks))
-    driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
     return Assessment(*about, comfort=comfort, remarks=said_once, limits=classes, driven=driven)
 
 

@@ -252,14 +252,18 @@ def _comfort_axes(
     assessments: Sequence[Assessment], width: float, height: float, over: str
 ) -> tuple[Picture, Axes, Axes]:
     """Axes of mean comfort and of Sperling's index under the names of vehicles and tracks."""
-    names = [a.vehicle for a in assessments]
-    names += [track for a in assessments for _, track, _ in a.driven.values()]
-    shown = [*dict.fromkeys(names)][:4]
-    figure = Picture(width, height, "\n".join(map(unformatted, shown)))
+    figure = Picture(width, height, _names(assessments))
     mean, index = figure.subplots(1, 2)
     mean.set(xlabel=over, ylabel="$N_{MV}$", title="Mean comfort, EN 12299")
     index.set(xlabel=over, ylabel="$W_z$", title="Sperling")
     return figure, mean, index
+
+
+def _names(assessments: Sequence[Assessment]) -> str:
+    """Vehicles and tracks, four of them at most, for the title."""
+    names = [a.vehicle for a in assessments]
+    names += [track for a in assessments for _, track, _ in a.driven.values()]
+    return "\n".join(map(unformatted, [*dict.fromkeys(names)][:4]))
 
 
 Runs = Sequence[tuple[float, Sequence[PointComfort]]]
@@ -316,7 +320,7 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
 def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean wear number and rail damage of every wheel; damage over wear number, shakedown map."""
     runs = [(run, wheels) for a in assessments for run, wheels in a.wear.items()]
-    figure = Picture(7.6, 7.0)
+    figure = Picture(7.6, 7.0, _names(assessments))
     (energy, damage), (life, map_) = figure.subplots(2, 2)
     damage.sharey(energy)
     width = 0.8 / len(runs)
@@ -325,7 +329,8 @@ def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
         colour = distinct(k)
         energy.barh(rows, [w.T_gamma for w in wheels], 0.9 * width, color=colour, label=run)
         damage.barh(rows, [1e6 * w.rail_damage for w in wheels], 0.9 * width, color=colour)
-    energy.set_yticks(range(len(runs[0][1])), [wheel.place for wheel in runs[0][1]])
+    most = max((wheels for _, wheels in runs), key=len)  # vehicles may have more or fewer
+    energy.set_yticks(range(len(most)), [wheel.place for wheel in most])
     energy.invert_yaxis()
     damage.tick_params(labelleft=False)
     _life_model(life, runs)
@@ -368,6 +373,6 @@ def _shakedown_map(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) 
             axes.plot(*zip(*found, strict=True), "o", color=distinct(k), ms=4)
             known = True
     if not known:
-        axes.set_title("needs outputs.contact_patches", fontsize=9)
+        axes.set_title("values need outputs.contact_patches", fontsize=9)
     axes.set(xlabel="utilised friction $T/N$", ylabel="$p_0/k$", xlim=(0.0, None), ylim=(0.0, None))
     axes.legend(loc="best")
