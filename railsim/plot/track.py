@@ -19,6 +19,7 @@ from railsim.definitions.track import layout
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.section import Section
 from railsim.laws.permission import refused
+from railsim.plot import style
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, key, note, shade, spans, styled
 from railsim.text import unformatted
 from railsim.track.alignment import Alignment
@@ -52,11 +53,12 @@ def track_figure(track: Track, title: str = "") -> Figure:
     sections = layout.curvature_sections(track)
     remarks = _marked(track)
     height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
-    figure = Picture(8.0, height)
+    constants = style.broken(_constants(track), 7.6)
+    room = "\n " * len(constants.splitlines())
+    figure = Picture(8.0, height, f"{unformatted(title or track.name)}{room}")
     axes = figure.subplots(1 + len(rows), 1, height_ratios=[1.9] + [1.0] * len(rows))
-    name = unformatted(title or track.name)
-    figure.suptitle(f"{name}\n ", x=0.012, ha="left")
-    figure.text(0.012, 1.0 - 0.30 / height, _constants(track), fontsize=8.5, va="top")
+    below = 0.11 + 0.19 * len(figure.get_suptitle().strip().splitlines())
+    figure.text(0.012, 1.0 - below / height, constants, fontsize=8.5, va="top")
     _plan(axes[0], alignment, sections, s)
     shown = spans(sections, s, s)
     for k, row in enumerate(rows):
@@ -144,7 +146,7 @@ def _table_rows(track: Track, s: Floats) -> list[_Row]:
 
 def _constants(track: Track) -> str:
     """Return a line of what is the same along the track."""
-    rail = " / ".join(dict.fromkeys(unformatted(Path(name).name) for name in track.rail))
+    rail = " / ".join(dict.fromkeys(Path(name).name for name in track.rail))
     tilt = f"1:{1.0 / track.inclination:.3g}" if track.inclination else "upright"
     words = [f"gauge {1e3 * track.gauge:g} mm", f"rail {rail} {tilt}"]
     if track.friction_table is None:
@@ -152,6 +154,10 @@ def _constants(track: Track) -> str:
     words.append(f"support {track.support.preset}")
     if track.speed is not None:
         words.append(f"permitted {3.6 * track.speed:.0f} km/h")
+    parts = [(f"{r.rail} check rail", r.rows[0][0], r.rows[-1][0]) for r in track.check_rail]
+    parts += [(f"sections of the {r.rail} rail", r.begin, r.end) for r in track.sections]
+    for name, begin, end in parts:
+        words.append(f"{name} {max(begin, 0.0):g} to {min(end, track.length):g} m")
     return ", ".join(words)
 
 

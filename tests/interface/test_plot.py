@@ -465,6 +465,20 @@ def test_track_figure_shows_curvature_and_cant_as_they_act():
     assert plan.yaxis_inverted()
 
 
+def test_drawn_track_names_its_check_rails_and_a_long_name_is_within_the_picture():
+    """Of a crossing nothing was told; a long name was cut off at the edge."""
+    track = load_track("depot_r150_check_rail")
+    figure = track_figure(track.replace(name="Line of the northern division, " * 5))
+    figure.draw_without_rendering()
+    (words,) = (text for text in figure.texts if text.get_text().startswith("gauge"))
+    begin, *_, end = (row[0] for row in track.check_rail[0].rows)
+    assert f"right check rail {begin:g} to {end:g} m" in words.get_text().replace("\n", " ")
+    title = figure._suptitle.get_window_extent()
+    assert title.x1 < figure.bbox.x1
+    assert words.get_window_extent().y0 > max(axes.bbox.y1 for axes in figure.axes)
+    assert len(figure.get_suptitle().strip().splitlines()) == 2
+
+
 def test_overlay_has_a_colour_for_every_result(result):
     other = example_result(gain=0.5)
     axes = overlay({"one": result, "other": other}, ["Y:1:left"]).axes[0]
