@@ -177,7 +177,7 @@ def unit_label(quantity: Quantity) -> str:
     if quantity.name not in {*QUANTITIES, *REQUESTED}:  # from a file of others, perhaps
         return unformatted(f"{quantity.symbol} ({quantity.shown_unit})")
     symbol = f"${quantity.symbol}$ " if quantity.symbol else ""
-    unit = quantity.shown_unit.replace("s2", "s²")
+    unit = quantity.shown_unit.replace("s2", "s²").replace("1e-3", "10⁻³")
     return f"{symbol}({unit})" if unit != "-" else symbol.strip()
 
 

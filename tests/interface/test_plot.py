@@ -70,6 +70,10 @@ def test_figures_of_the_study_are_the_default(result):
     assert all(unit in label for unit, label in zip(units, labels, strict=True))
 
 
+def test_creepages_are_in_thousandths_as_print_has_them(result):
+    assert histories(result, ["xi_x"]).axes[0].get_ylabel().endswith("(10⁻³)")
+
+
 def test_title_says_how_a_run_ended_early():
     for status, words in (("complete", "(72 km/h)"), ("derailed", "(72 km/h) · derailed")):
         assert histories(example_result(status=status)).get_suptitle().endswith(words)
