@@ -39,7 +39,10 @@
     };
   }
   function place(plot, box, height) {
-    function fit() { plot.setSize({ width: Math.max(200, box.clientWidth), height: height }); }
+    function fit() { /* what is printed is as wide as A4, its grid has two columns */
+      var most = !root.classList.contains("printing") ? 1e4 : box.closest(".grid") ? 330 : 680;
+      plot.setSize({ width: Math.max(200, Math.min(most, box.clientWidth)), height: height });
+    }
     drawn.push({ plot: plot, fit: fit });
     /* in the next frame: a change of size within the observer is one it complains of */
     if (window.ResizeObserver) { new ResizeObserver(function () { requestAnimationFrame(fit); }).observe(box); }
