@@ -236,7 +236,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         tuple(export_vehicles(evaluation, chosen)) if chosen else (),
         evaluation.computed,
     )
-    _write(found)
+    _write(found, evaluation.definition.name)
     return found
 
 
@@ -270,8 +270,8 @@ def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _write(found: Optimisation) -> None:
-    from railsim.plot.study import front_figure, sensitivity_figure
+def _write(found: Optimisation, name: str) -> None:
+    from railsim.plot.study import front_figure, say_above, sensitivity_figure
     from railsim.plot.style import save
 
     text = json.dumps(plain(found.record()), indent=1, allow_nan=False)
@@ -286,10 +286,12 @@ def _write(found: Optimisation) -> None:
     front = [design.number - 1 for design in found.front]
     chosen = None if found.chosen is None else found.chosen.number - 1
     figure = front_figure(values, labels, feasible, front, chosen)
+    say_above(figure, f"{name}: {len(found.designs)} designs")
     save(figure, found.folder / "front.png", overwrite=True)
     if found.sensitivities and found.chosen is not None:
         names = list(values_by_name(found.definition, found.designs))
         figure = sensitivity_figure([one.record() for one in found.sensitivities], names)
+        say_above(figure, f"{name}: about design {found.chosen.number}")
         save(figure, found.folder / "sensitivities.png", overwrite=True)
 
 
