@@ -18,7 +18,6 @@ from railsim.errors import argument_error, input_error
 
 YIELD_IN_SHEAR = 300e6  # yield stress in shear k of rail steel, default value [Pa]
 
-
 DENSITY = 7850.0  # density of wheel and rail steel [kg/m3]
 
 

@@ -25,7 +25,6 @@ WELL_SPREAD = 0.1
 """Range of the cant deficiency, as a share of the admissible one, from which the two-dimensional
 method is used."""
 
-
 METHODS = {"one": "one-dimensional", "two": "two-dimensional", "largest": "largest value",
            "smallest": "smallest value"}  # fmt: skip
 

@@ -29,7 +29,6 @@ from railsim.table import Column, Table
 ArcLength = TypeVar("ArcLength", float, Any)
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
-
 SOFTER = "the factor of the slip area is at most that of the adhesion area"
 Widening = Annotated[base.Finite, Field(ge=-0.05, le=0.1)]
 
