@@ -29,7 +29,7 @@ Group = dict[str, "Result"]
 @cli.choice("--over", "Horizontal axis of the picture.", "distance|time")
 @cli.output_options("Folder for compare.csv, .json, .png, differences.png; a set for each group.")
 def command(files: tuple[str, ...], over: str, output: cli.Output) -> None:
-    """Print peaks and mid-curve values of results side by side.
+    """Print peaks and medians over full curves of results side by side.
 
     The others are compared with the first result; differences are those of magnitudes, and those
     along the track where the plan is the same.  What differs in speed, track and settings stands

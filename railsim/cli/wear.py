@@ -33,10 +33,10 @@ def mix_option(name: str, what: str, amount: str) -> Decorator:
     return cli.repeated(name, text, f"{what.upper()} V SHARE", form, required=True)
 
 
-def amount_options(name: str, text: str, unit: str, profile: str) -> Decorator:
+def amount_options(name: str, text: str, unit: str) -> Decorator:
     """Options of the distance or tonnage to run, and of that of one step."""
     amount = name.split()[0].strip("-").capitalize()
-    between = f"{amount} in {unit} between two updates of {profile}."
+    between = f"{amount} in {unit} between two profiles written; each 0.1 mm updates them, too."
     return cli.together(
         cli.option(name, text, unit.upper(), float, required=True),
         cli.option("--step", between, unit.upper(), float, required=True),
@@ -51,7 +51,7 @@ law_option = cli.option(
 @click.command()
 @cli.vehicle_argument
 @mix_option("--route routes", "track", "distance")
-@amount_options("--distance", "Distance to run in km.", "km", "the wheel profile")
+@amount_options("--distance", "Distance to run in km.", "km")
 @law_option
 @cli.option("--limits", "Limits of flange and tread at which the loop ends.", "F", default="wheel")
 @cli.given_options("creep law and contact")
@@ -91,7 +91,7 @@ def command(routes: Mix, limits: str, given: cli.Given, **how: Any) -> None:
 @click.command()
 @cli.track_argument
 @mix_option("--traffic", "vehicle", "tonnage")
-@amount_options("--tonnage distance", "Traffic in Mt.", "Mt", "the rail profiles")
+@amount_options("--tonnage distance", "Traffic in Mt.", "Mt")
 @law_option
 @cli.given_options("creep law and contact", load=False)
 @cli.output_options("Folder for wear.json, wear.png and the profiles.")
