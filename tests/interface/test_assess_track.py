@@ -247,6 +247,34 @@ def test_places_on_the_floor_are_those_of_their_points(judged):
     assert ahead == {"floor_front": [9.5], "floor_rear": [-9.5]}
 
 
+class _Shaken:
+    """A run whose wheel loads swing by 10 kN at 10 or 40 Hz."""
+
+    def __init__(self, run, frequency):
+        self.run = run
+        self.swing = 10e3 * np.sin(2.0 * np.pi * frequency * np.array(run["time"]))
+
+    def __getitem__(self, name):
+        values = np.array(self.run[name], dtype=float)
+        return values + self.swing[:, None, None] if name == "Q" else values
+
+    def series(self, *names, **labels):
+        return self.run.series(*names, **labels)
+
+
+@pytest.mark.parametrize(("frequency", "gain"), [(10.0, 0.998), (40.0, 0.0624)])
+def test_forces_are_those_behind_the_low_pass_of_20_Hz(pieces, judged, frequency, gain):
+    """Butterworth of order 4: 1/sqrt(1 + (f/20 Hz)^8)."""
+    case = pieces[0][0].case
+    run = railsim.open_result(judged[2] / case.file_name)
+    shaken = _Shaken(run, frequency)
+    before, after = (
+        next(one[3] for one in module._signals(case, r) if one[0] == "Q") for r in (run, shaken)
+    )
+    middle = slice(100, -100)
+    np.testing.assert_allclose((after - before)[middle], gain * shaken.swing[middle], atol=20.0)
+
+
 class _Lifting:
     """A run whose third wheelset's left wheel is without load over some outputs."""
 
