@@ -198,17 +198,20 @@ class Run:
         except Exception as error:
             self.error = error
 
+    def kept(self) -> list[NDArray[Any]]:
+        """All arrays that the run goes on from: its state first."""
+        return [self.state, *(getattr(self.work, name) for name in COUNTED), self.extremes]
+
     def saved(self) -> SavedState:
         """All that the run goes on from, a copy."""
-        counted = tuple(getattr(self.work, name).copy() for name in COUNTED)
+        motion, *counted = (one.copy() for one in self.kept())
         grid = self.fresh, self.evaluates, float(self.derivative[SPEED])
-        return SavedState(self.state.copy(), counted, grid)
+        return SavedState(motion, tuple(counted), grid)
 
     def restore(self, saved: SavedState) -> None:
         """Go back to a state."""
-        self.state[:] = saved.motion
-        for name, values in zip(COUNTED, saved.counted, strict=True):
-            getattr(self.work, name)[...] = values
+        for here, values in zip(self.kept(), (saved.motion, *saved.counted), strict=True):
+            here[...] = values
         self.fresh, self.evaluates, self.derivative[SPEED] = saved.grid[-3:]
         self._prepared = None
 

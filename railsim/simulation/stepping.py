@@ -148,8 +148,8 @@ class Simulation:
     @property
     def running(self) -> bool:
         """Whether the run goes on."""
-        run = self._run
-        return run.status == RUNNING and not run.ended and run.left() > ROUND_OFF
+        run, open_ = self._run, self._closed is None
+        return open_ and run.status == RUNNING and not run.ended and run.left() > ROUND_OFF
 
     @property
     def status(self) -> str:
@@ -202,6 +202,10 @@ class Simulation:
             if self._run.ended:
                 break
             left -= self._part(left, whole)
+        if self._missing > 0.0 and not self.running and self._run.status == RUNNING:
+            self._taken_back()  # the run ends within a step, which it takes as a whole
+            whole = self._next()
+            self._part(self._missing or whole, whole)
         self._behind = left if self.running else 0.0
         self._raise_error()
         return self.running
@@ -222,6 +226,8 @@ class Simulation:
             self._to_the_end()
         elif until is None:
             return self.step(duration)
+        elif math.isnan(until):
+            raise argument_error("until", "found nan m", "a number")
         else:
             while self.running and until - self.distance > ROUND_OFF * self.speed:
                 self.step(min(self._ahead(), (until - self.distance) / self.speed))
@@ -373,8 +379,13 @@ class Simulation:
         if self._run.system.support.elastic:
             raise argument_error("set_rails", "a track with a support", "rigid rails")
         motion = self._run.work.rail_motion
+        given = {"displacement": np.asarray(displacement), "velocity": np.asarray(velocity)}
+        for name, values in given.items():
+            if values.shape not in ((), motion[..., :2].shape) or not np.isfinite(values).all():
+                found = f"{values.shape} values, or not finite ones"
+                raise argument_error(name, found, f"{motion[..., :2].shape} finite numbers")
         before = motion.copy()
-        motion[..., :2], motion[..., 2:] = displacement, velocity
+        motion[..., :2], motion[..., 2:] = given.values()
         if not np.array_equal(motion, before):
             self._seen = self._begun = None
 
@@ -440,10 +451,12 @@ class Simulation:
     @state.setter
     def state(self, saved: SavedState) -> None:
         run = self._run
-        if saved.motion.shape != run.state.shape:
-            found = f"a state of {saved.motion.size} values"
-            allowed = f"{run.state.size} values, those of this vehicle and track"
-            raise argument_error("state", found, allowed)
+        given, here = (
+            [one.size for one in each] for each in ((saved.motion, *saved.counted), run.kept())
+        )
+        if given != here:
+            found = f"a state of {given} values"
+            raise argument_error("state", found, f"{here}, those of this vehicle and track")
         recorded = run.recorder.state[: self._rows, TIME]
         if self._records and saved.motion[TIME] < self._written + SHORTEST:
             found = "an instant before what is recorded already"
@@ -461,9 +474,10 @@ class Simulation:
         if self._closed is None:
             run = self._run
             due = self._phase == 0 and self._missing == 0.0 and run.status == RUNNING
-            if due and self._records:
+            if due:
                 self._flush()
-                run.status, run.where, self._rows = run.last_record()
+                run.status, run.where, rows = run.last_record()
+                self._rows = rows * self._records
             self._flush()
             self._raise_error()
             run.take_last_extremes()

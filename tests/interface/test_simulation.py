@@ -93,6 +93,23 @@ def test_changing_speed_has_the_same_bits(coach, track, drive, spacing):
     assert equal(whole, stepped) == []
 
 
+@pytest.mark.parametrize("dt", [0.1048, 0.0349])
+@pytest.mark.parametrize("end", [{"until": 1.57}, {"duration": 0.1047}])
+@pytest.mark.parametrize("record", [True, False])
+def test_the_bits_of_simulate_where_the_run_ends_within_a_step(coach, track, dt, end, record):
+    """The end lies ahead of an output, at 0.105 s: that and the peaks hold the whole last step."""
+    way = {"speed": 15.0, "settings": DISTURBED, **end}
+    whole = railsim.simulate(coach, track, **way)
+    with railsim.Simulation(coach, track, record=record, **way) as sim:
+        while sim.step(dt):
+            pass
+        stepped = sim.result()
+    assert whole["time"][-1] == pytest.approx(0.105)
+    assert not record or equal(whole, stepped) == []
+    peaks, others = whole.groups["peaks"], stepped.groups["peaks"]
+    assert [n for n in peaks if not np.array_equal(peaks[n], others[n], equal_nan=True)] == []
+
+
 def test_what_is_read_is_what_is_recorded(coach, track):
     with railsim.Simulation(coach, track, speed=20.0, settings=DISTURBED) as sim:
         sim.step(0.5)
@@ -126,6 +143,31 @@ def test_a_state_restored_has_the_same_bits(coach, track):
     other.state = saved
     sim = other
     assert np.array_equal(onwards().motion, first.motion)
+
+
+def test_peaks_of_what_was_given_up_are_not_those_of_the_run(coach, track):
+    """Before the evaluation begins at 0.1 s, and after: a strong push, taken back."""
+    vehicle, way = commanded(coach, lag=0.0), {"speed": 20.0, "duration": 1.0, "record": False}
+    plain, other = (railsim.Simulation(vehicle, track, **way) for _ in range(2))
+    plain.step(0.05)
+    other.step(0.05)
+    saved = other.state
+    other.set("push", 50e3)
+    other.step(0.2)
+    other.state = saved
+    assert plain.result().groups["peaks"]["Q"] == pytest.approx(other.result().groups["peaks"]["Q"])
+
+
+def test_a_state_of_another_vehicle_changes_nothing(coach, track):
+    """Vehicles of as many coordinates: commands on their way belong to the state as well."""
+    way = {"speed": 20.0, "record": False}
+    late = railsim.Simulation(commanded(coach, delay=0.03), track, **way)
+    sim = railsim.Simulation(commanded(coach), track, **way)
+    late.step(0.01)
+    before = sim.state.motion
+    with pytest.raises(InputError, match="those of this vehicle and track"):
+        sim.state = late.state
+    assert np.array_equal(sim.state.motion, before)
 
 
 def test_a_longer_run_goes_on_from_the_end_of_a_shorter_one(coach, track):
@@ -213,9 +255,34 @@ def test_faults_are_one_line_each(coach, track):
     sim.run()
     with pytest.raises(InputError, match=r"the run has ended at 0\.1"):
         sim.step()
+    for record in (True, False):
+        sim = railsim.Simulation(vehicle, track, speed=20.0, duration=0.1, record=record)
+        with pytest.raises(InputError, match="until: found nan"):
+            sim.run(until=float("nan"))
+        sim.step(0.0107)
+        assert sim.result().status == "complete"
+        with pytest.raises(InputError, match="its result has been taken"):
+            sim.step(0.01)
     passive = railsim.Simulation(coach, track, speed=20.0, duration=0.1)
     with pytest.raises(InputError, match="the vehicle has none"):
         passive.set("push", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("displacement", "velocity", "words"),
+    [
+        (1e-3, np.zeros((3, 2, 2)), r"velocity: \(3, 2, 2\) values"),
+        (np.full((4, 2, 2), np.nan), 0.0, "displacement: .* not finite"),
+    ],
+)
+def test_rails_that_are_not_wheels_or_numbers_do_not_move(
+    coach, track, displacement, velocity, words
+):
+    rigid = track.replace(support={"preset": "rigid"})
+    sim = railsim.Simulation(coach, rigid, speed=20.0, duration=0.1, record=False)
+    with pytest.raises(InputError, match=words):
+        sim.set_rails(displacement, velocity)
+    assert not np.any(sim.state.counted[-2])
 
 
 def test_a_file_is_there_when_whole(coach, track, tmp_path):
