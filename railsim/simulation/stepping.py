@@ -266,11 +266,17 @@ class Simulation:
         run = self._run
         if self._phase == 0 and self._missing == 0.0:
             self._begin_interval()
-        if run.spacing is None or self._phase < self._every - 1 or run.ended:
+        ahead = self._every - self._phase
+        if run.spacing is None or ahead & (ahead - 1) or self._missing > 0.0 or run.ended:
             return self._length
-        # the last step of an interval of distance ends where the interval ends
+        # the last step of an interval of distance ends where the interval ends; where 2, 4, 8, ...
+        # steps are left as well, their number follows from how the speed has changed by then
         s, v = run.state[ARC_LENGTH], run.state[SPEED]
-        return time_for(self._goal - s, v, run.derivative[SPEED])
+        left = max(time_for(self._goal - s, v, run.derivative[SPEED]), SHARE * self._length)
+        if abs(left / self._length - ahead) > 0.5:
+            ahead = math.ceil(left / self._length)
+            self._every, self._length = self._phase + ahead, left / ahead
+        return left if ahead == 1 else self._length
 
     def _part(self, most: float, whole: float) -> float:
         """Take whole steps, or a part of one, within a time `most` [s]; the time taken."""
@@ -288,9 +294,10 @@ class Simulation:
             self._missing = whole - most
             return most
         steps = min(steps, STEPS, max(1, math.ceil(run.left() / whole * (1.0 - 1e-9))))
-        if run.varies:  # the last step of an interval of distance has its own length
-            one = int(run.spacing is not None and self._phase < every - 1)
-            steps = min(steps, every - self._phase - one)
+        if run.varies:  # of an interval of distance as far as to where `_next` looks
+            ahead = every - self._phase
+            half = 0 if run.spacing is None else (1 << (ahead - 1).bit_length()) >> 1
+            steps = min(steps, ahead - half)
         elif self._records:
             steps = min(steps, (ROWS - self._rows) * every - self._phase)
         if not run.evaluates:

@@ -9,7 +9,7 @@ from selection import points
 import railsim
 from railsim.errors import Fault, InputError
 from railsim.result import open_result
-from railsim.simulation import preparation, run_in, simulate
+from railsim.simulation import Simulation, preparation, run_in, simulate
 
 RAMP = ((0.0, 10.0), (50.0, 10.0), (150.0, 30.0), (200.0, 30.0))
 
@@ -298,3 +298,28 @@ def test_outputs_in_equal_steps_of_distance(bogie, straight, settings, scheme):
     assert result.status == "complete"
     inner = np.diff(result.distance)[:-1]
     assert np.max(np.abs(inner - 0.25)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("drive", "speed", "spacing", "reason"),
+    [
+        ({"mode": "table", "speed_table": [[0.0, 0.5], [10.0, 5.0]]}, None, 2.5, "its end"),
+        ({"mode": "free", "resistance": (60e3, 0.0, 0.0)}, 5.0, 0.5, "standstill"),
+    ],
+)
+def test_outputs_in_equal_steps_of_distance_from_low_speed_and_to_a_standstill(
+    bogie, straight, drive, speed, spacing, reason
+):
+    """The speed doubles, or is gone, within an interval; taken in parts, the run has its bits."""
+    settings = Settings(output_spacing=spacing, drive=drive)
+    way = {"speed": speed, "until": 10.0, "settings": settings}
+    result = simulate(bogie, straight, **way)
+    assert reason in result.attributes["status_reason"]
+    assert np.all(np.diff(result["time"]) > 0.0)
+    inner = result["distance"] / spacing
+    assert np.max(np.abs(inner - np.round(inner))[:-1]) < 1e-5
+    with Simulation(bogie, straight, **way) as sim:
+        while sim.step(0.0331):
+            pass
+        stepped = sim.result()
+    assert np.array_equal(stepped["Q"], result["Q"])
