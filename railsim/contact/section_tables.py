@@ -182,7 +182,7 @@ def _kept_zones(
     zones: dict[int, set[int]] = {}
     masks = []
     for along in rows:
-        near = np.array([mask for _, _, mask in along]).reshape(-1, 3)
+        near = np.array([mask for _, _, mask in along], dtype=bool).reshape(-1, 3)
         for _ in range(2):
             around = np.pad(near, ((1, 1), (0, 0)))
             near = near | around[:-2] | around[2:]

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from railsim.contact.curves import HALF_WIDTHS, wheel_curve
 from railsim.contact.rail_sections import kinematic_height, rail_parts, rolled_curve
-from railsim.contact.section_tables import Range, section_table
+from railsim.contact.section_tables import Range, _kept_zones, section_table
 from railsim.contact.table import _wheel_arrays, ellipse_functions, strip_influence
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.section_files import SectionList, read_sections
@@ -174,6 +174,14 @@ def test_every_table_along_a_rising_rail_lies_higher_by_its_way():
     assert height[1] - height[own][0] == pytest.approx(2e-3 * along[own][0], abs=2e-6)
 
 
+def test_a_rail_that_stands_beside_the_range_alone_has_no_tables():
+    """Such as the nose of a crossing whose range ends ahead of it."""
+    all_zones = np.ones(3, dtype=bool)
+    kept, described = _kept_zones([[(0.0, 0, all_zones), (0.1, 1, all_zones)], []], 0.0)
+    assert kept == [(0, [0, 1, 2]), (1, [0, 1, 2])]
+    assert described == [[[0.0, 0, 1, 2], [0.1, 3, 4, 5]], []]
+
+
 @pytest.mark.parametrize("beyond", [0.0, 0.02, 0.04, 0.058])
 @pytest.mark.parametrize("end", [-1.0, 1.0])
 def test_a_wheel_beyond_the_end_of_a_rail_stands_on_its_edge(beyond, end):
@@ -219,3 +227,15 @@ def test_wrong_sections_are_refused(changed, said):
     part = track.sections[0].model_dump(exclude_none=True)
     with pytest.raises(InputError, match=said):
         track.replace(sections=[{**part, **changed}])
+
+
+@pytest.mark.parametrize(
+    ("rail", "begin", "faults"), [("right", 50.2, 1), ("right", 50.5, 0), ("left", 50.2, 0)]
+)
+def test_ranges_of_a_rail_that_overlap_are_refused(rail, begin, faults):
+    """Where two say what a rail is, none does."""
+    track = load_track("crossing_56e1_r245_1in9.25")
+    part = track.sections[0].model_dump(exclude_none=True) | {"begin": 49.6, "end": 50.5}
+    track = track.replace(sections=[part, {**part, "rail": rail, "begin": begin, "end": 51.0}])
+    found = [f"{fault.key}: {fault.found}" for fault in track.contradictions()]
+    assert found == ["sections.1: 50.2 to 51 m, within the range of sections.0"] * faults

@@ -83,6 +83,11 @@ def track_faults(track: "Track") -> list[Fault]:
         for before, behind in _steps(cant):
             found = f"the cant steps from {before.end_value:g} to {behind.start_value:g} m"
             faults.append(Fault("", behind.key, found, "a ramp (LIR) between the two elements"))
+    for k, part in enumerate(track.sections):
+        for i, one in enumerate(track.sections[:k]):
+            if part.rail == one.rail and part.begin < one.end and one.begin < part.end:
+                found = f"{part.begin:g} to {part.end:g} m, within the range of sections.{i}"
+                faults.append(Fault("", f"sections.{k}", found, "ranges of a rail side by side"))
     return faults
 
 
