@@ -81,7 +81,7 @@ def fmu(
         facts["inputs"] = _commands(vehicle, actuators, inputs)
         facts["outputs"] = _variables(vehicle, result, signals, outputs)
         variables = Path(folder) / VARIABLES
-        variables.write_text(json.dumps(facts, indent=1), encoding="utf-8")
+        variables.write_text(json.dumps(facts, indent=1, default=float), encoding="utf-8")
         script.write_text(WRAPPER.format(name=name, version=__version__), encoding="utf-8")
         files = {"dest": Path(folder) / "made", "project_files": [stored, variables]}
         made = wrapper.FmuBuilder.build_FMU(script, **files, **dict.fromkeys(CAPABILITIES, True))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from railsim.errors import InputError
 from railsim.result import open_run
 from railsim.simulation import Simulation
 from railsim.simulation.advance import SavedState
@@ -123,7 +124,11 @@ class Unit:
         if not run.running:
             self.log(f"the run has ended before: {self._status}", status.error)
             return outcome(status.error)
-        self._command()
+        try:
+            self._command()
+        except InputError as fault:  # the run goes on from here with commands that are right
+            self.log(str(fault), status.error)
+            return outcome(status.error)
         goes_on = run.step(step_size)
         self._look()
         if not goes_on:

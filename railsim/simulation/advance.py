@@ -112,7 +112,7 @@ class Run:
         self.derivative = np.zeros_like(self.state)
         self.stages = np.zeros((3, len(self.state)))
         self.fresh = prepared.fresh  # whether nothing was before the state
-        self.evaluates = self.state[TIME] >= prepared.evaluation - ROUND_OFF
+        self.evaluates = bool(self.state[TIME] >= prepared.evaluation - ROUND_OFF)
         self.varies = prepared.steps.varies
         # equal steps of distance while the speed changes: the last step of an interval ends there
         self.spacing = settings.output_spacing if self.varies else None

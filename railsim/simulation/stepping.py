@@ -362,7 +362,7 @@ class Simulation:
             allowed = nearest(actuator, names) if names else "the vehicle has none"
             raise argument_error("actuator", found, allowed)
         if not math.isfinite(value):
-            raise argument_error("value", f"found {value}", "a finite number")
+            raise argument_error("value", f"found {value} for '{actuator}'", "a finite number")
         run, number = self._run, names.index(actuator)
         memory = run.work.memory
         if value == memory[run.system.actuators.which[number, COMMAND]]:

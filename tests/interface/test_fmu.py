@@ -164,6 +164,31 @@ def test_steps_of_communication_may_be_a_little_longer_than_those_of_the_run(uni
     assert called.do_step(3.0 + 20 * step, step).status.name == "ok"
 
 
+def test_a_wrong_command_is_an_error_after_which_the_run_goes_on(unit, tmp_path):
+    """Not a fatal one, which would end all units of the program."""
+    called = unpacked(unit, tmp_path)
+    called.exit_initialization_mode()
+    called._commands["push"] = np.nan
+    assert called.do_step(0.0, 0.02).status.name == "error"
+    assert "push" in called.logged[-1][0]
+    called._commands["push"] = 1e3
+    assert called.do_step(0.0, 0.02).status.name == "ok"
+    assert called._time == pytest.approx(0.02)
+
+
+def test_a_state_can_be_written_from_the_begin_on(unit, tmp_path):
+    """Ahead of the part of the run that is evaluated, and within a step: to the last bit."""
+    called = unpacked(unit, tmp_path)
+    called.exit_initialization_mode()
+    called.do_step(0.0, 0.0013)
+    saved = json.loads(json.dumps(called._get_fmu_state()))
+    called.do_step(0.0013, 0.02)
+    first = dict(called._values)
+    called._set_fmu_state(saved)
+    called.do_step(0.0013, 0.02)
+    assert called._values == first
+
+
 def test_a_step_beyond_the_end_ends_with_the_run_at_the_time_of_the_program(unit, tmp_path):
     """30 m at 20 m/s, from 3 s on; what the program asks for later is an error."""
     called = unpacked(unit, tmp_path)
@@ -195,6 +220,12 @@ def test_the_unit_holds_no_path_and_says_what_it_needs(unit):
     assert re.search('<Float64 name="push"[^>]* unit="N"/>', description)
     assert validate_fmu(str(unit)) == []
     assert not any(str(unit.parent).encode() in content for content in contents)
+
+
+def test_the_end_of_a_unit_may_be_any_number(active, track, tmp_path):
+    way = {**WAY, "until": np.int64(330)}
+    found = fmu(active, track, tmp_path / "coach.fmu", outputs=["Q:1"], **way)
+    assert json.loads(zipfile.ZipFile(found).read("resources/variables.json"))["until"] == 330.0
 
 
 def test_quantities_of_ones_own_are_outputs_whatever_their_unit(active, track, tmp_path):
