@@ -301,6 +301,8 @@ def test_a_controller_faster_than_the_step_of_the_settings(coach, track):
         railsim.simulate(vehicle, track, **WAY | {"settings": settings})
     free = railsim.Simulation(vehicle, track, **WAY)
     assert free.step_length == pytest.approx(0.001)
+    with pytest.raises(InputError, match=r"controllers.sky.period: 1e-09; must be greater"):
+        vehicle.with_values({"controllers.sky.period": 1e-9})  # its run would not end
 
 
 def shen_hedrick_elkins(xi_x, xi_y, phi, a, b, mu_N, c11, c22, c23, c33, G):

@@ -7,7 +7,7 @@ told apart by it, and workers get it.  Nothing is executed here (see `railsim.la
 import ast
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -143,7 +143,7 @@ class Controller(base.Definition):
 
     law: base.Name
     """Name of the law in the table `laws`"""
-    period: base.Positive
+    period: Annotated[base.Finite, Field(ge=1e-6)]
     """Time between two calls [s]"""
     inputs: dict[base.Name, base.Name] = base.EMPTY_TABLE
     """Signals by the arguments of the function that take them"""
