@@ -193,11 +193,13 @@ class _Problem:
         self.known = b"", None
 
 
-def _between(judge: Judge, x: Floats, choice: dict[str, float]) -> tuple[float, list[float]]:
-    """Largest breach of a constraint at any position, and where constraints are broken."""
+def _between(
+    judge: Judge, x: Floats, choice: dict[str, float], known: float = 0.0
+) -> tuple[float, list[float]]:
+    """Largest breach of a constraint at any position, and where it is larger than a known one."""
     found = judge.least(x, choice)
-    breach = max((-margin for margin, _ in found.values()), default=0.0)
-    return breach, [share for margin, share in found.values() if margin < -0.1 * FEASIBLE]
+    breach, most = max((-m for m, _ in found.values()), default=0.0), known + 0.1 * FEASIBLE
+    return breach, [share for margin, share in found.values() if -margin > most]
 
 
 def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]) -> Start:
@@ -212,9 +214,10 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
     u, here = _rounds(problem, u, here, effort)
     violation = here.violation
     for left in reversed(range(effort.checks)):
-        breach, shares = _between(judge, judge.lower + u * problem.span, choice)
+        x, known = judge.lower + u * problem.span, here.violation * (here.violation > FEASIBLE)
+        breach, shares = _between(judge, x, choice, known)
         violation = max(here.violation, breach)
-        if not left or not shares or here.violation > FEASIBLE:
+        if not left or not shares:
             break
         problem.add(shares)
         judged = problem(u)

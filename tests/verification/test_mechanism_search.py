@@ -140,6 +140,22 @@ def test_a_search_over_the_whole_travel_may_change_how_far_the_output_goes(tmp_p
     assert best.parameters["r"] == pytest.approx(alike, rel=1e-5)  # was left at 0.4
 
 
+def test_a_compromise_is_the_least_broken_between_the_positions_too(tmp_path):
+    """The rod's angle at the pin is 90 deg less asin(d/r) at least, the force is largest last."""
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM.replace("starts = 1", "starts = 1\navailable_force = 1000.0"))
+
+    def breaches(d):
+        angle = (np.sin(np.radians(50.0)) ** 2 - 1.0 + (d / 0.3) ** 2) / np.sin(np.radians(100.0))
+        return angle, 100.0 / rod(2.4, d=d)[1] / 1000.0 - 1.0
+
+    alike = brentq(lambda d: np.subtract(*breaches(d)), 0.15, 0.25)
+    best = optimise(load_mechanism(path))
+    assert not best.feasible
+    assert best.parameters["d"] == pytest.approx(alike, rel=1e-6)  # held at 17 positions: 6e-6 more
+    assert best.starts[0].violation == pytest.approx(breaches(alike)[0], rel=1e-6)
+
+
 def test_a_search_may_begin_without_friction(tmp_path):
     """The number of constraints does not depend on it; was a traceback."""
     search = 'objective="constant_force",range="travel",points=21,starts=1,available_force=300'
