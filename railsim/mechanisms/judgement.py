@@ -31,9 +31,12 @@ from railsim.mechanisms.model import Model, build, with_lanes
 from railsim.mechanisms.outputs import length_points
 from railsim.mechanisms.targets import Positions, drivers_at_heights, positions
 
+FEASIBLE = 1e-7  # breach of a constraint, in its scale, that counts as none
 GRID = 17  # positions over the whole travel at which constraints are held
 DENSE = 201  # positions from which the least values between them are looked for
 RIVAL = 1e-6  # share of the peak by which positions with as large a force may differ
+IMPOSSIBLE = 10.0
+"""What a breach counts more where nothing moves: dead points, gas springs beyond their strokes."""
 SLOWEST = 0.05
 """Smallest rate of the actuator against its mean, and of the driver: away from dead points."""
 
@@ -49,6 +52,7 @@ class Judgement:
     margins: Floats  # in units of each constraint's scale; negative where broken, (constraint,)
     slopes: Floats  # (constraint, parameter)
     rivals: Floats | None = None  # gradients of all positions with such a peak, (rival, parameter)
+    firm: Any = False  # constraints without which nothing moves, (constraint,)
 
     @property
     def objective(self) -> float:
@@ -64,7 +68,17 @@ class Judgement:
     @property
     def violation(self) -> float:
         """Largest breach of a constraint in its own scale; 0 where all are kept."""
-        return float(max(0.0, -np.min(self.margins, initial=0.0)))
+        return float(max(0.0, np.max(breach(self.margins, self.firm), initial=0.0)))
+
+
+def firm(name: str) -> bool:
+    """Whether a mechanism that breaks a constraint cannot move at all."""
+    return name != "max_stroke" and name.endswith(("dead_point", "_stroke"))
+
+
+def breach(margin: Any, firm: Any) -> Any:
+    """Breach of a constraint in its own scale, `IMPOSSIBLE` more of a firm one."""
+    return -margin + IMPOSSIBLE * ((margin < -FEASIBLE) & firm)
 
 
 class Judge:
@@ -212,6 +226,7 @@ class Judge:
         return Judgement(
             np.real(residuals)[0], derivative(residuals).T, float(sizes[k]), rivals[k],
             np.real(margins)[0], derivative(margins).T, rivals[sizes >= (1.0 - RIVAL) * sizes[k]],
+            np.array([firm(name) for name, _ in self.labels], dtype=bool),
         )  # fmt: skip
 
     def _at_height(

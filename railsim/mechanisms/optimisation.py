@@ -21,9 +21,9 @@ from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import number
 from railsim.errors import Fault, InputError, argument_error, argument_fault
 from railsim.mechanisms.forces import unit_work
-from railsim.mechanisms.judgement import Judge, Judgement
+from railsim.mechanisms.judgement import FEASIBLE, Judge, Judgement, breach, firm
 from railsim.mechanisms.kinematics import solve
-from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of
+from railsim.mechanisms.optimum import Optimum, Start, best_of, optimum_of
 from railsim.processes import WorkerPool
 from railsim.units import duration_in_words
 
@@ -197,9 +197,10 @@ def _between(
     judge: Judge, x: Floats, choice: dict[str, float], known: float = 0.0
 ) -> tuple[float, list[float]]:
     """Largest breach of a constraint at any position, and where it is larger than a known one."""
-    found = judge.least(x, choice)
-    breach, most = max((-m for m, _ in found.values()), default=0.0), known + 0.1 * FEASIBLE
-    return breach, [share for margin, share in found.values() if -margin > most]
+    found = [(firm(name), *least) for name, least in judge.least(x, choice).items()]
+    most = max((float(breach(margin, fixed)) for fixed, margin, _ in found), default=0.0)
+    allowed = [0.1 * FEASIBLE + (not fixed) * known for fixed, _, _ in found]
+    return most, [s for (_, m, s), limit in zip(found, allowed, strict=True) if -m > limit]
 
 
 def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]) -> Start:
@@ -215,8 +216,8 @@ def _run(judge: Judge, effort: Effort, job: tuple[int, Floats, dict[str, float]]
     violation = here.violation
     for left in reversed(range(effort.checks)):
         x, known = judge.lower + u * problem.span, here.violation * (here.violation > FEASIBLE)
-        breach, shares = _between(judge, x, choice, known)
-        violation = max(here.violation, breach)
+        most, shares = _between(judge, x, choice, known)
+        violation = max(here.violation, most)
         if not left or not shares:
             break
         problem.add(shares)
@@ -296,18 +297,18 @@ def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats
 
 
 def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Floats, Judgement]:
-    """Parameters with the smallest breach t: least t with every margin above -t."""
-    m = len(u0)
+    """Parameters with the smallest breach t: least t with every margin above -t, firm ones 0."""
+    m, yields = len(u0), 1.0 - np.broadcast_to(here.firm, here.margins.shape)
 
     def margins(y: Floats) -> Floats:
         found = problem(y[:m])
         inner = -10.0 * np.ones_like(here.margins) if found is None else found.margins
-        moved: Floats = inner + y[m]
+        moved: Floats = inner + y[m] * yields
         return moved
 
     def slopes(y: Floats) -> Floats:
         found = problem(y[:m]) or here
-        return np.hstack((found.slopes, np.ones((len(found.margins), 1))))
+        return np.hstack((found.slopes, yields[:, None]))
 
     inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}
 
@@ -316,7 +317,7 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
 
     bounds = Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf))
     how: Any = {"method": "SLSQP", "bounds": bounds, "options": {"maxiter": 100, "ftol": 1e-9}}
-    start = np.append(u0, here.violation)
+    start = np.append(u0, max(0.0, -np.min(here.margins)))
     found: Any = minimize(breach, start, jac=True, constraints=inequality, **how)
     u: Floats = np.clip(found.x[:m], 0.0, 1.0)
     after = problem(u)

@@ -15,11 +15,10 @@ from railsim.design_checks import ROUNDING
 from railsim.errors import InputError
 from railsim.files.key_paths import key_path
 from railsim.mechanisms.analysis import Analysis, analyse
-from railsim.mechanisms.judgement import Judge, Judgement
+from railsim.mechanisms.judgement import FEASIBLE, Judge, Judgement
 from railsim.mechanisms.kinematics import check_freedom
 from railsim.mechanisms.model import build
 
-FEASIBLE = 1e-7  # breach of a constraint, in its scale, that counts as none
 ACTIVE = 1e-5  # margin, in its scale, below which a constraint is active
 
 

@@ -156,6 +156,23 @@ def test_a_compromise_is_the_least_broken_between_the_positions_too(tmp_path):
     assert best.starts[0].violation == pytest.approx(breaches(alike)[0], rel=1e-6)
 
 
+def test_a_compromise_takes_no_gas_spring_beyond_its_stroke(tmp_path):
+    """A longer one pushes harder at the end, where most is needed; its stroke is used up."""
+    path = tmp_path / "arm.toml"
+    head = ARM.replace("d = 0.1", "long = 0.42").replace('"d"', "0.1").partition("min_trans")[0]
+    gas = 'gas_spring = ["ground.foot", "arm.pin"]\nF1 = 300.0\nprogression = 1.3\nstroke = 0.25\n'
+    head = head.replace("[solve]", f'[elements.gas]\n{gas}extended = "long"\n[solve]')
+    head = head.replace('lift]\npiston = ["ground.foot", "arm.pin"]', 'lift]\nturn = "arm"')
+    path.write_text(
+        f"{head}available_force = 10.0\nstarts = 1\n[optimise.bounds]\nlong=[0.3,0.9]\n"
+    )
+    best = optimise(load_mechanism(path))  # was refused: it ended beyond the stroke
+    assert best.parameters["long"] == pytest.approx(rod(0.4)[0] + 0.25, rel=1e-6)
+    push = 300.0 * (1.0 + 0.3 * (best.parameters["long"] - rod(2.4)[0]) / 0.25)
+    excess = 100.0 - push * rod(2.4)[1] - 10.0
+    assert best.breaches == pytest.approx({"available_force": excess}, rel=1e-5)
+
+
 def test_a_search_may_begin_without_friction(tmp_path):
     """The number of constraints does not depend on it; was a traceback."""
     search = 'objective="constant_force",range="travel",points=21,starts=1,available_force=300'
