@@ -73,12 +73,11 @@ class Optimum:
 
 
 def best_of(starts: Sequence[Start]) -> Start:
-    """The feasible start with the smallest objective, else that with the smallest breach."""
+    """The start with the smallest objective of those that are feasible, or least broken."""
     usable = [start for start in starts if np.isfinite(start.objective)]
-    feasible = [start for start in usable if start.feasible]
-    if feasible:
-        return min(feasible, key=lambda start: start.objective)
-    return min(usable, key=lambda start: start.violation)
+    least = (1.0 + 1e-5) * min(start.violation for start in usable)
+    known = [start for start in usable if start.feasible or start.violation <= least]
+    return min(known, key=lambda start: (not start.feasible, start.objective))
 
 
 def optimum_of(

@@ -11,6 +11,7 @@ from railsim.mechanisms.checks import checks
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import _least_breach, optimise
+from railsim.mechanisms.optimum import Start, best_of
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import optimum_sentences, optimum_tables
 from railsim.mechanisms.tolerance import scatter
@@ -171,6 +172,14 @@ def test_a_compromise_takes_no_gas_spring_beyond_its_stroke(tmp_path):
     push = 300.0 * (1.0 + 0.3 * (best.parameters["long"] - rod(2.4)[0]) / 0.25)
     excess = 100.0 - push * rod(2.4)[1] - 10.0
     assert best.breaches == pytest.approx({"available_force": excess}, rel=1e-5)
+
+
+def test_of_equal_breaches_the_better_objective_is_the_compromise():
+    """A limit that bounds alone break is broken alike, to rounding, wherever a start ends."""
+    ends = [(217.0, 0.3), (3.2, 0.3 + 1e-12), (1.0, 0.4), (np.nan, np.nan)]
+    starts = [Start(i, {}, {}, *end, 1) for i, end in enumerate(ends)]
+    assert best_of(starts).number == 1
+    assert best_of([*starts, Start(4, {}, {}, 500.0, 1e-8, 1)]).number == 4
 
 
 def test_a_search_may_begin_without_friction(tmp_path):
