@@ -180,17 +180,21 @@ def _fault(model: Model, tracked: _Tracked, s: Floats, pose: Floats) -> Fault:
     if status == kernel.NO_ASSEMBLY and (closed := assembled(model, at, q, arcs)) is not None:
         status, q = kernel.DEAD_POINT, closed
     sentence = kernel.STATUS[status].format(joint=f"'{name}'")
+    loop = None
     if status in (kernel.NO_ASSEMBLY, kernel.LOST_ASSEMBLY):
         far = at if status == kernel.NO_ASSEMBLY else float(s[-1])
         loop = open_loop(model, at + BEYOND * (far - at), q, arcs)
-        if loop is not None:
-            # behind the limit the gap is still small: the end of the range says more
-            end = ""
-            if far != at and (last := open_loop(model, far, q, arcs, loop)) is not None:
-                loop, end = last, f" at {driver_words(model, far)}"
-            name = loop.blamed
-            sentence = f"{sentence.partition(' (joint')[0]}; {loop}{end}"
-    elif status != kernel.BEYOND_CAM:
+        if loop is None and status == kernel.LOST_ASSEMBLY:  # nothing stays open behind it
+            status = kernel.DEAD_POINT
+            sentence = kernel.STATUS[status]
+    if loop is not None:
+        # behind the limit the gap is still small: the end of the range says more
+        end = ""
+        if far != at and (last := open_loop(model, far, q, arcs, loop)) is not None:
+            loop, end = last, f" at {driver_words(model, far)}"
+        name = loop.blamed
+        sentence = f"{sentence.partition(' (joint')[0]}; {loop}{end}"
+    elif status in (kernel.DEAD_POINT, kernel.BRANCH_JUMP):
         loop_names = dead_loop(model, at, q, arcs)
         name = loop_names[-1] if name not in loop_names else name
         sentence = f"{sentence.partition(' (joint')[0]} (joints {', '.join(loop_names)})"

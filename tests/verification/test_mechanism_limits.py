@@ -321,6 +321,12 @@ def test_an_exact_parallelogram_stretched_out_is_a_dead_point(tmp_path):
     path.write_text(FOUR_BAR.format(rocker=0.4, end=0.2))
     fault = refused(load_mechanism(path))
     assert "a dead point" in fault.found  # was: joints hold the same freedom twice
+    # on the way, between positions: it can be assembled behind it, on two branches
+    start = "[start]\ncrank = { angle = -0.5 }\nrocker = { angle = -0.5 }\n[driver]\nstart = -0.5\n"
+    path.write_text(FOUR_BAR.format(rocker=0.4, end=0.5).replace("[driver]\n", start))
+    fault = refused(load_mechanism(path))
+    assert "driver at 0.0000 deg: a dead point" in fault.found  # was: cannot be assembled
+    assert "(joints left, right, begin, end)" in fault.found
 
 
 TINY = 5e-324  # the smallest number above 0
