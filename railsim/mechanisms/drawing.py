@@ -170,7 +170,9 @@ def working_box(motion: Motion) -> tuple[float, float, float, float]:
         elif hasattr(joint, "cam"):
             names.append(joint.cam)
     heavy = definition.output.point.partition(".")[0] if definition.output else ""
-    names = [n for n in names if n.partition(".")[0] != heavy] or list(motion.model.points)
+    names = [n for n in names if n.partition(".")[0] != heavy]
+    if len({tuple(motion.point(name)[0][0]) for name in names}) < 2:
+        names = list(motion.model.points)
     return box(np.concatenate([motion.point(name)[0][:1] for name in names]), 0.12)
 
 

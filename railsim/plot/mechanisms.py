@@ -273,8 +273,8 @@ def cam_figure(result: Analysis) -> Figure:
 
 @style.styled()
 def force_figure(result: Analysis) -> Figure:
-    """Ratios and force of the actuator over its length and over the height."""
-    over = [name for name in ("length", way(result)) if name in result.output]
+    """Ratios and force of the actuator over its length and over the height, or over the driver."""
+    over = [name for name in ("length", way(result)) if name in result.output] or ["travel"]
     rows = {
         "ratio": [("ratio", "along y"), ("ratio_x", "along x")],
         "force": [("force", "on the way"), ("force_back", "on the way back")],
@@ -295,13 +295,14 @@ def force_figure(result: Analysis) -> Figure:
 
 @style.styled()
 def pressure_figure(result: Analysis) -> Figure:
-    """Pressure that the mechanism needs, over the height."""
+    """Pressure that the mechanism needs, over the height, without an output over the length."""
     figure, axes = style.single(6.4, 3.4)
     names = (("pressure", "needed"), ("pressure_back", "needed on the way back"))
     lines = [(values_of(n, result), label) for n, label in names if n in result.output]
     if result.contact is not None:
         lines.append((np.full(len(lines[0][0]), result.contact.pressure / 1e6), "held"))
-    curves(axes, result, way(result), lines, "pressure (MPa)")
+    over = "length" if result.definition.output is None else way(result)
+    curves(axes, result, over, lines, "pressure (MPa)")
     axes.set_ylim(bottom=0.0)
     return figure
 
@@ -447,7 +448,8 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
     for axes, text in ((left, "pressure needed (MPa)"), (right, "static contact force (N)")):
         mark_zone(axes, first, way(first))
         axes.set(xlabel=label_of(way(first), first), ylabel=text)
-        axes.legend(fontsize=7.5)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize=7.5)
     left.set_ylim(bottom=0.0)
     return figure
 

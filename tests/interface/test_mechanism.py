@@ -576,3 +576,33 @@ def test_limit_in_the_picture_of_angles_names_those_that_it_limits():
     """mu_s is smaller than the limit at the start, and not limited."""
     (axes,) = angles_figure(analyse(load_mechanism("atr95_lift_5"))).axes
     assert [text.get_text() for text in axes.texts] == ["limit of mu, mu_prime"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_pictures_do_without_an_output_or_the_length_of_an_actuator(tmp_path):
+    """A pressure over the length, a torque over the driver; each was a traceback."""
+    from railsim.plot.mechanisms import drawing_figure, force_figure, held_figure, pressure_figure
+
+    text = """
+    format = "railsim-mechanism/1"
+    ground.points = { h = [0, 0], f = [0.2, -0.4] }
+    bodies.arm = { points = { h = [0, 0], e = [0.5, 0] }, mass = 2, centre = [0.3, 0] }
+    joints.h.revolute = ["ground.h", "arm.h"]
+    driver = { angle = "arm", end = 1.0 }
+    solve.unknown = "a"
+    """
+    path, results = tmp_path / "arm.toml", []
+    for actuator in (
+        'actuators.a = { cylinder = ["ground.f", "arm.e"], bore = 0.05, supply_pressure = 1e6 }',
+        'actuators.a.turn = "arm"',
+    ):
+        path.write_text(f"{text}\n{actuator}")
+        results.append(analyse(load_mechanism(path)))
+    (panel,), (over,) = pressure_figure(results[0]).axes, force_figure(results[1]).axes
+    area, (pressure, *_) = 0.25 * np.pi * 0.05**2, panel.lines
+    assert pressure.get_ydata() == pytest.approx(results[0].output["force"] / area / 1e6)
+    assert over.lines[0].get_ydata() == pytest.approx(
+        2.0 * 9.81 * 0.3 * np.cos(np.radians(over.lines[0].get_xdata()))
+    )
+    drawing_figure(results[1])  # warned of a box without a size
+    held_figure({"a": results[0], "b": results[0]})  # and of a legend of nothing
