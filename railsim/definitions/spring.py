@@ -347,7 +347,7 @@ def _inner_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
         found = f"the inner spring would touch {early * 1e3:.1f} mm before the outer one"
         words = "lower inner.seat_height or inner.free_height by as much: the outer spring must be"
         yield Fault("", "inner.seat_height", found, f"{words} the first to work")
-    elif below > 0.0:
+    elif below > 1e-9:
         found = f"the inner spring would stand {below * 1e3:.1f} mm below the axle centre"
         allowed = "shorten inner.free_height, or raise arm.seat_height or outer.free_height"
         yield Fault("", "inner.free_height", found, allowed)
