@@ -219,7 +219,10 @@ def _curve(result: Verification) -> dict[str, Floats]:
     """All quantities over a range of rotations somewhat wider than that of the cases."""
     turned = [case.rotation for case in result.cases]
     wider = max(0.08 * (max(turned) - min(turned)), np.radians(0.5))
-    lowest, highest = (float(end) for end in trailing_arm.rotation_range(result.arm))
+    highest, first = float(trailing_arm.rotation_range(result.arm)[1]), result.arm.coils[0]
+    # no nearer to lift-off, where a load over its deflection has no meaning, than half way
+    rise = 0.5 * min(case.deflection for case in result.cases) - first.start
+    lowest = float(trailing_arm.rotation_of_rise(result.arm.length, first.seat, rise))
     phi = np.linspace(max(min(turned) - wider, lowest), min(max(turned) + wider, highest), 201)
     load = trailing_arm.load(result.arm, phi)
     states = [trailing_arm.coil_state(result.arm, coil, phi) for coil in result.arm.coils]

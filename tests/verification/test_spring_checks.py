@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from railsim.definitions.loading import load_spring
 from railsim.errors import InputError
+from railsim.plot.springs import stiffness_figure
 from railsim.springs import checks
 from railsim.springs.design import design
 from railsim.springs.summary import design_data, fatigue_data, ride_height_data, verification_data
@@ -197,3 +198,20 @@ def test_a_dynamic_load_on_the_wrong_side_of_the_default_of_the_other_is_refused
 def test_a_spring_that_never_touches_has_no_stress():
     found = fatigue(load_spring("turasas_axlebox", ["inner.engagement=0.113"]))["inner"]
     assert (found.tau_max, found.margin) == (0.0, np.inf)  # was a traceback
+
+
+def test_an_inner_spring_on_the_level_of_the_axle_stands_there():
+    """0.36 - 0.2 - 0.16 is -5.6e-17 with floats; was refused, 0.0 mm below the axle centre."""
+    changes = ["arm.seat_height=0.0", "outer.free_height=0.36", "inner.free_height=0.2"]
+    found = load_spring("turasas_axlebox", [*changes, "inner.engagement=0.16"])
+    assert found.seat_heights[1] == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_curves_of_a_small_load_end_before_lift_off():
+    """There the stiffness is 0 by 0; level seats, no bush: nearly half the load at half the way."""
+    changes = ["arm.bush_torsional_stiffness=0.0", "arm.seat_height=0.0", "loads.ODM=50.0"]
+    result = verify(load_spring("turasas_axlebox", changes))
+    load, K_sys = stiffness_figure(result).axes[0].lines[0].get_data()
+    assert load[0] == pytest.approx(0.025, rel=0.05)
+    assert np.all(np.isfinite(K_sys))
