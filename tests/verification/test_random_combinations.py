@@ -188,9 +188,9 @@ def check_at_half_the_step(case, result, half):
 def check_mirrored(case, result, atol):
     """Each step from a state and from its mirror image gives forces that are mirror images."""
     run, mirrored = case.beside_its_image(result.attributes["step"])
-    order, signs = image(run._loop.system, mirrored._loop.system)
+    order, signs = image(run._run.system, mirrored._run.system)
     begun = signs * run.state.motion[order] - mirrored.state.motion
-    positions = 6 * len(run._loop.system.bodies.kind)
+    positions = 6 * len(run._run.system.bodies.kind)
     assert np.abs(begun[:positions]).max() < FROM_BALANCE
     forces, goes_on = [], True
     while goes_on:
@@ -198,7 +198,7 @@ def check_mirrored(case, result, atol):
         mirrored.state = dataclasses.replace(mirrored.state, motion=motion)
         goes_on = run.step()
         assert mirrored.step() == goes_on
-        forces.append([each._loop.work.wheel[..., :2].copy() for each in (run, mirrored)])
+        forces.append([each._run.work.wheel[..., :2].copy() for each in (run, mirrored)])
     # Q and Y by step, wheelset and side
     ours, theirs = np.moveaxis(forces, 1, 0)
     np.testing.assert_allclose(
