@@ -312,13 +312,13 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
 
     inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}
 
-    def breach(y: Floats) -> tuple[float, Floats]:
+    def size(y: Floats) -> tuple[float, Floats]:
         return float(y[m]), np.eye(m + 1)[m]
 
     bounds = Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf))
     how: Any = {"method": "SLSQP", "bounds": bounds, "options": {"maxiter": 100, "ftol": 1e-9}}
     start = np.append(u0, max(0.0, -np.min(here.margins)))
-    found: Any = minimize(breach, start, jac=True, constraints=inequality, **how)
+    found: Any = minimize(size, start, jac=True, constraints=inequality, **how)
     u: Floats = np.clip(found.x[:m], 0.0, 1.0)
     after = problem(u)
     if after is None or after.violation >= here.violation:

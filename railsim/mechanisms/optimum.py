@@ -19,6 +19,7 @@ from railsim.mechanisms.judgement import FEASIBLE, Judge, Judgement
 from railsim.mechanisms.kinematics import check_freedom
 from railsim.mechanisms.model import build
 
+ALIKE = 1e-5  # share by which breaches may differ that count as equal
 ACTIVE = 1e-5  # margin, in its scale, below which a constraint is active
 
 
@@ -75,7 +76,7 @@ class Optimum:
 def best_of(starts: Sequence[Start]) -> Start:
     """The start with the smallest objective of those that are feasible, or least broken."""
     usable = [start for start in starts if np.isfinite(start.objective)]
-    least = (1.0 + 1e-5) * min(start.violation for start in usable)
+    least = (1.0 + ALIKE) * min(start.violation for start in usable)
     known = [start for start in usable if start.feasible or start.violation <= least]
     return min(known, key=lambda start: (not start.feasible, start.objective))
 

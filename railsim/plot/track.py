@@ -206,7 +206,7 @@ def _name_curve(
     """Write the radius on the outer side of a curve."""
     at = int(np.searchsorted(s, 0.5 * (section.begin + section.end)))
     outwards = -np.sign(section.start_value) * np.array([-np.sin(heading[at]), np.cos(heading[at])])
-    words = f"R {1.0 / section.start_value:.6g} m".replace("-", "\N{MINUS SIGN}")
+    words = f"R {style.signed(1.0 / section.start_value)} m"
     shift = 12.0 * outwards * (1.0, -1.0)  # Y points down on the page
     ha = "left" if outwards[0] > 0.3 else "right" if outwards[0] < -0.3 else "center"
     va = "bottom" if outwards[1] < -0.3 else "top" if outwards[1] > 0.3 else "center"

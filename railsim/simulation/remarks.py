@@ -90,7 +90,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2])),
         unsettled_rails(int(run.work.parts[UNSETTLED])),
-        struck_sections(support, prepared.steps.smallest) if passes(run) else "",
+        struck_sections(support, prepared.steps.smallest) if reached_sections(run) else "",
         uneven_wheels_on(support) if uneven else "",
     ]
     return tuple(dict.fromkeys(filter(None, found)))
@@ -201,7 +201,7 @@ def _evaluations(number: int) -> str:
     return f"{number} evaluation{'s' * (number > 1)}"
 
 
-def passes(run: Run) -> bool:
+def reached_sections(run: Run) -> bool:
     """Whether the vehicle came to a range in which the section of a rail changes."""
     model, start = run.prepared.model, run.prepared.state[ARC_LENGTH]
     (begin, end), offset = model.rails.ends.T, model.system.frame_offset

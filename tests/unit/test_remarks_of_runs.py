@@ -17,7 +17,7 @@ from railsim.simulation.remarks import (
     beyond_experience,
     creep_range,
     ended_by_the_track,
-    passes,
+    reached_sections,
     stability,
     struck_sections,
     unsettled_rails,
@@ -62,7 +62,7 @@ def test_sections_are_passed_where_any_part_of_the_vehicle_comes(start, end, pas
     begin, now = np.zeros(8), np.zeros(8)
     begin[ARC_LENGTH], now[ARC_LENGTH] = start, end
     prepared = Record(model=Record(system=system, rails=rails), state=begin)
-    assert passes(Record(prepared=prepared, state=now)) == passed
+    assert reached_sections(Record(prepared=prepared, state=now)) == passed
 
 
 def test_sums_of_Y_count_against_three_times_their_limit():
