@@ -9,8 +9,10 @@ from math import ceil
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.branches import rarely
 from railsim.kernels.internal import constant_decays
-from railsim.kernels.system import AHEAD, DIVIDED, LOCATED, PARTS, PER_PART, SHARE
+from railsim.kernels.rail_parts import near_range
+from railsim.kernels.system import AHEAD, AT_SECTIONS, DIVIDED, LOCATED, PARTS, PER_PART, SHARE
 
 
 @compiled(python=False)
@@ -22,7 +24,7 @@ def prepare_steps(system, work, h):
 
 
 @compiled(python=False)
-def striking(system, work, h):
+def striking(system, work, state, h):
     """Wheelset with the contact force that is about to change most, beyond a share of the load.
 
     There wheels lift, strike, or ring afterwards; -1 where nothing does, or no step is divided.
@@ -38,6 +40,8 @@ def striking(system, work, h):
     if most > 0:
         for w in range(contact.body.shape[0]):
             own = work.force_rate[w] * h / contact.load[w]
+            if rarely(contact.rails.range_row.shape[0] > 0) and near_range(system, state, w):
+                own *= work.watch[AT_SECTIONS]
             if own > change:
                 where, change = w, own
     return where, np.int64(ceil(min(change / work.watch[PER_PART], float(most))))

@@ -48,9 +48,10 @@ N_PARTS = 6
 # the vertical one; shortest step that has the full tolerance of forces on elastic rails [s]; arc
 # length at which the rails of `Work.plane` and `Work.rail` are [m], no number where that is open;
 # share of the wheel load by which they may change in a part of a step; time in which the stiffness
-# of a contact on rigid rails counts as damping, over the last step, see `model.time_step`
-AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE, LOCATED, PER_PART, IMPLICIT = range(7)
-N_WATCH = 7
+# of a contact on rigid rails counts as damping, over the last step, see `model.time_step`; what a
+# change counts near rails whose section changes
+AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE, LOCATED, PER_PART, IMPLICIT, AT_SECTIONS = range(8)
+N_WATCH = 8
 # Work.events, of each wheelset: loaded patches so far, how many of them were outside the range of
 # the creep law; the same kept over corrections; look-ups beyond the yaw of the contact table;
 # evaluations of its contact alone

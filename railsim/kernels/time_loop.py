@@ -96,7 +96,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                 if scheme == FAST and chunk.fresh and step == chunk.first:
                     remember(system, work, state, derivative, h)
                 decay, length, left = work.decay, h, np.int64(1)
-                w, parts = striking(system, work, h)
+                w, parts = striking(system, work, state, h)
                 if w >= 0:
                     decay, length, left = work.decay_part, h / parts, parts
                     begin_division(system, work, length)

@@ -9,6 +9,7 @@ margin leaves room for higher wheel loads.
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,9 +25,19 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import LAST_STEP, N_SCALARS, SPEED
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE, WEIGHT
-from railsim.kernels.system import IMPLICIT, PARTS, PER_PART, SHARE, SIDEWAYS, System, Work
+from railsim.kernels.system import (
+    AT_SECTIONS,
+    IMPLICIT,
+    PARTS,
+    PER_PART,
+    SHARE,
+    SIDEWAYS,
+    System,
+    Work,
+)
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
+from railsim.model.uneven_wheels import longest_part
 from railsim.model.work import parts_of_wheel, work_arrays
 
 Situation = tuple[System, Floats]
@@ -53,18 +64,40 @@ SHORTEST_STEP = 1e-6  # s
 # raises the frequency of the contact, which goes with the sixth root of the load, by as much; by at
 # most half of it where the contact is in series with rails that are no stiffer than it is
 MARGIN, MARGIN_ELASTIC = math.pow(2.0, 1.0 / 6.0), math.pow(2.0, 1.0 / 12.0)
-# Where a wheel lifts or strikes a step is divided into parts, down to this length (s): a fiftieth
-# of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
-PART = {FAST: 1e-4, RK4: 2.5e-4}
-# the same of the fast scheme on elastic rails, where a wheel has no such vibration
-PART_ELASTIC = 1.25e-3 / 3.0
-# share of the static wheel load by which a contact force may change in a step that is not divided,
-# on rigid and on elastic rails, where no vibration follows: on smooth curves no step is
-FORCE_CHANGE, FORCE_CHANGE_ELASTIC = 0.15, 0.2
-# the same of a part of a divided step, which is no shorter than `PART` for it
-PART_CHANGE, PART_CHANGE_ELASTIC = 0.08, 0.2
-# what a change of the lateral force counts: flanges strike sideways
-SIDEWAYS_RIGID, SIDEWAYS_ELASTIC = 10.0, 4.0
+
+
+class Division(NamedTuple):
+    """How a step of the fast scheme is divided where a wheel lifts or strikes.
+
+    Attributes
+    ----------
+    part : float         shortest part [s]
+    change : float       share of the static wheel load by which a contact force may change in a
+                         step that is not divided; on smooth curves none is
+    of_part : float      the same of a part, which is no shorter than `part` for it
+    sideways : float     what a change of the lateral force counts: flanges strike sideways
+    at_sections : float  what a change counts near rails whose section changes
+    """
+
+    part: float
+    change: float
+    of_part: float
+    sideways: float
+    at_sections: float = 1.0
+
+
+# a fiftieth of a period of the wheel on a rigid rail, 200 Hz; a twentieth for the reference scheme
+RIGID, PART_RK4 = Division(1e-4, 0.15, 0.08, 10.0), 2.5e-4
+# no such vibration follows a strike
+ELASTIC = Division(1.25e-3 / 3.0, 0.2, 0.2, 4.0)
+# rails with masses vibrate on the contact at some 700 Hz: the blow of a flat lasts 0.7 ms
+MASSES = ELASTIC._replace(part=2.5e-5)
+# where these change their section, as at the nose of a crossing, a blow is not foreseen in a step
+# as long as the transfer: 62 instead of 80 kN as elsewhere (`wagon_y25`, p2, 10 m/s)
+NOSES = MASSES._replace(part=1e-5, at_sections=40.0)
+# s, on rails with masses `change` is that of a step as long as this, and in proportion of shorter
+# ones: what they lose of a vibration goes with the rate of the force
+CHANGE_WITHIN = 1e-3
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve
 GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
@@ -108,19 +141,21 @@ def observed(system: System, state: Floats, recorder: Recorder) -> int:
     return int(status)
 
 
-def divide_strikes(work: Work, scheme: int, step: float, longest: float = math.inf) -> None:
+def divide_strikes(system: System, work: Work, scheme: int, step: float, speed: float) -> None:
     """Have the time loop divide the steps over which a wheel lifts or strikes.
 
-    `work`: with which the loop is called; `scheme`, `step`: FAST or RK4; time step [s]; `longest`:
-    longest part that follows what the wheels pass over [s].
+    `system`, `work`: with which the loop is called; `scheme`, `step`: FAST or RK4; time step [s];
+    `speed`: at which wheels pass over flats [m/s].
     """
-    elastic = len(work.support) > 0
-    part = min(longest, PART_ELASTIC if elastic and scheme == FAST else PART[scheme])
+    how = ELASTIC if system.support.elastic else RIGID
+    if system.support.elastic and not system.support.massless:
+        how = NOSES if len(system.contact.rails.range_row) else MASSES
+        how = how._replace(change=how.change * min(1.0, step / CHANGE_WITHIN))
+    part = min(longest_part(system, speed), how.part if scheme == FAST else PART_RK4)
     parts = math.ceil(step / part * (1.0 - 1e-9))
     work.parts[PARTS] = parts if parts > 1 else 0
-    work.watch[SHARE] = FORCE_CHANGE_ELASTIC if elastic else FORCE_CHANGE
-    work.watch[PER_PART] = PART_CHANGE_ELASTIC if elastic else PART_CHANGE
-    work.watch[SIDEWAYS] = SIDEWAYS_ELASTIC if elastic else SIDEWAYS_RIGID
+    work.watch[SHARE], work.watch[PER_PART] = how.change, how.of_part
+    work.watch[SIDEWAYS], work.watch[AT_SECTIONS] = how.sideways, how.at_sections
     work.watch[IMPLICIT] = _implicit_share(step)
 
 

@@ -86,7 +86,7 @@ def work_arrays(system: kernel.System) -> kernel.Work:
         events=aligned_zeros((n_wheelsets, kernel.N_EVENTS), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         force_rate=aligned_zeros(n_wheelsets),
-        watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE, np.nan, 1.0, 0.0]),
+        watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE, np.nan, 1.0, 0.0, 1.0]),
         rate_change=aligned_zeros((2, CHANGES)),
         parts=aligned_zeros(kernel.N_PARTS, np.int64),
         extremes=no_extremes(n_wheelsets),

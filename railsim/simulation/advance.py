@@ -22,7 +22,7 @@ from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
-from railsim.model.uneven_wheels import longest_part, rolling
+from railsim.model.uneven_wheels import rolling
 from railsim.model.work import no_extremes, work_arrays
 from railsim.result import MemorySink, Sink
 from railsim.result.hunting import SEEN, thinned
@@ -179,7 +179,7 @@ class Run:
         begin = time.thread_time()  # a library's idle threads may still be spinning
         if (prepared := (step, self.state[SPEED])) != self._prepared:  # 8 us of a single step's 30
             self._prepared = prepared
-            divide_strikes(self.work, self.scheme, step, longest_part(self.system, prepared[1]))
+            divide_strikes(self.system, self.work, self.scheme, *prepared)
         arrays = self.state, self.derivative, self.stages, self.recorder
         status, where, steps, rows = self.compiled(time_loop, *arrays, self.scheme, step, chunk)
         self.fresh = self.fresh and steps == 0

@@ -8,6 +8,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.track.definition import Track
+from railsim.kernels.state import SPEED
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import Chunk, time_loop
@@ -80,7 +81,7 @@ def advance(
 ) -> int:
     """Advance a state in calls short enough for signals to be heard; its status is returned."""
     work, recorder = work_arrays(system), empty_recorder(model, 1)
-    divide_strikes(work, scheme, step)
+    divide_strikes(system, work, scheme, step, state[SPEED])
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     status, done = RUNNING, 0
     most = max(1, WHEELSET_STEPS // len(system.contact.body))

@@ -40,7 +40,6 @@ VIBRATES = 0.05  # amplitude of a wheel load over the static one
 ALTERNATES = 0.005, 0.02
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
-STRIKES = 5e-5  # s; at longer steps rails with masses, some 700 Hz on the contact, miss such a blow
 YAW_MAX = TableGrid().yaw_max
 
 
@@ -90,7 +89,6 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2])),
         unsettled_rails(int(run.work.parts[UNSETTLED])),
-        struck_sections(support, prepared.steps.smallest) if reached_sections(run) else "",
         uneven_wheels_on(support) if uneven else "",
     ]
     return tuple(dict.fromkeys(filter(None, found)))
@@ -199,25 +197,6 @@ def unsettled_rails(evaluations: int) -> str:
 
 def _evaluations(number: int) -> str:
     return f"{number} evaluation{'s' * (number > 1)}"
-
-
-def reached_sections(run: Run) -> bool:
-    """Whether the vehicle came to a range in which the section of a rail changes."""
-    model, start = run.prepared.model, run.prepared.state[ARC_LENGTH]
-    (begin, end), offset = model.rails.ends.T, model.system.frame_offset
-    before, behind = start + offset.min() < end, run.state[ARC_LENGTH] + offset.max() > begin
-    return bool(np.any(before & behind))
-
-
-def struck_sections(support: Support, step: float) -> str:
-    """Remark on a step [s] too long for the blow of a wheel on a nose, on rails with masses."""
-    if not support.elastic or support.massless or step <= STRIKES:
-        return ""
-    return (
-        f"Rails with masses change their section: at a step of {1e3 * step:.3g} ms the largest Q "
-        "of a blow, as on the nose of a crossing, can be a third too small; settings.step = 2.5e-5 "
-        "follows it."
-    )
 
 
 def uneven_wheels_on(support: Support) -> str:

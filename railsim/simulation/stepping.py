@@ -28,7 +28,6 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.laws import allowed
 from railsim.model.time_step import divide_strikes
-from railsim.model.uneven_wheels import longest_part
 from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
 from railsim.profiles import Profile
@@ -428,7 +427,7 @@ class Simulation:
         (work, recorder), state = self._probe, run.state.copy()
         work.memory[:] = run.work.memory
         work.rail_motion[:] = run.work.rail_motion
-        divide_strikes(work, run.scheme, length, longest_part(run.system, run.state[SPEED]))
+        divide_strikes(run.system, work, run.scheme, length, run.state[SPEED])
         status, where, _, _ = time_loop(
             run.system,
             work,

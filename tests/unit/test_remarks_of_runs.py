@@ -9,7 +9,6 @@ import pytest
 import railsim
 from railsim.kernels import vibration as kernel
 from railsim.kernels.contact_columns import W_Q, WHEEL_COLUMNS
-from railsim.kernels.state import ARC_LENGTH
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
 from railsim.result.stored import lost_peak
@@ -17,9 +16,7 @@ from railsim.simulation.remarks import (
     beyond_experience,
     creep_range,
     ended_by_the_track,
-    reached_sections,
     stability,
-    struck_sections,
     unsettled_rails,
     vibration,
 )
@@ -35,34 +32,6 @@ def test_all_corrections_used_are_told_with_their_number_and_a_way_to_check():
     assert f"all {MOST_CORRECTIONS} iterations" in remark
     assert "0.02%" in remark
     assert "--check-step" in remark
-
-
-@pytest.mark.parametrize(
-    ("elastic", "massless", "step", "said"),
-    [
-        (True, False, 2.5e-3, True),
-        (True, False, 2.5e-5, False),
-        (True, True, 2.5e-3, False),  # agree within 4 % with 0.025 ms, as rigid rails do
-        (False, False, 1.25e-3, False),
-    ],
-)
-def test_blow_on_a_nose_needs_a_step_that_follows_rails_with_masses(elastic, massless, step, said):
-    """Coach, crossing on co-running rails, 35 m/s: 213 kN at 0.025 ms, 146 kN at that chosen."""
-    support = Record(elastic=elastic, massless=massless)
-    assert bool(struck_sections(support, step)) == said
-
-
-@pytest.mark.parametrize(
-    ("start", "end", "passed"), [(0, 30, False), (0, 40, True), (70, 80, False), (60, 80, True)]
-)
-def test_sections_are_passed_where_any_part_of_the_vehicle_comes(start, end, passed):
-    """A vehicle from 12 m behind to 10 m ahead of its reference, a range from 45 to 55 m."""
-    system = Record(frame_offset=np.array([10.0, 0.0, -12.0]))
-    rails = Record(ends=np.array([[45.0, 55.0]]))
-    begin, now = np.zeros(8), np.zeros(8)
-    begin[ARC_LENGTH], now[ARC_LENGTH] = start, end
-    prepared = Record(model=Record(system=system, rails=rails), state=begin)
-    assert reached_sections(Record(prepared=prepared, state=now)) == passed
 
 
 def test_sums_of_Y_count_against_three_times_their_limit():
