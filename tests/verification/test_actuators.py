@@ -16,7 +16,7 @@ from railsim.constants import GRAVITY
 from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.kernels.actuators import COMMAND
+from railsim.kernels.actuators import COMMAND, SENSE
 from railsim.model.assembly import assemble
 from railsim.simulation.step_choice import braked_step
 
@@ -91,7 +91,10 @@ def test_an_actuator_along_a_line_pulls_along_it_where_it_is_now():
 
 @pytest.mark.parametrize("acts", ["x", "y", "z", "roll", "pitch", "yaw"])
 def test_an_actuator_along_or_about_an_axis_of_its_body_turns_with_it(acts):
-    """It acts along a column of C = Rz(yaw) Rx(roll) Ry(pitch); its power is F v along it."""
+    """It acts along a column of C = Rz(yaw) Rx(roll) Ry(pitch), in a mirrored vehicle against it.
+
+    Its power is F v along it.
+    """
     roll, pitch, yaw = 0.3, -0.2, 0.5
     about, k = divmod(["x", "y", "z", "roll", "pitch", "yaw"].index(acts), 3)
     axis = (rotation(yaw, 2) @ rotation(roll, 0) @ rotation(pitch, 1))[:, k]
@@ -99,7 +102,8 @@ def test_an_actuator_along_or_about_an_axis_of_its_body_turns_with_it(acts):
     rig = Rig(kind="actuator", acts=acts, power_limit=1e3)
     rig.work.memory[rig.system.actuators.which[0, COMMAND]] = 1300.0
     rig.state[6 * rig.frame + 3 : 6 * rig.frame + 6] = roll, pitch, yaw
-    for speed, force in ((0.0, 1300.0), (2.0, 500.0)):
+    for sense, speed, force in ((1, 0.0, 1300.0), (1, 2.0, 500.0), (-1, -2.0, -500.0)):
+        rig.system.actuators.row[0, SENSE] = sense
         rate = np.zeros(6)
         rate[own] = speed * axis
         assert rig.forces(np.zeros(6), rate)[own] == pytest.approx(force * axis, abs=1e-6)

@@ -36,12 +36,12 @@ def bogie_with(coach, actuator, *without):
     return {"bogie": {**bogie, "elements": {**elements, "act": {**ends, **actuator}}}}
 
 
-@pytest.mark.parametrize(("delay", "sampled"), [(0.0, {}), (0.02, {}), (0.0, {"rate": 20.0})])
+@pytest.mark.parametrize(("delay", "sampled"), [(0.0, {}), (0.02, {}), (0.0, {"rate": 10.0})])
 def test_skyhook_decays_as_its_linearised_loop(coach, delay, sampled):
     """The swaying mode alone, by its left eigenvector: decay within 1 %, frequency within 0.2 %.
 
     The controller is 500 times faster than the mode; its delay is in the linearisation, and so is
-    the time for which a sample of a slow signal is held.
+    the time for which a sample of a slow signal is held, at the rear end alone.
     """
     across = {"point": [0.0, 0.0, -0.7], "acts": "y", "delay": delay}
     vehicle = coach.replace(
@@ -53,7 +53,7 @@ def test_skyhook_decays_as_its_linearised_loop(coach, delay, sampled):
                 "body": "carbody",
                 "axis": "y",
                 "position": [x, 0, -0.7],
-                **sampled,
+                **(sampled if end == "rear" else {}),
             }
             for end, x in ENDS.items()
         },
