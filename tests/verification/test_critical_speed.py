@@ -223,6 +223,20 @@ def test_what_a_ramp_alone_finds_counts_for_the_limits():
     assert found.instability_limit.speed == 54.3
 
 
+def test_branches_stand_in_a_dataset_as_they_were_found(monkeypatch):
+    """Of the shorter one nothing is known beyond its end."""
+    package = SimpleNamespace(Dataset=lambda values, coordinates: (values, coordinates))
+    monkeypatch.setattr("railsim.stability.result.optional_package", lambda *_: package)
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=120.0)
+    slow, fast = Point(25.6, 8.6e-3, 0.9, 1e3), Point(54.3, 9.5e-3, 1.9, 40e3)
+    found.branches = [Branch("up", [fast]), Branch("ramp", [fast, slow], 25.6)]
+    values, coordinates = found.to_xarray()
+    assert coordinates == {"branch": ["up", "ramp"]}
+    for name, two in (("speed", (54.3, 25.6)), ("frequency", (1.9, 0.9))):
+        assert values[name][0] == ("branch", "point")
+        np.testing.assert_array_equal(values[name][1], [[two[0], np.nan], two])
+
+
 def test_a_ramp_goes_on_with_the_sway_of_stuck_friction_however_near():
     """One motion dies at 52.5 m/s; another, which dies above 54 m/s, lasts from there to 47 m/s.
 
@@ -247,11 +261,14 @@ def test_a_ramp_goes_on_with_the_sway_of_stuck_friction_however_near():
 
 
 def test_what_derails_at_the_highest_speed_is_not_said_to_die_there():
-    """It derails above 50 m/s, and dies below."""
+    """It derails above 50 m/s, and dies below; a search above 52 m/s ends."""
+    tried = []
 
     class Derailing(Cycles):
         def stretch(self, state, begin, end, duration):
             if begin > 50.0:
+                tried.append(begin)
+                assert len(tried) < 200, "it is tried again and again"
                 raise LeftRange("off the rails")
             return super().stretch(state, begin, end, duration)
 
@@ -261,6 +278,9 @@ def test_what_derails_at_the_highest_speed_is_not_said_to_die_there():
     nothing, derails = found.remarks
     assert nothing.endswith("at 49.64 m/s")
     assert derails == "ramp: the vehicle derails above 49.64 m/s"
+    with pytest.raises(LeftRange, match="off the rails"):
+        ramp(dying, 52.0, 55.0, excitations=(3e-3,))
+    assert tried[-1] == 52.0
 
 
 def test_motions_that_die_above_a_range_of_hunting_are_no_hunting():
