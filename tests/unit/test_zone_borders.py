@@ -65,6 +65,9 @@ def test_sections_end_before_the_cant_changes():
     found = track_sections(track, limits, service, (0.0, 1000.0), lambda _: 20.0)
     # 100 m each, from 10 m, half of the rounding, behind a change to 10 m in front of the next
     assert [s.begin for s in found] == [10.0, 110.0, 210.0, 510.0, 610.0, 710.0, 810.0]
+    (short,) = track_sections(track, limits, service, (0.0, 60.0), lambda _: 20.0)
+    assert (short.begin, short.end) == (10.0, 60.0)
+    assert short.reason == "50 m of a curve of 500 m, a section needs 100 m"
 
 
 def test_of_the_two_signs_of_one_section_the_larger_is_shown_whatever_the_hand():

@@ -185,6 +185,22 @@ def test_no_nest_names_the_limits_in_the_way():
         assert fault.allowed
 
 
+@pytest.mark.parametrize(
+    ("slack", "said"),
+    [
+        (-0.123, "is missed by 12.3% at the best compromise (wires 38 and 22 mm)"),
+        (-0.6, "keeps out 25% of the candidates"),
+    ],
+)
+def test_limits_in_the_way_are_told_with_their_size(slack, said):
+    """A slack is relative; far beyond all nests counts how many candidates break a limit."""
+    wires = SimpleNamespace(d=np.array([[0.038], [0.022]]))
+    nearest = springs_search._Optimum(wires, {"outer_diameter": slack, "inner_diameter": 0.2})
+    tried = SimpleNamespace(tried=400, broken={"outer_diameter": 100, "stiffness": 40})
+    (fault,) = springs_search._nothing_fits(SimpleNamespace(name="s"), tried, [nearest])
+    assert fault.found == f"no nest fits: the limit 'outer_diameter' {said}"
+
+
 def test_height_rises_with_stiffer_and_taller_springs():
     for result in ride_heights(load_spring("turasas_axlebox")):
         for name in (

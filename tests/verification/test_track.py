@@ -4,13 +4,14 @@ from types import SimpleNamespace as Record
 
 import numpy as np
 import pytest
-from dynamics import absolute_frame
+from dynamics import absolute_frame, rotation
 from scipy.special import fresnel
 
 from railsim.definitions.loading import load_track
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.rounded_profile import RoundedProfile
-from railsim.kernels.track_frame import OMEGA, OMEGA_S, TrackTables
+from railsim.kernels.rhs import locate_frames
+from railsim.kernels.track_frame import FRAME_SIZE, OMEGA, OMEGA_S, TrackTables
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables, usual_cell_length
 
@@ -72,6 +73,13 @@ def test_a_frame_turns_as_its_axes_do():
     assert here[OMEGA : OMEGA + 3] == pytest.approx([turn[2, 1], turn[0, 2], turn[1, 0]], abs=1e-6)
     change = (after - before)[OMEGA : OMEGA + 3] / (2.0 * h)
     assert here[OMEGA_S : OMEGA_S + 3] == pytest.approx(change, abs=1e-6)
+    place, ahead = (coefficients[0, :4] @ at ** np.arange(4.0) for at in (s, s + 0.3))
+    assert here[:3] == pytest.approx(place[:3], abs=1e-14)
+    # from the frame at s, with its heading
+    frames, where = np.zeros((2, FRAME_SIZE)), (np.zeros(2, dtype=np.int64), np.zeros(2))
+    assert locate_frames(tables, np.array([0.0, 0.3]), 0, s, frames, *where) == 0
+    moved = rotation(-place[PSI], 2) @ (ahead - place)[:3]
+    assert frames[1, :3] == pytest.approx(moved, abs=1e-14)
 
 
 @pytest.mark.parametrize("radius", [250.0, -400.0])
