@@ -251,6 +251,7 @@ CONTROLLER = binding.Takes("a controller", ("time",), ("v",))
         ("def x(v, memory):\n    return v", "has an argument 'memory' but no key of this name"),
         ("def y(v):\n    return v", "is no function 'x' of this file; allowed: y"),
         ("raise SystemExit(7)", "line 1: .* fails when it is read: SystemExit: 7"),
+        ("def half(n):\n    return n / 0\nk = half(1)", "line 2: .* is read: ZeroDivisionError"),
         ("n = 0\ndef x(v):\n    global n\n    n += 1\n    return v", "cannot be compiled"),
     ],
 )

@@ -379,8 +379,10 @@ def test_a_drawn_track_has_its_curvature_and_cant_to_scale_and_wide_curves_their
         dict(tuple(map(float, point.split(","))) for point in points.split())
         for points in re.findall(r'points="([^"]*)"', drawn)
     ]
-    even = track.replace(cant=[{"type": "CST", "length": 1000.0, "cant": 0.05}])
-    assert ">cant: 50 to 50 mm<" in track_svg(even)
+    even = [{"type": "CST", "length": 350.0, "cant": 0.05}]  # 350 m: 50 m of it are 143 units
+    short = track_svg(track.replace(plan=[track.plan[0], track.plan[3]], cant=even))
+    assert ">cant: 50 to 50 mm<" in short
+    assert ">R 500 m<" in short
     zero, curvature, level, cant = lines
     assert zero == {0.0: 43.3, 1000.0: 43.3}  # 70 - 48 2.5/4.5
     assert [curvature[s] for s in (100.0, 550.0, 900.0, 975.0)] == [43.3, 70.0, 43.3, 22.0]

@@ -196,6 +196,16 @@ def test_a_clock_0_3_per_cent_off_is_said_beside_distance_and_speed():
         assert all(w in s for w, s in zip(words, said, strict=True))
 
 
+def test_an_axis_is_linear_over_its_gaps_and_constant_beyond_what_is_known():
+    how, time = MeasurementFile.model_construct(speed=None, start=0.0), np.linspace(0.0, 10.0, 1001)
+    known = (time > 0.3) & ((time < 4.0) | (time > 5.0)) & (time < 9.8)
+    speed = 20.0 + 2.0 * time
+    read = {"speed": np.where(known, speed, np.nan)}
+    _, found, (said,) = position("a.toml", how, time, read, None)
+    assert found == pytest.approx(np.clip(speed, *speed[known][[0, -1]]), rel=1e-12)
+    assert said == "The speed has gaps (15.3 %): linear over them."
+
+
 @pytest.mark.parametrize(("gravity", "high_pass"), [(9.81, ""), (0.0, ", high_pass = 0.2")])
 def test_mounting_takes_gravity_back(tmp_path, gravity, high_pass):
     """A floor sensor rolled by 20 mrad reads -g p in y, which a high pass keeps back, and z."""

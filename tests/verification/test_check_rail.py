@@ -176,6 +176,11 @@ def test_contact_facing_and_trailing_is_at_mirrored_places():
         for one in (rail, rail.model_copy(update={"trailing": True}))
     )
     np.testing.assert_array_equal(facing.check_wheel, trailing.check_wheel)
+    low = rail.model_copy(update={"rail": "left", "height": 0.02})
+    alone, both = (check_rails(flat, curve(some), known) for some in ([low], [rail, low]))
+    np.testing.assert_array_equal(both.check_wheel[:, :1], facing.check_wheel)
+    np.testing.assert_array_equal(both.check_wheel[:, 1:], alone.check_wheel)
+    assert np.ptp(both.check_wheel, axis=1).min(axis=0)[1] > 0.0  # each reaches another height
     d = np.linspace(-10.0, 6.0, 33)
     for s in (50.1, 53.0, 62.5, 65.9):
         there, mirrored = standing_at(facing, s), standing_at(trailing, 120.0 - s)
