@@ -453,8 +453,9 @@ def test_a_file_in_place_of_the_folder_is_said(found, tmp_path):
 
 
 def test_channels_of_another_vehicle_are_refused(found):
+    run = railsim.load_measurement(found[1])  # not its file
     with pytest.raises(railsim.InputError) as caught:
-        railsim.identify("coach_25t", found[1], ["bodies.carbody.mass"], workers=1)
+        railsim.identify("coach_25t", run, ["bodies.carbody.mass"], workers=1)
     assert "has no sensor 'on_frame'" in str(caught.value)
 
 
