@@ -10,7 +10,6 @@ from selection import points
 from railsim.contact import build_contact_table, cached_contact_table, hertz
 from railsim.contact.elastic import loaded_contact
 from railsim.contact.table import TableGrid
-from railsim.kernels.contact_table import coupled_approaches
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.builtin import s1002_height
 
@@ -248,19 +247,6 @@ def test_zones_share_a_contact_on_their_border_instead_of_counting_it_twice():
         shares.append(vertical.max() / vertical.sum())
     assert min(shares) < 0.7  # a border was crossed
     assert np.max(totals) < 1.25 * np.min(totals)
-
-
-@pytest.mark.parametrize("p", [(1e-4, 2e-4, 1.6e-4), (4e-6, 2e-4, 1e-4), (1e-4, 2e-4, -1e-4)])
-def test_neighbours_bend_the_surfaces_by_their_loads(p):
-    """e = p - kappa N, N = K e^(3/2) + K2 e^2; what that lifts off carries nothing."""
-    K, K2 = np.array([[0.8e11, 1.0e11, 1.3e11], [2e12, 3e12, 5e12]])
-    kappa, e = np.array([0.7e-10, 1.1e-10]), np.array(p)
-    coupled_approaches(kappa[None], 0, np.concatenate([K, K2]), e)
-    N = np.maximum(e, 0.0) ** 1.5 * K + np.maximum(e, 0.0) ** 2 * K2
-    left = p - np.array([kappa[0] * N[1], kappa @ N[::2], kappa[1] * N[1]])
-    assert e[1] < p[1]
-    for found, bent, apart in zip(e, left, p, strict=True):
-        assert found == pytest.approx(apart if apart < 0.0 else max(bent, 0.0), abs=1e-12)
 
 
 def test_ellipses_are_those_of_hertz_where_curvatures_are_constant():
