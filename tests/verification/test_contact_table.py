@@ -236,6 +236,8 @@ def test_zones_share_a_contact_on_their_border_instead_of_counting_it_twice():
         inclination=0.0,
         grid=TableGrid(s_min=-0.02, s_max=0.0, roll_max=0.003, n_w=2),
     )
+    nodes = table.y0 + table.dy * np.arange(table.values.shape[3])
+    assert (nodes[0], nodes[-1]) == pytest.approx((-0.02, 0.0), abs=1e-12)
     positions = np.arange(-0.018, -0.005, 1e-4)
     totals, shares = [], []
     for position in positions:
