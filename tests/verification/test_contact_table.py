@@ -47,8 +47,7 @@ def random_positions(n, seed):
 
 
 def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
-    table = build_contact_table(load_profile("S1002"), load_profile("60E1"), grid=FINE_YAW)
-    rail = rail_points()
+    table, rail = standard_table(), rail_points()
     errors = []
     for y, roll, yaw in random_positions(15, seed=1):
         height = lowest_gap(*WHEEL, *rail, y, roll, yaw, 0.46)[0]
@@ -96,14 +95,14 @@ def test_normal_force_is_the_gradient_of_one_potential_over_the_whole_table(whee
 
 def test_work_around_a_closed_path_through_root_and_flange_is_zero():
     table = standard_table()
-    t = np.linspace(0.0, 2 * np.pi, 4001)
+    t = np.linspace(0.0, 2 * np.pi, 1001)
     y, roll = 0.0062 + 0.0010 * np.cos(t), 3e-4 * np.sin(2 * t)
     lowest = np.array([evaluate(table, a, b)[0][:, 0].min() for a, b in zip(y, roll, strict=True)])
     z = lowest + 60e-6 + 20e-6 * np.sin(t)
     f = np.array([forces(table, *point) for point in zip(y, z, roll, strict=True)])
     steps = np.diff(np.column_stack((y, z, roll)), axis=0)
     parts = 0.5 * (f[1:, :3] + f[:-1, :3]) * steps
-    # the trapezoid's own error over 4000 steps
+    # the trapezoid's own error over 1000 steps, 8e-6
     assert abs(parts.sum()) < 1e-4 * np.abs(parts).sum()
 
 
