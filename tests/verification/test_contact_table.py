@@ -22,8 +22,14 @@ NARROW, FINE_YAW, ONE_YAW = TableGrid(**RANGE, n_w=5), TableGrid(**RANGE), Table
 
 
 @cache
+def table_of(seed, rail):
+    """Of S1002 where `seed` is None, else of a worn one."""
+    wheel = load_profile("S1002") if seed is None else worn(seed)
+    return build_contact_table(wheel, load_profile(rail), grid=NARROW)
+
+
 def standard_table():
-    return build_contact_table(load_profile("S1002"), load_profile("60E1"), grid=NARROW)
+    return table_of(None, "60E1")
 
 
 def worn(seed):
@@ -70,13 +76,9 @@ def test_heights_of_worn_profiles_agree_too(seed):
     assert np.median(np.abs(errors)) < 15e-6
 
 
-@points("wheel", [None, 0, 1], always=(0, 1))
-def test_normal_force_is_the_gradient_of_one_potential_over_the_whole_table(wheel):
-    table = (
-        standard_table()
-        if wheel is None
-        else build_contact_table(worn(wheel), load_profile("60E1"), grid=NARROW)
-    )
+@points(("wheel", "rail"), [(None, "60E1"), (7, "benchmark"), (1, "60E1")], always=(0, 1))
+def test_normal_force_is_the_gradient_of_one_potential_over_the_whole_table(wheel, rail):
+    table = table_of(wheel, rail)
     step = np.diag([1e-8, 1e-8, 1e-8, 1e-9])
     for y, roll, yaw in random_positions(40, seed=5):
         w = yaw**2 + 1e-6
@@ -268,10 +270,7 @@ def test_ellipses_are_those_of_hertz_where_curvatures_are_constant():
 
 
 def test_every_value_of_the_table_is_finite_with_positive_stiffness_and_axes():
-    for table in (
-        standard_table(),
-        build_contact_table(worn(7), load_profile("benchmark"), grid=NARROW),
-    ):
+    for table in (standard_table(), table_of(7, "benchmark")):
         assert np.all(np.isfinite(table.values))
         assert np.all(table.values[..., [3, 6]] >= 0.0)
         assert table.values[..., 1].min() > -1e-6 * table.values[..., 1].max()
