@@ -53,8 +53,8 @@ def flange(y):
 
 
 @njit(cache=True)
-def rate(x, speed):
-    """State derivative, float64[14]."""
+def write_rate(x, speed, out):
+    """Write the state derivative, float64[14]."""
     q, v = x[:7], x[7:]
     A1 = 2.0 * K1 * (q[0] - q[4] - B * q[5] - H1 * q[6])
     A2 = 2.0 * K1 * (q[2] - q[4] + B * q[5] - H1 * q[6])
@@ -65,8 +65,8 @@ def rate(x, speed):
     A7 = 2.0 * D1 * L2**2 * v[6] + (2.0 * K5 * L2**2 + 4.0 * K3 * L1**2) * q[6]
     fx1, fy1 = creep_forces(q[0], q[1], v[0], v[1], speed)
     fx2, fy2 = creep_forces(q[2], q[3], v[2], v[3], speed)
-    out = np.empty(14)
-    out[:7] = v
+    for i in range(7):
+        out[i] = v[i]
     out[7] = (-A1 - 2.0 * fx1 - flange(q[0])) / M_W
     out[8] = (-A3 - 2.0 * A * fy1) / I_W
     out[9] = (-A2 - 2.0 * fx2 - flange(q[2])) / M_W
@@ -74,23 +74,31 @@ def rate(x, speed):
     out[11] = (A1 + A2 - A5) / M_F
     out[12] = (B * (A1 - A2) + A3 + A4 - A6) / I_FY
     out[13] = (H1 * (A1 + A2) + H2 * A5 - A7) / I_FR
+
+
+def rate(x, speed):
+    """State derivative, float64[14]."""
+    out = np.empty(14)
+    write_rate(x, speed, out)
     return out
 
 
 @njit(cache=True)
 def path(x, begin, end, h, steps):
     """States along a motion whose speed goes evenly from `begin` to `end`, by Runge and Kutta."""
-    found = np.empty((steps + 1, 14))
-    found[0] = x
+    found, at, slope = np.empty((steps + 1, 14)), np.empty(14), np.empty(14)
+    for i in range(14):  # loops: expressions of arrays take seconds to compile
+        found[0, i] = x[i]
     change = (end - begin) / steps
     for k in range(steps):
-        v = begin + k * change
-        x = found[k]
-        k1 = rate(x, v)
-        k2 = rate(x + 0.5 * h * k1, v + 0.5 * change)
-        k3 = rate(x + 0.5 * h * k2, v + 0.5 * change)
-        k4 = rate(x + h * k3, v + change)
-        found[k + 1] = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        v, now, after = begin + k * change, found[k], found[k + 1]
+        for i in range(14):
+            at[i] = after[i] = now[i]
+        for stage in range(4):
+            write_rate(at, v + 0.5 * ((stage + 1) // 2) * change, slope)
+            for i in range(14):
+                after[i] += h / 6.0 * (2.0 if stage in (1, 2) else 1.0) * slope[i]
+                at[i] = now[i] + (h if stage == 2 else 0.5 * h) * slope[i]
     return found
 
 
