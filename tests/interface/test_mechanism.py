@@ -126,7 +126,11 @@ def test_json_of_a_lift_has_the_promised_keys(lift):
         assert set(data["zone"][name]) == {"low", "work", "high"}
     assert set(data["contact"]["force"]) == {"low", "work", "high"}
     assert {"time", "travel", "force", "max_force", "min_force"} <= set(data["motion"])
-    assert {"max", "at"} <= set(data["reactions"]["boom_pin"])
+    pin = data["reactions"]["boom_pin"]
+    x, y = pin["components"]
+    assert len(x) == len(y) == 51
+    assert pin["max"] == pytest.approx(np.max(np.hypot(x, y)), rel=1e-3)  # at more positions
+    assert abs(pin["at"]) <= abs(data["parameters"]["travel"])
     for check in data["checks"]:
         assert {"name", "value", "limit", "ok"} <= set(check)
     assert data["parameters"]["held_pressure"] == data["contact"]["pressure"]

@@ -178,6 +178,8 @@ def test_dominant_frequency_of_a_hunting_wheelset_in_noise():
     noise = np.random.default_rng(3).normal(size=12_000)
     found = spectrum(5.0 * sine(6.3, 12.0) + noise, RATE)
     assert hunting_frequency([np.interp(FREQUENCIES, *found)]) == pytest.approx(6.3, abs=0.05)
+    lasting = spectrum(50.0 + 5.0 * sine(6.3, 12.0) + noise, RATE)[1]  # a force of a curve
+    np.testing.assert_allclose(lasting, found[1], atol=1e-9 * found[1].max())
 
 
 # statistics ---------------------------------------------------------------------------------------

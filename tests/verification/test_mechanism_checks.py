@@ -13,7 +13,7 @@ from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.cams import transitions
-from railsim.mechanisms.checks import checks
+from railsim.mechanisms.checks import _gas_spring, checks
 from railsim.mechanisms.dynamics import law_of
 from railsim.mechanisms.forces import Rates, generalised_force
 from railsim.mechanisms.kinematics import solve
@@ -241,6 +241,15 @@ def test_it_is_said_that_a_torsion_spring_is_wound_by_a_turn_too_many(tmp_path, 
     path.write_text(PENDULUM.replace("-0.7", "0.1").replace("2.4", "1.2") + rocker)
     said = [text for text in remarks(analyse(load_mechanism(path))) if "wound" in text]
     assert len(said) == abs(turns)
+
+
+@pytest.mark.parametrize(("value", "limit", "sense"), [(-5, -30, "above"), (40, 80, "below")])
+def test_a_gas_spring_is_checked_against_the_nearer_end_of_its_range(value, limit, sense):
+    spring = SimpleNamespace(temperature=value, service=(-30, 80), rod_end=None)
+    result = SimpleNamespace(model=SimpleNamespace(number=float))
+    (found,) = _gas_spring(result, "flap", spring)
+    assert (found.name, found.value, found.limit) == ("flap_temperature", value, limit)
+    assert found.sense == sense
 
 
 def test_it_is_said_that_what_is_let_go_leaves_the_travel(tmp_path):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -511,6 +512,11 @@ def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_
         "run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), (), STRAIGHT
     )
     assert found.flanges == ((1, 40.0, 50.0),)
+    for places, further in ((20, []), (22, ["Flanges touch at 2 further places."])):
+        seen = SimpleNamespace(unseen=dict, flanges=found.flanges * places)
+        said = type(found).notes.fget(seen)
+        assert all(note.startswith("A flange of wheelset 1 touches") for note in said[:20])
+        assert list(said[20:]) == further
     expected = np.interp(found.s, [80.0, 100.0], [1.0, 3.0])
     np.testing.assert_allclose(found.values[0], expected, atol=1e-12)
 
