@@ -66,11 +66,8 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
 
 
 def _title(found: CriticalSpeed) -> str:
-    where = found.conditions
-    return (
-        f"{found.vehicle}\nstraight track, rails {where['rails']}, friction {where['friction']}, "
-        f"{where['law']}"
-    )
+    rails, friction, law = (found.conditions[key] for key in ("rails", "friction", "law"))
+    return f"{found.vehicle}\nstraight track, rails {rails}, friction {friction}, {law}"
 
 
 def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
@@ -151,6 +148,8 @@ def _draw(axes: Axes, branch: Branch, values: np.ndarray) -> None:
     if marker:
         axes.plot(speed, values, ls="-" if stable.all() else DASHED, **style)
         return
+    # a piece of a ramp with few periods has no frequency
+    speed, values, stable = np.array([speed, values, stable])[:, np.isfinite(values)]
     for is_stable, line in ((True, "-"), (False, DASHED)):
         # a piece reaches to its neighbour of the other kind
         inside = stable == is_stable

@@ -112,6 +112,16 @@ def test_picture_of_a_vehicle_unstable_at_the_lower_end_says_so():
     np.testing.assert_array_equal(drawn.get_xdata(), [np.nan, 7.0, np.nan])
 
 
+def test_frequencies_of_a_ramp_are_drawn_where_not_every_piece_has_one():
+    """At 1.2 Hz every fourth piece of 1 s has two periods; points between gaps were no line."""
+    rows = zip((23.0, 22.0, 21.0, 20.0, 19.0), (1.3, np.nan, 1.2, np.nan, 1.1), strict=True)
+    branch = Branch("ramp", [Point(speed, 6e-3, frequency) for speed, frequency in rows])
+    where = {"rails": "rigid", "friction": "0.4", "law": "fastsim"}
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), "x", where, branches=[branch])
+    drawn = bifurcation_figure(found).axes[1].lines[0]
+    assert drawn.get_xydata().tolist() == [[23.0, 1.3], [21.0, 1.2], [19.0, 1.1]]
+
+
 def test_diagram_follows_what_hunts_below_its_lowest_speed():
     """Speeds of the diagram end 3.3 m/s above the fold at 66.69 m/s (N2)."""
     assert lowest_of(diagram(cooperrider.Rolling(), [70.0, 72.0])).speed == 70.0
