@@ -34,12 +34,11 @@ def irregularity_figure(found: Irregularity) -> Figure:
     axes[0].set_title(f"{found.name}: track of {found.vehicle}, with 95 % intervals")
     axes[SHOWN - 1].set_xlabel("s (m)")
     for piece in found.pieces:
-        for q in range(SHOWN):
+        for q, ls in enumerate(("-", "--", ":")):
             there = piece.power[q] > 0.0
-            axes[SHOWN].plot(
-                2.0 * np.pi / piece.wave_numbers[there], piece.seen[q, there], color=f"C{q}",
-                lw=0.9, label=QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None,
-            )  # fmt: skip
+            wavelength, seen = 2.0 * np.pi / piece.wave_numbers[there], piece.seen[q, there]
+            words = QUANTITIES[q].replace("_", " ") if piece is found.pieces[0] else None
+            axes[SHOWN].plot(wavelength, seen, color=f"C{q}", ls=ls, lw=0.9, label=words)
     axes[SHOWN].axhline(0.5, color="0.5", lw=0.8, ls="--")
     axes[SHOWN].set(xscale="log", xlabel="wavelength (m)", ylabel="share of the variance explained")
     if len(found.pieces) > 1:

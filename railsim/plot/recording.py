@@ -24,7 +24,7 @@ CHANNELS: dict[str, tuple[str, str, Callable[[Floats], Floats]]] = {
     "gauge": ("g", "Gauge, positive when wider", lambda v: v[2] - v[0]),
 }
 LOOKS = {"as read": {"color": "0.6", "lw": 0.8}, "as it acts": {"color": DISTINCT[0], "lw": 1.0}}
-ERRI = {"erri_b176_low": (DISTINCT[2], (0, (5, 2))), "erri_b176_high": (DISTINCT[1], (0, (5, 2)))}
+ERRI = {"erri_b176_low": (DISTINCT[2], "--"), "erri_b176_high": (DISTINCT[1], "-.")}
 WAVELENGTHS = (1.0, 200.0)  # m, that are shown
 SEGMENTS = 8  # of a recording at least, for its spectrum; half overlapping
 LONGEST = 400.0  # m, of a segment
@@ -96,5 +96,5 @@ def _beside(axes: Axes, channel: str) -> None:
             S = S * (2.0 * spectrum.half_base) ** 2
         label = f"{spectrum.label} (formerly ORE)"
         axes.plot(wavelength, 1e6 * S, color=colour, ls=line, lw=1.0, label=label)
-    axes.set(xscale="log", yscale="log", ylabel="$S$ (mm²·m)")
+    axes.set(xscale="log", yscale="log", ylabel="$S$ (mm²/(1/m))")
     axes.set(title="Power spectral density" if channel == "lateral" else "")

@@ -15,7 +15,7 @@ from railsim.text import unformatted
 
 MOST = 12  # channels of a picture
 LONGEST = 20_000  # values of a line
-BOTH = {"measured": "k", "simulated": DISTINCT[1]}
+BOTH = {"measured": ("k", "-"), "simulated": (DISTINCT[1], "-")}
 LIMITS = "dashed: limit of the mean; dotted: twice that of the standard deviation"
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
 
@@ -86,14 +86,15 @@ def overlays(validation: ModelValidation) -> Figure:
 
 
 def _over_arc(
-    shown: Sequence[Any], part: Callable[..., Any], lines: Mapping[str, str], lw: float
+    shown: Sequence[Any], part: Callable[..., Any], lines: Mapping[str, Any], lw: float
 ) -> Figure:
-    """Draw channels by the names of their attributes, in colours, over a part of the arc length."""
-    figure, grid = grid_of(len(shown), 1, 8.0, 1.3, 0.6)
+    """Draw channels by the names of their attributes, in looks, over a part of the arc length."""
+    figure, grid = grid_of(len(shown), 1, 8.0, 1.3, 0.8, unformatted(shown[0].run))
     for axes, one in zip(grid, shown, strict=True):
         (scale, unit), (s, rows) = _shown(one.quantity), part(one)
-        for name, colour in lines.items():
-            axes.plot(s[rows], scale * getattr(one, name)[rows], color=colour, lw=lw, label=name)
+        for name, (colour, ls) in lines.items():
+            values = scale * getattr(one, name)[rows]
+            axes.plot(s[rows], values, color=colour, ls=ls, lw=lw, label=name)
         axes.set_ylabel(f"{one.name}\n({unit})", fontsize="small")
     grid[0].legend(
         fontsize="small", ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0),
@@ -107,13 +108,12 @@ def _over_arc(
 def spectra(validation: ModelValidation) -> Figure:
     """Draw power spectral densities of measured and simulated channels of the first run."""
     shown = _first(validation.overlays)
-    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.6)
+    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.8, unformatted(shown[0].run))
     for axes, one in zip(grid, shown, strict=True):
         scale, unit = _shown(one.quantity)
-        for name, colour in BOTH.items():
-            axes.loglog(
-                *_density(one, scale * getattr(one, name)), color=colour, lw=0.9, label=name
-            )
+        for name, (colour, _) in BOTH.items():
+            density = _density(one, scale * getattr(one, name))
+            axes.loglog(*density, color=colour, lw=0.9, label=name)
         axes.set_title(one.name, fontsize="small")
         axes.set_xlabel("frequency (Hz)", fontsize="small")
         axes.set_ylabel(f"PSD (({unit})²/Hz)", fontsize="small")
@@ -138,7 +138,7 @@ def fits(found: Identified) -> Figure:
         middle = len(one.at) // 2
         return one.at, slice(middle, middle + int(4.0 / one.step))
 
-    lines = {"measured": "k", "before": DISTINCT[4], "after": DISTINCT[1]}
+    lines = {"measured": ("k", "-"), "before": (DISTINCT[4], "--"), "after": (DISTINCT[1], "-")}
     return _over_arc(_first(found.channels), part, lines, 0.8)
 
 
@@ -146,7 +146,7 @@ def fits(found: Identified) -> Figure:
 def residual_spectra(found: Identified) -> Figure:
     """Draw the cumulative periodograms of the residuals: a straight line where they are white."""
     shown = _first(found.channels)
-    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.6)
+    figure, grid = grid_of(len(shown), 3, 8.0, 1.9, 0.8, unformatted(shown[0].run))
     low, high = found.band
     for axes, one in zip(grid, shown, strict=True):
         rest = one.measured - one.after

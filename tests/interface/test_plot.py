@@ -565,6 +565,9 @@ def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(
     assert name == "record.csv"
     assert np.allclose(before[:, 1:], offsets.T, atol=1e-12)
     figure = recording_figure(before, after, "Line")
+    low, high = figure.axes[1].lines[2:]
+    assert low.get_linestyle() != high.get_linestyle()  # in black and white
+    assert figure.axes[1].get_ylabel() == "$S$ (mm²/(1/m))"  # not over rad/m: 2 pi
     for axes in figure.axes[1::2]:  # read, acts, low, high
         read, acts, low, _ = (line.get_xydata()[::-1] for line in axes.lines)
         low = low[np.argsort(low[:, 0])]

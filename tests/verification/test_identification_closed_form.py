@@ -20,6 +20,7 @@ from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import Prepared
+from railsim.plot import validation as plots
 from railsim.profiles import save_profile
 
 N, STEP, SPEED, BAND = 1200, 0.01, 20.0, (0.5, 8.0)
@@ -337,6 +338,16 @@ def test_residuals_are_white_where_chance_gives_their_statistic_once_in_a_hundre
     none = np.zeros(3)
     one = Channel("run", "Q", "Q:1:left", STEP, none, none, none, none, 1.0, 1.6, probability)
     assert one.is_white is white
+
+
+def test_pictures_name_their_run_and_lines_differ_in_black_and_white():
+    s = np.arange(600.0)
+    one = Channel("run 12", "Q1L", "Q:1:left", 0.02, s, s, s, s, 1.0, 1.6, 0.5)
+    found = SimpleNamespace(channels=(one,), band=(0.5, 20.0))
+    drawn = plots.fits(found), plots.residual_spectra(found)
+    assert [figure.get_suptitle() for figure in drawn] == ["run 12", "run 12"]
+    _, before, after = drawn[0].axes[0].lines
+    assert before.get_linestyle() != after.get_linestyle()
 
 
 def test_a_stretch_of_more_than_a_metre_in_a_kilometre_is_said(monkeypatch):

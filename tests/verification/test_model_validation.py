@@ -59,7 +59,9 @@ def test_pictures_name_quantities_in_words_and_densities_with_their_units():
     title = figure.axes[0].get_title(loc="left").replace("\n", " ")
     assert title == "guiding force, quasi-static: pass"
     assert figure.get_suptitle().startswith("coach against run\n")
-    axes = plots.spectra(found).axes[0]
+    drawn = plots.spectra(found)
+    assert [drawn.get_suptitle(), plots.overlays(found).get_suptitle()] == ["run", "run"]
+    axes = drawn.axes[0]
     assert axes.get_ylabel() == "PSD ((kN)²/Hz)"
     # a sine of 1 kN of 1/(2 pi) samples: its mean square is 0.5 kN²
     f, power = axes.lines[0].get_data()

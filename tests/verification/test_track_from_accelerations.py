@@ -540,6 +540,7 @@ def test_picture_shades_the_95_per_cent_interval_of_each_quantity():
         power=none, outputs=("lateral.1",), forces=rows[:1], force_deviations=np.zeros(1),
     )  # fmt: skip
     figure = irregularity_figure(joined("run", "coach", [piece], np.array([0.1]), (), STRAIGHT))
+    assert len({line.get_linestyle() for line in figure.axes[3].lines[:3]}) == 3
     for q, axes in enumerate(figure.axes[:3]):
         for shaded in axes.collections:
             corners = shaded.get_paths()[0].vertices
