@@ -176,8 +176,8 @@ def prepared(
 ) -> Prepared:
     """Return a measured run ready for comparison in a band of frequencies [Hz].
 
-    Raises InputError: channels that the vehicle does not have, a band above what was sampled, a run
-    too short or beyond the track.
+    Raises InputError: channels that the vehicle does not have or without any value, a band above
+    what was sampled, a run too short or beyond the track.
     """
     track = track or track_of(measurement)
     check_channels(measurement.name, measurement, model.vehicle)
@@ -220,6 +220,9 @@ def prepared(
         thinner.distance,
     )  # fmt: skip
     values = np.stack([thinner[name] for name in names])
+    if not np.isfinite(values).any():
+        found = "no value where runs are compared"
+        raise input_error(measurement.name, found, "values; 'range', 'missing'?", key="channels")
     step = 1.0 / thinner.rate
     share = np.sqrt(2.0 * (high - band[0]) / measurement.rate)
     noise = np.array([np.nan if c.noise is None else c.noise * share for c in channels])

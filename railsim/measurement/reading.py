@@ -168,7 +168,7 @@ def _channel(
     return x
 
 
-def _zeroed(name: str, how: MeasurementFile, x: Floats, time: Floats) -> Floats:
+def _zeroed(path: str, name: str, how: MeasurementFile, x: Floats, time: Floats) -> Floats:
     """Return a channel without its mean between the times of `zero`."""
     zero = how.channels[name].zero
     if zero is None:
@@ -177,7 +177,7 @@ def _zeroed(name: str, how: MeasurementFile, x: Floats, time: Floats) -> Floats:
     if not inside.any():
         found = f"no value between {zero[0]:g} and {zero[1]:g} s"
         allowed = f"times from {time[0]:g} to {time[-1]:g} s"
-        raise input_error(how.name, found, allowed, key=f"channels.{name}.zero")
+        raise input_error(path, found, allowed, key=f"channels.{name}.zero")
     return np.asarray(x - x[inside].mean())
 
 
@@ -216,7 +216,7 @@ def _measurement(
     path: str, how: MeasurementFile, clock: Clock, values: dict[str, Floats], remarks: list[str]
 ) -> Measurement:
     axes = {
-        how.channels[name].quantity: _zeroed(name, how, values.pop(name), clock.time)
+        how.channels[name].quantity: _zeroed(path, name, how, values.pop(name), clock.time)
         for name in list(values)
         if how.channels[name].quantity in ("distance", "mileage", "speed")
     }
@@ -225,13 +225,13 @@ def _measurement(
         track = load_track(how.track)
         mileage = track.mileage, track.falling_mileage
     s, speed, said = position(path, how, clock.time, axes, mileage)
-    values = _mounted(how, values, remarks)
-    values = {name: _zeroed(name, how, x, clock.time) for name, x in values.items()}
+    values = _mounted(path, how, values, remarks)
+    values = {name: _zeroed(path, name, how, x, clock.time) for name, x in values.items()}
     return Measurement(how, clock.time, s, speed, values, (*remarks, *said))
 
 
 def _mounted(
-    how: MeasurementFile, values: dict[str, Floats], remarks: list[str]
+    path: str, how: MeasurementFile, values: dict[str, Floats], remarks: list[str]
 ) -> dict[str, Floats]:
     """Return the channels with the accelerations at points of `mounting` turned back.
 
@@ -249,7 +249,7 @@ def _mounted(
         }
         if not names:
             allowed = "a point with channels of sensor_acceleration"
-            raise input_error(how.name, "no channel there", allowed, key=f"mounting.{point}")
+            raise input_error(path, "no channel there", allowed, key=f"mounting.{point}")
         still = np.zeros(len(next(iter(values.values()))))
         read = [values[names[axis]] if axis in names else still for axis in "xyz"]
         turned = np.cross(np.array(angles), np.stack(read, axis=-1))

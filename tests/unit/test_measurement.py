@@ -323,7 +323,7 @@ def test_resampling_at_its_own_rate_changes_nothing(tmp_path):
         ("file=gone.csv", "cannot be read"),
         ("file=m.toml", "the name ends in '.toml'"),
         ("rate=100.0", "either a channel of the quantity 'time' or 'rate'"),
-        ("channels.box.zero=[100.0, 200.0]", "no value between 100 and 200 s"),
+        ("channels.box.zero=[100.0, 200.0]", "m.toml: channels.box.zero: no value between 100"),
         ("channels.box.range=[1.0, -1.0]", "'range' must rise"),
         ("encoding=klingon", "unknown encoding"),
         ("channels.box.index=[0]", "leave 'index' out"),

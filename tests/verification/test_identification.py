@@ -655,6 +655,9 @@ def test_a_run_is_prepared_with_its_lead_its_speeds_and_the_noise_in_the_band(tm
         stated = [run.definition.channels[name].noise for name in one.names]
         share = np.sqrt(2.0 * (band[1] - band[0]) / RATE)
         assert one.noise == pytest.approx(share * np.array(stated), rel=1e-6)
+    none = replace(run, channels={name: np.nan * x for name, x in run.channels.items()})
+    with pytest.raises(railsim.InputError, match="channels: no value where runs are compared"):
+        prepared(none, model, (0.5, 14.0), long)  # a vehicle "identified" by nothing was written
     for shift, start in ((40.0, 0.0), (150.0, 50.0)):
         one = prepared(run.moved(shift), model, (0.5, 14.0), long).run
         first = shift + run.distance[0]
