@@ -345,6 +345,9 @@ WORK, HIGH = "parameters.zone_work", "parameters.zone_high"
         ("atr95_lift_5", "parameters.lift_speed={}", TINY, 0.0),
         ("tilting_one_spring", "parameters.temperature={}", -273.14, -273.15),
         ("tilting_one_spring", "parameters.front_progression={}", 1.0, math.nextafter(1.0, 0.0)),
+        ("tilting_one_spring", "elements.front.rod={}", TINY, 0.0),  # was divided by
+        ("tilting_one_spring", "catalogues.vapsint.AG.rod={}", TINY, 0.0),
+        ("tilting_one_spring", "catalogues.vapsint.AG.progression={}", 1.0, 0.99),
         ("atr95_lift_5", f"{LOW} {WORK}={{}} {HIGH}=0.9", 0.6, 0.59),
         ("atr95_lift_5", f"{LOW} {WORK}={{}} {HIGH}=0.9", 0.9, 0.91),
         ("atr95_lift_5", f"{LOW} {WORK}=0.6 {HIGH}={{}}", 0.61, 0.6),

@@ -141,9 +141,9 @@ class CatalogueRow(base.Definition):
 
     name: base.Text
     """Name of the series"""
-    body: parts.Quantity | None = None
+    body: parts.Positive | None = None
     """Diameter of the body [m]"""
-    rod: parts.Quantity | None = None
+    rod: parts.Positive | None = None
     """Diameter of the rod [m]"""
     stroke: tuple[parts.Quantity, parts.Quantity] | None = None
     """Smallest and largest stroke [m]"""
@@ -151,13 +151,13 @@ class CatalogueRow(base.Definition):
     """Strokes that are made [m], instead"""
     F1: tuple[parts.Quantity, parts.Quantity]
     """Smallest and largest force F1 [N]"""
-    progression: parts.Quantity | None = None
+    progression: parts.Progression | None = None
     """Progression"""
     extended: tuple[parts.Quantity, parts.Quantity] | None = None
     """Extended length as factor times stroke plus constant [1, m]"""
     F1_tolerance: tuple[tuple[parts.Quantity, parts.Quantity, parts.Quantity], ...] | None = None
     """Rows [up to F1, minus, plus] of the maker's tolerance [N]"""
-    unlock: parts.Quantity = 0.0
+    unlock: parts.NonNegative = 0.0
     """Travel beyond the range of use that unlocks it [m]"""
     lock_extension: parts.Quantity | None = None
     """Force that it holds locked against extension [N]"""

@@ -52,6 +52,7 @@ class Least(NamedTuple):
 
 Positive = Annotated[Quantity, Least(0.0, "greater than 0", excluded=True)]
 NonNegative = Annotated[Quantity, Least(0.0, "0 or greater")]
+Progression = Annotated[Quantity, Least(1.0, "1 or greater: the gas is compressed")]
 
 
 @cache
@@ -419,7 +420,7 @@ class GasSpring(Definition):
     """Its ends"""
     F1: Positive
     """Force at 20 C without friction: fully extended, or fully compressed if it pulls [N]"""
-    progression: Annotated[Quantity, Least(1.0, "1 or greater: the gas is compressed")]
+    progression: Progression
     """Ratio of the force at the other end of the stroke to `F1`"""
     stroke: Positive
     """Stroke [m]"""
@@ -439,7 +440,7 @@ class GasSpring(Definition):
     """Length of that part [m]"""
     temperature: Annotated[Quantity, Least(-273.15, "above -273.15 C", excluded=True)] = 20.0
     """Temperature of the gas [C]"""
-    rod: NonNegative | None = None
+    rod: Positive | None = None
     """Diameter of the rod [m], for the pressure of the gas"""
     rod_end: PointName | None = None
     """Point at which the rod is; it should be the lower one when compressed"""
