@@ -399,7 +399,7 @@ LABELS = {"Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "floor y", "body_z": "f
 def heat_strip(
     cells: Floats, shares: Mapping[tuple[str, float, str], Floats], length: float
 ) -> Figure:
-    """Draw one row for each vehicle, speed and quantity; red where a limit is exceeded.
+    """Draw one row for each vehicle, speed and quantity; a cross where a limit is exceeded.
 
     `cells`: begin of each along the track [m]; `length`: of each [m].
     """
@@ -408,13 +408,14 @@ def heat_strip(
     if shares:
         edges = np.append(cells, cells[-1] + length) / 1e3
         values = np.array([*shares.values()])
-        scale = matplotlib.colormaps["Blues"].with_extremes(over=LIMIT, bad="0.8")
+        scale = matplotlib.colormaps["Blues"].with_extremes(over=LIMIT, bad="none")
         mesh = axes.pcolormesh(edges, rows, values, cmap=scale, vmin=0.0, vmax=1.0)
         figure.colorbar(mesh, ax=axes, label="share of the limit", extend="max")
-        axes.set_title("Red: above the limit; grey: no run")
-    words = [
-        f"{vehicle}, {3.6 * speed:.0f} km/h, {LABELS.get(q, q)}" for vehicle, speed, q in shares
-    ]
+        row, cell = np.nonzero(values > 1.0)  # in black and white, too
+        axes.plot((edges[cell] + edges[cell + 1]) / 2.0, row + 0.5, "wx", ms=4.0)
+        axes.patch.set(hatch="////", edgecolor="0.6")
+        axes.set_title("Red with a cross: above the limit; hatched: no run")
+    words = [f"{name}, {3.6 * speed:.0f} km/h, {LABELS.get(q, q)}" for name, speed, q in shares]
     axes.set_yticks(rows[:-1] + 0.5, words)
     axes.set(xlabel="s (km)")
     axes.invert_yaxis()

@@ -8,7 +8,7 @@ from railsim.report.document import Section, as_png, document, pictures
 from railsim.table import Table
 
 MOST_ROWS = 200
-CAPTIONS = {"heat": "Largest share of each limit over the arc length; blank without a run."}
+CAPTIONS = {"heat": "Largest share of each limit over the arc length; hatched without a run."}
 METHOD = (
     "Q, Y/Q, sum Y and accelerations of the floor, low-passed at 20 Hz, Y/Q and sum Y as mean over "
     "2 m, against the limits of EN 14363. A section counts as flagged by vehicles where one of "

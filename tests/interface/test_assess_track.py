@@ -140,9 +140,13 @@ def test_the_strip_of_a_single_cell_is_as_long_as_the_cell():
 def test_the_strip_is_red_where_a_limit_is_exceeded_and_nowhere_else():
     """In darker and darker colours 1.0 looked as 0.9 and as 1.2."""
     shares = {("coach", 40.0, "sum_Y"): np.array([0.0, 0.99, 1.01, 3.0])}
-    (mesh,) = heat_strip(np.arange(4.0), shares, 1.0).axes[0].collections
+    axes = heat_strip(np.arange(4.0), shares, 1.0).axes[0]
+    (mesh,) = axes.collections
     red = [to_hex(colour) == LIMIT for colour in mesh.to_rgba(mesh.get_array()).reshape(-1, 4)]
     assert red == [False, False, True, True]
+    # in black and white red is as dark as 0.95 of the limit, and grey as 0.3
+    assert axes.lines[0].get_xydata() == pytest.approx(np.array([[2.5e-3, 0.5], [3.5e-3, 0.5]]))
+    assert axes.patch.get_hatch()
 
 
 def test_vehicles_that_hunt_are_said():
