@@ -157,13 +157,13 @@ def _parsed(text: str) -> Parameter:
     except ValueError:
         raise ValueError(f"'{':'.join(rest)}'", "numbers LOW:HIGH or LOW:HIGH:SPREAD") from None
     if len(numbers) not in (0, 2, 3):
-        raise ValueError(
-            f"{len(numbers)} numbers", "LOW:HIGH or LOW:HIGH:SPREAD, factors of the value"
-        )
+        raise ValueError(f"{len(numbers)} numbers", "LOW:HIGH or LOW:HIGH:SPREAD, as factors")
     low, high = numbers[:2] if numbers else (one.low, one.high)
     inside = 0.0 <= low < high <= 1.0 if one.is_share else 0.0 < low < 1.0 < high
     spread = numbers[2] if len(numbers) == 3 else None
-    if not inside or (spread is not None and not spread > 0.0):
+    if spread is not None and not spread > 0.0:
+        raise ValueError(f"SPREAD {spread:g}", "a share of the value above 0, such as 0.2")
+    if not inside:
         allowed = "shares 0 to 1" if one.is_share else "factors below and above 1, such as 0.5:2"
         raise ValueError(f"bounds {low:g} to {high:g}", allowed)
     return replace(one, low=low, high=high, spread=spread)

@@ -350,6 +350,7 @@ def test_tables_scale_their_forces_only():
         ([PRIMARY], {"form": "shapes"}, "history, spectra, sections"),
         ([PRIMARY], {"workers": -3}, "workers: found -3; a whole number above 0"),
         ([PRIMARY + ":2:3"], {}, "factors below and above 1"),
+        ([PRIMARY + ":0.5:2:0"], {}, "SPREAD 0; a share of the value above 0"),  # named the bounds
         ([PRIMARY, f"elements.{PRIMARY}"], {}, "z is given twice; each value once"),
         (["primary.stiffness", PRIMARY], {}, "z is given twice"),
         ([f"{PRIMARY}+{PRIMARY}"], {}, "z is given twice"),
