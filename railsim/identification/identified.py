@@ -282,7 +282,7 @@ class Identified:
                 "# deviation of the value."]  # fmt: skip
         shares = zip(self.parameters, self.factors, self.deviations, strict=True)
         head += [
-            f"# Of the track: {parameter.name} x {factor:.4g} +- {100 * spread:.2g} %."
+            f"# Of the track: {parameter.name} x {factor:.4g} {_known(spread)}."
             for parameter, factor, spread in shares
             if parameter.of_vehicle != parameter.keys
         ]
@@ -303,7 +303,7 @@ class Identified:
                 value = present(self.fitted, ".".join(whole))[1]
                 written = tomli_w.dumps({whole[-1]: value}).strip().replace("\n", " ")
                 part = keys[-1] if keys != whole else ""
-                mark = f"{written}  # [I] {part} +- {100 * spread:.2g} %"
+                mark = f"{written}  # [I] {part} {_known(spread)}"
                 tables.setdefault(".".join(whole[:-1]), []).append(" ".join(mark.split()))
         marks = "; ".join(mark for _, mark in files.values())
         for key, names in wheels.items():
@@ -312,6 +312,11 @@ class Identified:
         for table, entries in tables.items():
             lines += [f"[{table}]" if table else "", *_merged(entries), ""]
         return "\n".join(lines)
+
+
+def _known(spread: float) -> str:
+    """Return a standard deviation in words."""
+    return "not shown by the data" if spread > INFINITE else f"+- {100 * spread:.2g} %"
 
 
 def _wheels(vehicle: Vehicle, files: Mapping[str, tuple[str, str]]) -> dict[str, list[str]]:

@@ -381,10 +381,14 @@ def test_a_bound_that_keeps_the_value_out_is_said(found, low):
     assert not one.unidentified
 
 
-def test_what_nothing_shows_has_no_deviation_and_no_end_in_the_table(found):
-    one = found[0]
+def test_what_nothing_shows_has_no_deviation_and_no_end_in_the_table(found, tmp_path):
+    one, base = found[0], tmp_path / "base.toml"
+    base.write_text(quarter().to_toml())
     covariance = one.covariance.copy()
     covariance[1, 1] = 1e12
+    path = replace(one, covariance=covariance).save_vehicle(tmp_path / "fitted.toml", base)
+    text = path.read_text()
+    assert [text.count(" not shown by the data"), text.count(" +- ")] == [1, 2]  # 1e+08 %
     table = str(replace(one, covariance=covariance).table()).splitlines()
     (line,) = (line for line in table if DAMPER in line)
     value = f"{one.factors[1] * 2e4:.5g}"
