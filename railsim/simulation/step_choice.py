@@ -24,6 +24,7 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import ModelError, input_error
 from railsim.kernels.actuators import BY_BRAKE, LIMIT, MODE
+from railsim.kernels.check_rails import DAMPING, STIFFNESS
 from railsim.kernels.driving import BRAKES_FULLY
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.system import BRAKES, RADIUS, System
@@ -42,6 +43,7 @@ CLASS = 1.2  # ratio of the speeds of a class
 WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
 HELD, DRY = 1.6, 0.5  # z in `braked_step`; friction of dry rails
+GUIDED = 0.4, 0.6  # h c/m and h sqrt(k/m) in `check_rail_step`
 MOST_JUDGED = 10_000
 ALIGNMENT = {"name", "source", "speed", "plan", "cant", "rounding"}  # of a track
 # whether steps hold in classes that this process has judged or read, by a hash of all inputs
@@ -83,7 +85,9 @@ class StepChoice:
         self._known: dict[float, float] = {}
         self._classes: dict[str, Stability] = {}
         self._states = states
-        self._braked = braked_step(model.system)
+        lightest = model.system.bodies.mass[model.system.contact.body].min()
+        guided = check_rail_step(model.check.check, float(lightest))
+        self._followed = min(braked_step(model.system), guided)
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
 
@@ -96,7 +100,7 @@ class StepChoice:
         longest = self._known.get(key) or self._choose(key, interval)
         self._known[key] = longest
         if self._settings.step is None:
-            longest = min(longest, self._model.wheels.longest_step(speed), self._braked)
+            longest = min(longest, self._model.wheels.longest_step(speed), self._followed)
         longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         for finer in range(every, 2 * every + 1) if self._periods else ():
@@ -278,6 +282,16 @@ def braked_step(system: System) -> float:
     braked = np.flatnonzero(torque)
     rate = torque[braked] * bodies.row[braked, RADIUS] / bodies.inertia[braked, 1] / BRAKES_FULLY
     return HELD / float(rate.max()) if len(braked) else math.inf
+
+
+def check_rail_step(check: Floats, mass: float) -> float:
+    """Longest step that follows a wheelset on check rails [s]; `mass`: of the lightest one [kg].
+
+    On the damping c of a rail steps are stable up to h c/m = 1, on its stiffness k up to
+    h sqrt(k/m) = 2, and forces are right well below; the judged map knows no check rails.
+    """
+    rate = check[:, DAMPING] / mass / GUIDED[0], np.sqrt(check[:, STIFFNESS] / mass) / GUIDED[1]
+    return float(np.min(1.0 / np.maximum(*rate), initial=math.inf))
 
 
 def inputs_hash(

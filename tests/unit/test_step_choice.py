@@ -136,7 +136,7 @@ def test_steps_divide_the_output_interval_and_the_periods_of_controllers(
     wheels = SimpleNamespace(longest_step=lambda speed: math.inf)
     steps._settings, steps._model = Settings(output_rate=200.0, step=given), SimpleNamespace()
     steps._model.wheels, steps._known, steps._periods = wheels, {20.0: given or 2e-3}, periods
-    steps._braked, steps.varies, steps.smallest = braked, False, math.inf
+    steps._followed, steps.varies, steps.smallest = braked, False, math.inf
     step, every = steps.at(20.0)
     assert (step, every) == (pytest.approx(5e-3 / count), count)
     assert steps.smallest == step

@@ -7,6 +7,7 @@ import pytest
 
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.settings import Settings
 from railsim.definitions.track.check_rail import CheckRail
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError
@@ -149,6 +150,25 @@ def test_check_rail_that_is_out_of_reach_changes_nothing():
     mine, plain = simulate(coach, curve([far]), **how), simulate(coach, curve(), **how)
     np.testing.assert_array_equal(mine["Q"], plain["Q"])
     assert not mine["check_rail_force"].any()
+
+
+def test_the_step_follows_a_wheelset_on_a_strongly_damped_check_rail():
+    """No longer than 0.4 m/c; at 2.5 ms, h c/m = 2.8, the force would be 308 instead of 73 kN."""
+    damping, mass = 2e6, 1813.0
+    flangeway = [[11.0, 0.06], [13.0, 0.034], [60.0, 0.034]]
+    track = load_track("straight").replace(
+        check_rail=[{"rail": "right", "flangeway": flangeway, "damping": damping}]
+    )
+
+    def run(step=None):
+        how = {"speed": 10.0, "duration": 0.8, "settings": Settings(step=step)}
+        result = simulate(load_vehicle("coach_manchester"), track, **how)
+        return result.attributes["step"], result["check_rail_force"].max()
+
+    step, force = run()
+    assert step == pytest.approx(5e-3 / np.ceil(5e-3 / (0.4 * mass / damping)))
+    assert force > 5e4
+    assert force == pytest.approx(run(0.5 * step)[1], rel=5e-3)
 
 
 @pytest.mark.parametrize(
