@@ -13,9 +13,10 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.contact.table import TableGrid
+from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, COMMAND, MODE
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.system import DIVIDED, UNSETTLED, Support
+from railsim.kernels.system import DIVIDED, UNSETTLED, Support, System
 from railsim.kernels.vibration import (
     ALTERNATES_AT,
     ALTERNATION,
@@ -38,6 +39,8 @@ VIBRATES = 0.05  # amplitude of a wheel load over the static one
 # amplitude of a guiding force from step to step over the static wheel load; the second where steps
 # are divided: flanges that strike have part of it
 ALTERNATES = 0.005, 0.02
+# h c/m of a commanded damper, m of the lighter body: a pair of yaw dampers alternates from there on
+COMMANDED = 0.3
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
 YAW_MAX = TableGrid().yaw_max
@@ -62,7 +65,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
     wheelsets, support = model.index.wheelsets, model.system.support
     uneven, hunts = model.wheels.uneven, swings is not None
     irregular = bool(model.system.track.has_irregularity or len(model.rails.ends))
-    duration = float(run.state[TIME] - prepared.state[TIME])
+    duration, smallest = float(run.state[TIME] - prepared.state[TIME]), prepared.steps.smallest
     found = [
         *run.remarks,
         *prepared.remarks,
@@ -86,6 +89,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             hunts=hunts,
         ),
         alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
+        commanded_dampers(model.system, model.index.actuators, run.work.memory, smallest),
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2])),
         unsettled_rails(int(run.work.parts[UNSETTLED])),
@@ -251,6 +255,21 @@ def alternation(measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided:
         f"may be held in a state that is none of its own; compare with half the step "
         f"(--check-step)."
     )
+
+
+def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step: float) -> str:
+    """Remark on a damper whose last command is too large for the step [s], chosen without it."""
+    acts, bodies = system.actuators, system.bodies
+    for i in np.flatnonzero(acts.which[:, MODE] == BY_DAMPER):
+        about = acts.which[i, ACTION] - ABOUT
+        of = bodies.inertia[:, (0, 1, 2, 1)[about]] if about >= 0 else bodies.mass
+        if step * (constant := memory[acts.which[i, COMMAND]]) > COMMANDED * of[acts.body[i]].min():
+            return (
+                f"The damper {names[i]} was commanded {constant:.3g} at the end. The step of "
+                f"{1e3 * step:.3g} ms was chosen without commands, and the force of such a damper "
+                "may alternate from step to step: compare with half the step (--check-step)."
+            )
+    return ""
 
 
 def vibration(

@@ -175,6 +175,22 @@ def test_limited_power_accelerates_by_the_root_of_time():
     assert gained == pytest.approx(4.0 * power / ROTATING, rel=5e-3)
 
 
+@pytest.mark.parametrize(("share", "said"), [(1.02, True), (0.5, False)])
+def test_a_damper_commanded_beyond_the_step_is_remarked_upon(share, said):
+    """A pair on the frame's yaw alternates from h 2 c y^2/I = 1 on, by Adams and Bashforth."""
+    coach, y = railsim.load_vehicle("coach_manchester"), 1.3
+    usual = {"kind": "actuator", "bodies": ["carbody", "front.frame"], "command": "damper"}
+    pair = {f"of_yaw_{k}": {**usual, "point": [9.5, k * y, -0.6], "acts": "x"} for k in (-1, 1)}
+    coach = coach.replace(elements={**coach.elements, **pair})
+    inertia = coach.assemblies["bogie"].bodies["frame"].inertia[2]
+    with railsim.Simulation(coach, load_track("straight"), speed=20.0, duration=0.05) as sim:
+        for name in pair:
+            sim.set(name, share * inertia / (2.0 * sim.step_length * y**2))
+        sim.step(0.05)
+        found = [remark for remark in sim.result().remarks if "commanded" in remark]
+    assert bool(found) == said
+
+
 @pytest.mark.parametrize(
     ("brakes", "actuator", "torque"),
     [
