@@ -26,6 +26,7 @@ from railsim.errors import ModelError, input_error
 from railsim.kernels.actuators import BY_BRAKE, LIMIT, MODE
 from railsim.kernels.check_rails import DAMPING, STIFFNESS
 from railsim.kernels.driving import BRAKES_FULLY
+from railsim.kernels.element_columns import LINK_COLUMNS
 from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.system import BRAKES, RADIUS, System
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
@@ -192,6 +193,7 @@ class StepChoice:
         self, model: Model, speed: float, state: Floats | None, *, of_class: bool = False
     ) -> Stability:
         rolling = equilibrium(model, speed, self._inputs).state if state is None else state
+        model = replace(model, system=with_steepest_dampers(model.system))
         level = level_track_with_friction(model.system)
         if len(rows := model.system.support.variation):  # judged on the stiffest rails
             support = model.system.support._replace(variation=rows.max(axis=0, keepdims=True))
@@ -282,6 +284,21 @@ def braked_step(system: System) -> float:
     braked = np.flatnonzero(torque)
     rate = torque[braked] * bodies.row[braked, RADIUS] / bodies.inertia[braked, 1] / BRAKES_FULLY
     return HELD / float(rate.max()) if len(braked) else math.inf
+
+
+def with_steepest_dampers(system: System) -> System:
+    """Return the system with dampers that are as steep at rest as their tables are elsewhere."""
+    links, curves = system.links, system.curves
+    row, curve = links.row.copy(), links.curve.copy()
+    for e in np.flatnonzero(curve[:, 1] >= 0):
+        first, end = curves.start[curve[e, 1] : curve[e, 1] + 2]
+        speed, force = curves.x[first:end], curves.f[first:end]
+        slope = np.diff(force) / np.diff(speed)
+        at_rest = np.clip(np.searchsorted(speed, 0.0, side="right") - 1, 0, len(slope) - 1)
+        if slope.max() > slope[at_rest]:
+            row[e, LINK_COLUMNS["damping"]] += slope.max()
+            curve[e, 1] = -1
+    return system._replace(links=links._replace(row=row, curve=curve))
 
 
 def check_rail_step(check: Floats, mass: float) -> float:

@@ -72,6 +72,19 @@ def test_dry_friction_is_followed_in_short_steps():
     assert steps.at(15.0)[0] == pytest.approx(1.25e-3)
 
 
+def test_step_follows_dampers_that_are_steeper_away_from_rest():
+    """Two of c on a frame of the mass m: Adams and Bashforth's method is stable to h 2 c/m = 1."""
+    coach, c = load_vehicle("coach_manchester"), 0.8e6
+    bogie = coach.assemblies["bogie"].model_dump(exclude_none=True)
+    damper = bogie["elements"]["secondary_lateral_damper"]
+    for key in ("damping", "series_stiffness"):
+        del damper[key]
+    damper["damper_table"] = [[0.0, 0.0], [0.02, 400.0], [0.03, 400.0 + 0.01 * c]]
+    vehicle = coach.replace(assemblies={"bogie": bogie})
+    steps = prepare(vehicle, load_track("straight"), Settings(), 20.0, duration=1.0).steps
+    assert steps.at(20.0)[0] < bogie["bodies"]["frame"]["mass"] / (2.0 * c)
+
+
 def test_outputs_as_dense_as_the_steps_take_one_step_each():
     vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
     settings = Settings(output_rate=2000.0)
