@@ -90,11 +90,10 @@ class Division(NamedTuple):
 RIGID, PART_RK4 = Division(1e-4, 0.15, 0.08, 10.0), 2.5e-4
 # no such vibration follows a strike
 ELASTIC = Division(1.25e-3 / 3.0, 0.2, 0.2, 4.0)
-# rails with masses vibrate on the contact at some 700 Hz: the blow of a flat lasts 0.7 ms
-MASSES = ELASTIC._replace(part=2.5e-5)
-# where these change their section, as at the nose of a crossing, a blow is not foreseen in a step
-# as long as the transfer: 62 instead of 80 kN as elsewhere (`wagon_y25`, p2, 10 m/s)
-NOSES = MASSES._replace(part=1e-5, at_sections=40.0)
+# rails with masses vibrate on the contact at some 700 Hz: the blow of a flat lasts 0.7 ms.  Where
+# they change their section, as at the nose of a crossing, it is not foreseen in a step as long as
+# the transfer: Q of 62 instead of 80 kN as elsewhere (`wagon_y25`, p2, 10 m/s)
+MASSES = ELASTIC._replace(part=1e-5, at_sections=40.0)
 # s, on rails with masses `change` is that of a step as long as this, and in proportion of shorter
 # ones: what they lose of a vibration goes with the rate of the force
 CHANGE_WITHIN = 1e-3
@@ -149,8 +148,7 @@ def divide_strikes(system: System, work: Work, scheme: int, step: float, speed: 
     """
     how = ELASTIC if system.support.elastic else RIGID
     if system.support.elastic and not system.support.massless:
-        how = NOSES if len(system.contact.rails.range_row) else MASSES
-        how = how._replace(change=how.change * min(1.0, step / CHANGE_WITHIN))
+        how = MASSES._replace(change=MASSES.change * min(1.0, step / CHANGE_WITHIN))
     part = min(longest_part(system, speed), how.part if scheme == FAST else PART_RK4)
     parts = math.ceil(step / part * (1.0 - 1e-9))
     work.parts[PARTS] = parts if parts > 1 else 0

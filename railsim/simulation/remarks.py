@@ -65,7 +65,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
     wheelsets, support = model.index.wheelsets, model.system.support
     uneven, hunts = model.wheels.uneven, swings is not None
     irregular = bool(model.system.track.has_irregularity or len(model.rails.ends))
-    duration, smallest = float(run.state[TIME] - prepared.state[TIME]), prepared.steps.smallest
+    duration = float(run.state[TIME] - prepared.state[TIME])
     found = [
         *run.remarks,
         *prepared.remarks,
@@ -89,7 +89,9 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             hunts=hunts,
         ),
         alternation(run.work.vibration, Q0, wheelsets, int(run.work.parts[DIVIDED])),
-        commanded_dampers(model.system, model.index.actuators, run.work.memory, smallest),
+        commanded_dampers(
+            model.system, model.index.actuators, run.work.memory, prepared.steps.smallest
+        ),
         creep_range(int(run.events[1]), int(run.events[0])),
         yaw_range(int(run.events[2])),
         unsettled_rails(int(run.work.parts[UNSETTLED])),
@@ -260,7 +262,7 @@ def alternation(measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided:
 def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step: float) -> str:
     """Remark on a damper whose last command is too large for the step [s], chosen without it."""
     acts, bodies = system.actuators, system.bodies
-    for i in np.flatnonzero(acts.which[:, MODE] == BY_DAMPER):
+    for i in np.flatnonzero(acts.which[:, MODE] == BY_DAMPER).tolist():
         about = acts.which[i, ACTION] - ABOUT
         of = bodies.inertia[:, (0, 1, 2, 1)[about]] if about >= 0 else bodies.mass
         if step * (constant := memory[acts.which[i, COMMAND]]) > COMMANDED * of[acts.body[i]].min():
