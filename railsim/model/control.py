@@ -71,6 +71,7 @@ class _Wiring:
         self._blocks.address = model.system.own.places.tolist()
         self._faults: list[Fault] = []
         self._wires: list[int] = []
+        self._commanded: dict[str, str] = {}  # controllers by their actuators
 
     def fault(self, key: str, found: str, allowed: str) -> None:
         """Take note of what is wrong at a key of the vehicle."""
@@ -149,6 +150,10 @@ class _Wiring:
         for output in controller.outputs:
             actuators = self._model.index.actuators
             self._wires.append(self._number(actuators, output, f"{key}.outputs", "actuator"))
+            if output in self._commanded:
+                found = f"found '{output}', which controllers.{self._commanded[output]} commands"
+                self.fault(f"{key}.outputs", found, "each actuator once")
+            self._commanded[output] = name
         for argument, signal in controller.inputs.items():
             signals = tuple(self._vehicle.signals or {})
             self._wires.append(self._number(signals, signal, f"{key}.inputs.{argument}", "signal"))

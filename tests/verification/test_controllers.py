@@ -6,6 +6,7 @@ import pytest
 import railsim
 from railsim import laws
 from railsim.assessment.weighting import WF
+from railsim.errors import InputError
 from railsim.linear.closed_loop import closed_loop
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.vehicle import LinearVehicle
@@ -148,6 +149,24 @@ def test_a_tilted_car_body_feels_less(coach, sign):
     assert tilted > 0.07  # 0.1 rad less what springs and wheels yield
     expected = a_q * np.cos(tilted) - g_n * np.sin(tilted)
     assert abs(sign * np.mean(felt) - expected) < 0.005 * a_q
+
+
+def test_an_actuator_has_one_controller(coach):
+    """The last command alone would count; named twice in one controller as in two."""
+    held = {"point": [0.0, 0.0, -0.9], "acts": "roll", "command": "position", "stiffness": 50e6}
+    one = {"law": "tilt", "period": 0.01, "inputs": {"curvature": "c"}, "parameters": {"arm": 1.0}}
+    vehicle = coach.replace(
+        assemblies=bogie_with(coach, {**held, "damping": 2e6}),
+        laws={"tilt": laws.law(tilt)},
+        signals={"c": {"quantity": "curvature"}},
+        controllers={
+            "first": {**one, "outputs": ["front.act", "front.act"]},
+            "second": {**one, "outputs": ["rear.act", "front.act"]},
+        },
+    )
+    words = r"first.outputs: found 'front.act', which controllers.first commands(.|\n)*second.outp"
+    with pytest.raises(InputError, match=words):
+        railsim.simulate(vehicle, railsim.load_track("straight"), speed=20.0, duration=0.1)
 
 
 def test_weighting_of_motion_sickness():
