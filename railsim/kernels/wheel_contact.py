@@ -10,9 +10,7 @@ from railsim.kernels.branches import rarely
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
-    B_ACROSS,
     B_CHANGE,
-    B_HEIGHT,
     B_K,
     B_K2,
     B_LEAD,
@@ -91,10 +89,10 @@ from railsim.kernels.rails import (
 from railsim.kernels.state import SPEED, velocity_begin
 from railsim.kernels.status import RUNNING, WHEEL_LIFT, YAW_RANGE
 from railsim.kernels.support import SKIP
-from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, SIN_ROLL, Y_0, Z_0
+from railsim.kernels.system import AHEAD, AT_SECTIONS, COS_ROLL, SIDEWAYS, SIN_ROLL, Y_0, Z_0
 from railsim.kernels.table_ends import LIFT_RANGE, all_far, beside_sections, outside, without_rail
 from railsim.kernels.track_frame import OMEGA
-from railsim.kernels.wheel_surface import note_surfaces
+from railsim.kernels.wheel_surface import note_surfaces, raise_gap
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
@@ -341,14 +339,6 @@ def wheel_on_rails(system, work, w, side, state, wheel, highest, s, piece, n):
 
 
 @compiled(inline=True)
-def raise_gap(look_up, first, bump, patch, shear):
-    """Take the height of a wheel that is not round from the gap of a patch and its gradients."""
-    look_up[first] -= bump[patch, B_HEIGHT]
-    look_up[first + G_Y] -= bump[patch, B_ACROSS]
-    look_up[first + G_ROLL] += shear * bump[patch, B_ACROSS]
-
-
-@compiled(inline=True)
 def closing_distance(work, side, wheel):
     """How far a patch may come closer during the next step, a steep flange from the side [m]."""
     change = work.rate_change
@@ -401,6 +391,9 @@ def patch_contact(system, work, w, side, patch, wheel, n):
     deep = sqrt(deepest)
     gained = deepest * deep * (t[k + 1] + deep * t[k + 2]) - elastic
     soon = max(soon, gained / max(ahead, SHORTEST))
+    if rarely(work.watch[AT_SECTIONS] > 1.0):  # rails with masses: a blow begins with the damping
+        fades = min(1.0, deepest / FADE) - min(1.0, inside / FADE)
+        soon += contact.damping * fades * change / max(ahead, SHORTEST)
     soon *= max(1.0, work.watch[SIDEWAYS] * abs(t[k + G_Y]))
     work.force_rate[w] = max(work.force_rate[w], soon)
     if p > 0.0:

@@ -28,7 +28,7 @@ from railsim.kernels.contact_columns import (
     B_RATE,
     BUMP_SIZE,
 )
-from railsim.kernels.contact_table import N_PATCH, TREAD
+from railsim.kernels.contact_table import G_ROLL, G_Y, N_PATCH, TREAD
 from railsim.kernels.rail_parts import lowest_gap, near_range, place_on_rails, plain_gap
 from railsim.kernels.rails import ASIDE, ROLL
 from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
@@ -195,3 +195,11 @@ def foreseen_heights(system, work, state, w, track, first):
                 low, fall = lowest_gap(contact.rails, piece, s, y)
                 track[first + side] += plain_gap(contact.rails, piece, y) - low
                 track[first + 2 + side] -= fall * state[SPEED]
+
+
+@compiled(inline=True)
+def raise_gap(look_up, first, bump, patch, shear):
+    """Take the height of a wheel that is not round from the gap of a patch and its gradients."""
+    look_up[first] -= bump[patch, B_HEIGHT]
+    look_up[first + G_Y] -= bump[patch, B_ACROSS]
+    look_up[first + G_ROLL] += shear * bump[patch, B_ACROSS]
