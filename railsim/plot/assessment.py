@@ -266,6 +266,10 @@ def _names(assessments: Sequence[Assessment]) -> str:
     return "\n".join(map(unformatted, [*dict.fromkeys(names)][:4]))
 
 
+def _at_speed(assessment: Assessment, run: str) -> str:
+    return f"{run}, {3.6 * assessment.driven[run][0]:.0f} km/h"
+
+
 Runs = Sequence[tuple[float, Sequence[PointComfort]]]
 """Speeds with the comfort at every measuring point."""
 
@@ -299,7 +303,7 @@ def _classes(axes: Axes, assessments: Sequence[Assessment]) -> None:
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean comfort and Sperling's index along the car, a line for each run."""
     figure, mean, index = _comfort_axes(assessments, 9.6, 3.8, "along the car, forwards (m)")
-    runs = [pair for assessment in assessments for pair in assessment.comfort.items()]
+    runs = [(_at_speed(a, run), points) for a in assessments for run, points in a.comfort.items()]
     for number, (run, points) in enumerate(runs):
         ordered = sorted(points, key=lambda point: point.place)
         x = [point.place for point in ordered]
@@ -319,7 +323,7 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
 
 def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean wear number and rail damage of every wheel; damage over wear number, shakedown map."""
-    runs = [(run, wheels) for a in assessments for run, wheels in a.wear.items()]
+    runs = [(_at_speed(a, run), wheels) for a in assessments for run, wheels in a.wear.items()]
     figure = Picture(7.6, 7.0, _names(assessments))
     (energy, damage), (life, map_) = figure.subplots(2, 2)
     damage.sharey(energy)

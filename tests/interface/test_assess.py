@@ -547,11 +547,14 @@ def test_wear_of_a_known_wear_number():
     assert 1e9 * right.worn_area["pearce_sherratt"] == pytest.approx(0.1560, rel=5e-4)
     assert left.percentiles["95"] == pytest.approx(65.0, abs=left.bound)
     # a wagon of two wheelsets first: those of the coach that it has not had no names
-    wagon = replace(found, vehicle="wagon", wear={"x": next(iter(found.wear.values()))[:4]})
+    ((run, wheels),) = found.wear.items()
+    wagon = replace(found, vehicle="wagon", wear={run: wheels[:4]})
     figure = assessment_figure([wagon, found])
     places = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    assert places == [wheel.place for wheel in next(iter(found.wear.values()))]
+    assert places == [wheel.place for wheel in wheels]
     assert figure.get_suptitle().split("\n")[0] == "wagon"
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels == [f"{run}, {3.6 * FAST:.0f} km/h"] * 2
 
 
 def with_patches(whole, patches):
