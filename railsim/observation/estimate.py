@@ -19,6 +19,7 @@ from railsim.table import Column, Table
 BANDS = {"D1": (3.0, 25.0), "D2": (25.0, 70.0)}  # wavelengths of EN 13848-1 [m]
 LETTERS = ("y", "z", "cross_level", "gauge")  # columns of a recording
 MILLI, KILO = 1e3, 1e-3
+LISTED, NEAR = 8, 10.0  # ranges in a sentence; flanges touch no farther apart at one place [m]
 SEEN = 0.5  # share of the variance that the channels explain, below which nothing is filled in
 FILES = ("recording.csv", "track.toml", "estimates.csv", "forces.csv")
 
@@ -134,15 +135,14 @@ class Irregularity(Estimated):
         for name, ranges in self.unseen().items():
             words = name.replace("_", " ")
             if ranges:
-                spans = ", ".join(f"{a:g} to {b:g} m" for a, b in ranges[:8])
-                more = f" and {len(ranges) - 8} further ranges" if len(ranges) > 8 else ""
-                said.append(f"Wavelengths not seen and not filled in, {words}: {spans}{more}.")
-        for wheelset, begin, end in self.flanges[:20]:
-            said.append(
-                f"A flange of wheelset {wheelset} touches from s = {begin:.0f} to {end:.0f} m: the "
-                "alignment there is less certain than its interval says.")  # fmt: skip
-        if len(self.flanges) > 20:
-            said.append(f"Flanges touch at {len(self.flanges) - 20} further places.")
+                spans = _listed([f"{a:g} to {b:g}" for a, b in ranges], "ranges")
+                said.append(f"Wavelengths not seen and not filled in, {words}: {spans}.")
+        for wheelset in dict.fromkeys(w for w, _, _ in self.flanges):
+            ends = [(f"{a:.0f}", f"{b:.0f}") for w, a, b in self.flanges if w == wheelset]
+            places = [a if a == b else f"{a} to {b}" for a, b in ends]
+            said.append(f"A flange of wheelset {wheelset} touches at s = "
+                        f"{_listed(places, 'places')}: the alignment there is less certain than "
+                        "its interval says.")  # fmt: skip
         return tuple(said)
 
     def record(self) -> dict[str, Any]:
@@ -283,8 +283,8 @@ def joined(
     touching = []
     for w, clearance in enumerate(clearances):
         lateral = whole.forces[whole.outputs.index(f"lateral.{w + 1}")]
-        places = stretches(np.abs(lateral) > clearance)
-        touching += [(w + 1, float(s[a]), float(s[b - 1])) for a, b in places]
+        places = [(s[a], s[b - 1]) for a, b in stretches(np.abs(lateral) > clearance)]
+        touching += [(w + 1, float(a), float(b)) for a, b in _merged(places, 1.0, NEAR)]
     return Irregularity(
         **vars(whole), name=name, vehicle=vehicle, pieces=tuple(pieces), flanges=tuple(touching),
         remarks=tuple(dict.fromkeys(remarks)), track=track,
@@ -300,15 +300,23 @@ def _share(piece: Estimate, number: int, band: tuple[float, float]) -> float:
     return float(np.sum(power * piece.seen[number, inside]) / total) if total else float("nan")
 
 
-def _merged(ranges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return ranges of wavelengths that overlap, or nearly touch, as one."""
+def _merged(
+    ranges: Sequence[tuple[float, float]], factor: float = 1.05, apart: float = 0.0
+) -> list[tuple[float, float]]:
+    """Return ranges that overlap or nearly touch as one: by a factor, or so far apart."""
     found: list[tuple[float, float]] = []
     for low, high in ranges:
-        if found and low <= 1.05 * found[-1][1]:
+        if found and low <= factor * found[-1][1] + apart:
             found[-1] = (found[-1][0], max(found[-1][1], high))
         else:
             found.append((low, high))
     return found
+
+
+def _listed(places: Sequence[str], kind: str) -> str:
+    """Return the first places or ranges [m] in words, and how many more there are."""
+    more = f" and {len(places) - LISTED} further {kind}" if len(places) > LISTED else ""
+    return f"{', '.join(places[:LISTED])} m{more}"
 
 
 def _csv(path: Path, columns: Mapping[str, Floats]) -> None:

@@ -5,9 +5,10 @@ that it has come over, and the forces of its wheels, each with its standard devi
 are alignment, level, cross level and gauge with the powers of a spectrum, and for each wheelset the
 accelerations in y, z, roll and yaw that the linear contact leaves out (`contact.py`).
 
-The linear model is one of straight track and constant speed; what it lacks is in the simulated runs
-by which its estimate is put right (`simulated.py`).  In curves the contact of the linear model is
-that of the sharpest place of a piece.  A run is divided into pieces (`pieces.py`).
+The linear model is one of straight track and constant speed; what a simulated run reads without
+irregularities is taken off before, what it lacks else is in the runs by which its estimate is put
+right (`simulated.py`).  With these its contact is that of the sharpest place of a piece.  A run is
+divided into pieces (`pieces.py`).
 """
 
 from collections.abc import Callable
@@ -111,11 +112,11 @@ def irregularity(
     `measurement`: With channels ``sensor_acceleration:POINT:AXIS`` or ``sensor_roll_rate:POINT``.
     `vehicle`, `track`: The vehicle that measured; plan, rails, gauge, friction and support of the
     track. `assumed`: Spectrum and noise. `simulations`: Most simulated runs for a piece of at most
-    2 km, see `railsim.observation.simulated`; 0 for the linear estimate, which knows neither
-    curves nor speeds that change. `progress`: Called repeatedly with the finished fraction. Raises
-    InputError: No channel that can be used, points that the vehicle does not have, a record too
-    short or too slow, channels that are all much larger or smaller than is assumed. Raises
-    ModelError: The vehicle cannot be linearised, or does not complete the run that does so.
+    2 km, see `railsim.observation.simulated`; 0 for the linear estimate, whose contact knows
+    neither curves nor speeds that change. `progress`: Called repeatedly with the finished
+    fraction. Raises InputError: No channel that can be used, points that the vehicle does not have,
+    a record too short or too slow, channels that are all much larger or smaller than is assumed.
+    Raises ModelError: The vehicle cannot be linearised, or does not complete a run for it.
     """
     assumed = assumed or Assumed()
     assumed.check()
@@ -127,7 +128,7 @@ def irregularity(
         remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")
     pieces = pieces_of(measurement, list(used))
     begin, end = measurement.distance[[0, -1]].tolist()
-    if simulations and not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
+    if not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
         found_words, allowed = f"{begin:.0f} to {end:.0f} m", f"0 to {track.length:.0f} m"
         allowed += f" as track '{track.name}' has it, on which the run is simulated"
         raise input_error(measurement.name, found_words, allowed, "distance")
@@ -153,8 +154,8 @@ def _curves(track: Track, measurement: Measurement) -> list[str]:
         return []
     low, high = min(c.begin for c in curved), max(c.end for c in curved)
     return [
-        f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear model is one "
-        "on straight track: neither the estimate nor its standard deviations are to be relied "
+        f"The track has curves between s = {low:.0f} and {high:.0f} m; the linear contact is that "
+        "of straight track: neither the estimate nor its standard deviations are to be relied "
         "upon there; simulated runs know the curves."
     ]
 
@@ -238,11 +239,12 @@ class _Smooth:
         outputs = dict(zip(self.used, self.filters, strict=True))
         run = SimulatedRun(self.vehicle, self.track, piece, outputs, list(names))
         read = piece.signals
-        if self.simulations and not run.is_steady:
+        base = np.tile(response.steady[forces][:, None], n)
+        if not run.is_steady:
             smooth = run(np.zeros((len(QUANTITIES), points)))
             if isinstance(smooth, str):
                 raise ModelError(f"the run over the track without irregularities: {smooth}")
-            read = read - smooth.channels
+            read, base = read - smooth.channels, smooth.forces
         there = self._there(powers, piece, read)
         sizes = likely_sizes(powers, spectra_of(read, there, points))
         # what the contact leaves out goes with the irregularities: its size does not show yet
@@ -250,7 +252,6 @@ class _Smooth:
         covariance = fields.covariance()
         padded = (0, 0), (0, points - n)
         mean = fields.mean(np.pad(read, padded), np.pad(there, padded))
-        base = np.tile(response.steady[forces][:, None], n)
         if self.simulations:
             found = self._refined(piece, run, powers, sizes, whole[:, forces], mean, there)
             covariance, mean, base = found or (covariance, mean, base)
