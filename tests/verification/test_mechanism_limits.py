@@ -348,6 +348,13 @@ WORK, HIGH = "parameters.zone_work", "parameters.zone_high"
         ("tilting_one_spring", "elements.front.rod={}", TINY, 0.0),  # was divided by
         ("tilting_one_spring", "catalogues.vapsint.AG.rod={}", TINY, 0.0),
         ("tilting_one_spring", "catalogues.vapsint.AG.progression={}", 1.0, 0.99),
+        ("tilting_one_spring", "catalogues.vapsint.AG.F1=[800.0,{}]", 800.0, 100.0),
+        ("tilting_one_spring", "catalogues.vapsint.AG.F1=[{},800.0]", TINY, 0.0),
+        ("tilting_one_spring", "catalogues.vapsint.AG.stroke=[0.1,{}]", 0.1, 0.09),
+        ("tilting_one_spring", "catalogues.airax.0.strokes={}", "[0.1]", "[]"),
+        ("tilting_one_spring", "catalogues.airax.0.strokes=[{},0.1]", TINY, 0.0),
+        ("tilting_one_spring", "catalogues.vapsint.AG.F1_tolerance=[[500,{},0]]", 0.0, -TINY),
+        ("tilting_one_spring", "catalogues.vapsint.AG.F1_tolerance=[[{},0,0]]", TINY, 0.0),
         ("atr95_lift_5", f"{LOW} {WORK}={{}} {HIGH}=0.9", 0.6, 0.59),
         ("atr95_lift_5", f"{LOW} {WORK}={{}} {HIGH}=0.9", 0.9, 0.91),
         ("atr95_lift_5", f"{LOW} {WORK}=0.6 {HIGH}={{}}", 0.61, 0.6),

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.base import Definition, Remark
-from railsim.definitions.mechanism.definition import RESULTS, Mechanism
+from railsim.definitions.mechanism.definition import RESULTS, CatalogueRow, Mechanism
 from railsim.definitions.mechanism.expressions import Expression
 from railsim.definitions.mechanism.parts import (
     AirSpring,
@@ -210,6 +210,8 @@ def _value_faults(mechanism: Mechanism, case: str | None) -> list[Fault]:
 def _range_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[Fault]:
     """Values out of their ranges, and tables that do not rise."""
     yield from _least_faults(mechanism, values)
+    for at, row in members(CatalogueRow, mechanism):
+        yield from _row_faults(at, row, values)
     for table in ("actuators", "elements"):
         for name, part in getattr(mechanism, table).items():
             key = f"{table}.{name}"
@@ -266,6 +268,21 @@ def _least_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> Iterator[F
                 else:
                     found = f"'{quantity}' is {value:g}"
             yield _fault(key, found, least.allowed)
+
+
+def _row_faults(key: str, row: CatalogueRow, values: Mapping[str, Any]) -> Iterator[Fault]:
+    """Ranges and lists of a series of gas springs that cannot be."""
+    pair, some = "smallest and largest, greater than 0", "one or more, greater than 0"
+    for field, allowed in {"stroke": pair, "strokes": some, "F1": pair}.items():
+        if (given := getattr(row, field)) is not None:
+            found = [number(q, values) for q in given]
+            if not found or min(found) <= 0.0 or (allowed is pair and found != sorted(found)):
+                yield _fault(f"{key}.{field}", ", ".join(map("{:g}".format, found)), allowed)
+    for k, band in enumerate(row.F1_tolerance or ()):
+        found = [number(q, values) for q in band]
+        if found[0] <= 0.0 or min(found) < 0.0:
+            allowed = "up to a force greater than 0, minus and plus 0 or greater"
+            yield _fault(f"{key}.F1_tolerance.{k}", ", ".join(map("{:g}".format, found)), allowed)
 
 
 def _air_spring_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> Iterator[Fault]:
