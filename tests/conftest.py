@@ -17,6 +17,7 @@ import railsim.contact.table
 import railsim.model.solutions
 from railsim.contact.table import TableGrid
 
+gc.disable()  # until all is collected
 ROOT = Path(__file__).parent.parent
 SMALL_GRID = functools.partial(TableGrid, n_w=3, ds=2e-4)
 collect_ignore = ["extending"]  # modules for a copy of the package, see docs/extending.md
@@ -26,6 +27,7 @@ def pytest_collection_finish():
     """What has been imported stays: to search it for garbage took a tenth of the tests' time."""
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(10_000, 10, 50)
 
 
@@ -108,6 +110,12 @@ def small_contact_tables_in_module():
 settings.register_profile("railsim", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("railsim")
+# Nor mixed with the numbers that stand in railsim's files: a number changed there would change them
+# everywhere, and to read all files takes 6 s of each process. Versions without it have no such mix.
+with contextlib.suppress(ImportError, AttributeError):
+    from hypothesis.internal.conjecture import providers
+
+    providers._get_local_constants = providers.Constants
 
 
 @pytest.hookimpl(tryfirst=True)
