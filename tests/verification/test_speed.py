@@ -281,7 +281,7 @@ def test_continued_run_gives_the_same_bytes(case, name, straight, tmp_path):
     "settings",
     [
         Settings(output_spacing=0.25),
-        in_table(output_spacing=0.25),
+        in_table([(0.0, 10.0), (20.0, 10.0), (120.0, 30.0)], output_spacing=0.25),
         Settings(output_spacing=0.25, drive={"mode": "free", "resistance": (20e3, 0.0, 0.0)}),
     ],
 )
@@ -292,7 +292,7 @@ def test_outputs_in_equal_steps_of_distance(bogie, straight, settings, scheme):
         bogie,
         straight,
         speed=10.0 if constant else None,
-        until=60.0,
+        until=30.0,
         settings=settings.replace(scheme=scheme),
     )
     assert result.status == "complete"
