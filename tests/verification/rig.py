@@ -4,14 +4,16 @@ Also the work of all forces that are not conservative, from positions alone: an 
 of where a vehicle's energy goes.
 """
 
+import functools
 from pathlib import Path
 
 import numpy as np
 from dynamics import Settings, absolute_frame, load_track, load_vehicle, rotation
 
 from railsim.definitions.vehicle.definition import Vehicle
+from railsim.kernels.compiler import entry
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.step_rk4 import settle_limits
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
@@ -30,12 +32,21 @@ def test_vehicle(name):
 test_vehicle.__test__ = False  # a helper, not a test
 
 
+@functools.cache
+def coach_and_track():
+    """What all rigs take a wheelset and rails of."""
+    data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    return (
+        data["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"],
+        load_track("straight"),
+    )
+
+
 class Rig:
     """`probe` hangs on `frame` by the element under test and is moved relative to it."""
 
     def __init__(self, **element):
-        data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
-        wheelset = data["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"]
+        wheelset, track = coach_and_track()
         body = {"mass": 1e3, "inertia": [1e3, 1e3, 1e3], "position": [0.0, 0.0, -1.0]}
         vehicle = Vehicle.model_validate(
             {
@@ -50,7 +61,7 @@ class Rig:
                 },
             }
         )
-        model = assemble(vehicle, load_track("straight"), Settings())
+        model = assemble(vehicle, track, Settings())
         self.system = level_track(model.system)
         self.state = np.zeros(model.n_state)
         self.state[-1] = 1.0
@@ -59,12 +70,16 @@ class Rig:
         self.n = model.index.n_bodies
         self.body = self.probe // 6
         self.frame = model.index.coordinate("frame", 0) // 6
+        arrays = self.system, self.work, self.state[None], self.derivative[None]
+        right_hand_sides(*arrays)
+        # a call with any arrays takes ten times as long to find their types
+        self._evaluate = functools.partial(entry(right_hand_sides, *arrays), *arrays)
 
     def force(self, axis, deflection, rate=0.0):
         """Force on the frame along `axis`, positive as the probe moves away; sets the drives."""
         self.state[self.probe + axis] = deflection
         self.state[6 * self.n + self.probe + axis] = rate
-        status, *_ = right_hand_side(self.system, self.work, self.state, self.derivative)
+        status, *_ = self._evaluate()
         assert status == 0
         return -self.work.pose[self.body, FORCE + axis]
 
@@ -78,7 +93,7 @@ class Rig:
         """Force and moment about its centre on the frame, six each; sets the drives."""
         self.state[self.probe : self.probe + 6] = position
         self.state[6 * self.n + self.probe : 6 * self.n + self.probe + 6] = rate
-        status, *_ = right_hand_side(self.system, self.work, self.state, self.derivative)
+        status, *_ = self._evaluate()
         assert status == 0
         return self.work.pose[self.frame, FORCE : FORCE + 6].copy()
 
