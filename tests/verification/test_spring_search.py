@@ -15,7 +15,7 @@ from railsim.springs.tolerance import ride_heights
 from railsim.springs.verification import fatigue, verify
 
 WIRES = "[0.022, 0.024, 0.027, 0.028, 0.038, 0.040, 0.041, 0.043]"
-QUICK = ["search.candidates=1024", "search.results=3", f"search.wire_diameters={WIRES}"]
+QUICK = ["search.candidates=512", "search.results=3", f"search.wire_diameters={WIRES}"]
 
 
 @pytest.fixture(scope="module", params=["mass", "fatigue"])
