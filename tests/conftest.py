@@ -19,7 +19,9 @@ from railsim.contact.table import TableGrid
 
 gc.disable()  # until all is collected
 ROOT = Path(__file__).parent.parent
-SMALL_GRID = functools.partial(TableGrid, n_w=3, ds=2e-4)
+SMALL_GRID = functools.partial(TableGrid, n_w=3, ds=3e-4, spacing=3e-4)
+SMOOTH_GRID = functools.partial(TableGrid, n_w=3, ds=2e-4)
+COARSE_GRID = functools.partial(TableGrid, n_w=3, ds=4e-4, spacing=2e-4)
 collect_ignore = ["extending"]  # modules for a copy of the package, see docs/extending.md
 
 
@@ -57,9 +59,10 @@ def stored_solutions(request, solutions_of_session):
     of a command apart: it may be what finds them.
     """
     folder = solutions_of_session
-    if any(name.startswith("small_contact_tables") for name in request.fixturenames):
-        folder = folder / "of_small_tables"  # which are no part of a solution's key
-        folder.mkdir(exist_ok=True)
+    for kind in ("small", "smooth", "coarse"):  # tables are no part of a solution's key
+        if any(name.startswith(f"{kind}_contact_tables") for name in request.fixturenames):
+            folder = folder / kind
+            folder.mkdir(exist_ok=True)
 
     def folder_now(_):
         if "monkeypatch" not in request.fixturenames:
@@ -76,17 +79,17 @@ def stored_solutions(request, solutions_of_session):
 
 
 @contextlib.contextmanager
-def small_tables():
-    """Contact tables of three nodes over the yaw, not seventeen, 0.2 mm apart: a tenth of the time.
+def small_tables(grid=SMALL_GRID):
+    """Contact tables of three nodes over the yaw, not seventeen, 0.3 mm apart: 1/25 of the time.
 
     For tests that need another pair of profiles, another gauge or a new table, not fine values.
     """
     generator = railsim.contact.stored_table.generator_hash
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(railsim.contact.table, "TableGrid", SMALL_GRID)
+        patch.setattr(railsim.contact.table, "TableGrid", grid)
         # those of sections have keys without the grid
         patch.setattr(
-            railsim.contact.section_tables, "generator_hash", lambda: f"{generator()} small"
+            railsim.contact.section_tables, "generator_hash", lambda: f"{generator()} {grid}"
         )
         yield
 
@@ -102,6 +105,27 @@ def small_contact_tables():
 def small_contact_tables_in_module():
     """The same for all tests of a module and the fixtures that they share."""
     with small_tables():
+        yield
+
+
+@pytest.fixture
+def smooth_contact_tables():
+    """Likewise, 0.2 mm apart, candidates 0.1 mm: a tenth of the time; for steep slopes and means."""
+    with small_tables(SMOOTH_GRID):
+        yield
+
+
+@pytest.fixture(scope="module")
+def smooth_contact_tables_in_module():
+    """The same for all tests of a module and the fixtures that they share."""
+    with small_tables(SMOOTH_GRID):
+        yield
+
+
+@pytest.fixture(scope="module")
+def coarse_contact_tables_in_module():
+    """Likewise, 0.4 mm apart, candidates 0.2 mm: for a hundred tables along rail sections."""
+    with small_tables(COARSE_GRID):
         yield
 
 

@@ -28,7 +28,7 @@ from railsim.model.work import work_arrays
 from railsim.profiles import load_profile
 from railsim.simulation import simulate
 
-pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")
+pytestmark = pytest.mark.usefixtures("coarse_contact_tables_in_module")
 DATA = Path(__file__).parents[1] / "data" / "sections"
 NOSE = 50.0  # m, the theoretical nose on the track
 ASIDE = 2.5e-3  # m: the results count y from rails 1.430 m apart, the track has 1.435 m

@@ -18,7 +18,7 @@ from railsim.profiles import load_profile
 from railsim.result.filters import low_passed
 from railsim.simulation import simulate
 
-pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")
+pytestmark = pytest.mark.usefixtures("coarse_contact_tables_in_module")
 FURTHER = pytest.mark.further
 NOSE = 50.0  # m, the theoretical nose on the track
 DIP = 18.15e-3  # rad, both slopes of the path together

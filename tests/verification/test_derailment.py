@@ -19,7 +19,7 @@ COACH = load_vehicle("coach_manchester")
 
 
 @pytest.mark.parametrize("widening", [0.0, 0.015])
-@pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.usefixtures("smooth_contact_tables")
 def test_wheel_that_climbs_is_derailed_and_stands_on_its_flange(widening):
     """Where the gauge is wider the inner wheel goes further inwards before the outer one is up."""
     # far too tight and dry for a coach

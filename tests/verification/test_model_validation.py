@@ -25,7 +25,8 @@ FOLDER = Path(__file__).parents[2] / "examples" / "measured_run"
 sys.path.insert(0, str(FOLDER))
 import make  # noqa: E402
 
-pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")
+# the test's forces are those of a fine table
+pytestmark = pytest.mark.usefixtures("smooth_contact_tables_in_module")
 
 # a table of twelve sections: measured and simulated, kN
 MEASURED = [31.0, 28.5, -30.2, 33.1, 29.9, -27.4, 35.0, 30.5, 32.2, -29.1, 28.8, 31.7]
