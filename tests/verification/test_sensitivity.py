@@ -8,6 +8,7 @@ from test_fixed_bodies import hanging, rig
 import railsim
 from railsim.definitions.settings import Settings
 
+pytestmark = pytest.mark.usefixtures("small_contact_tables_in_module")  # the anchor is fixed
 STRAIGHT = load_track("straight")
 MASS, STIFFNESS, DAMPING, AMPLITUDE = 1e3, 4e5, 2e3, 0.01
 STIFF, DAMP = "spring.stiffness.z", "spring.damping.z"

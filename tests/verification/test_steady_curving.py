@@ -153,6 +153,7 @@ def radial(places, longitudinal, lateral, curvature):
     return np.linalg.solve(matrix, given)[:4].reshape(2, 2).T
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize(
     ("longitudinal", "lateral"),
     [((1e4, 1e4), (1e6, 1e6)), ((1e6, 8e6), (5e5, 3e6)), ((3e6, 3e6), (1e6, 1e6))],
