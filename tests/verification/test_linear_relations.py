@@ -60,6 +60,7 @@ def test_harmonic_linearisation_of_a_small_amplitude_is_the_tangent_in_a_curve_t
     np.testing.assert_allclose(small / columns, tangent / columns, atol=2e-3)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize("name", ["coach_manchester", "coach_25t", "wagon_y25"])
 def test_every_coordinate_of_a_linearisation_has_a_name_of_its_own(name):
     """Of an element with internal states along several axes each is named by its axis."""
