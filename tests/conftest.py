@@ -110,7 +110,7 @@ def small_contact_tables_in_module():
 
 @pytest.fixture
 def smooth_contact_tables():
-    """Likewise, 0.2 mm apart, candidates 0.1 mm: a tenth of the time; for steep slopes and means."""
+    """Likewise, 0.2 mm apart, candidates 0.1 mm, a tenth of the time: for flanks and means."""
     with small_tables(SMOOTH_GRID):
         yield
 
