@@ -72,14 +72,14 @@ def moving_forces(bridge, forces, arrivals, speed, time):
     return total
 
 
-def coach_over(bridge, speed, until=150.0):
+def coach_over(bridge, speed, start=0.0, until=150.0):
     """Run a coach over the bridge: time and deflection at midspan, arrivals and wheelset loads."""
     vehicle = railsim.load_vehicle("coach_manchester")
     track = railsim.load_track("straight").with_values({"support": {"preset": "rigid"}})
     settings = railsim.Settings(step=5e-4)  # short, as the bridge meets the stiff contact itself
     middle, seen = [bridge.begin + 0.5 * bridge.span], []
     with railsim.Simulation(
-        vehicle, track, speed=speed, until=until, settings=settings, record=False
+        vehicle, track, speed=speed, start=start, until=until, settings=settings, record=False
     ) as run:
         positions, loads = run.read("wheelset_distance"), run.read("Q").sum(axis=1)
         arrivals, before = (bridge.begin - positions) / speed, loads
