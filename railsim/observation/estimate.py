@@ -315,7 +315,7 @@ def _merged(
 
 def _listed(places: Sequence[str], kind: str) -> str:
     """Return the first places or ranges [m] in words, and how many more there are."""
-    more = f" and {len(places) - LISTED} further {kind}" if len(places) > LISTED else ""
+    more = f" ({len(places)} {kind} in all)" if len(places) > LISTED else ""
     return f"{', '.join(places[:LISTED])} m{more}"
 
 

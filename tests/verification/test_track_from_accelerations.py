@@ -521,7 +521,7 @@ def test_pieces_are_joined_linearly_and_flanges_named_from_their_first_to_their_
         "run", "coach", [piece(0.0, 1.0), piece(80.0, 3.0)], np.array([0.006]), (), STRAIGHT
     )
     assert found.flanges == ((1, 40.0, 50.0),)
-    said = {1: "40 to 50 m:", 9: ", ".join(8 * ["40 to 50"]) + " m and 1 further places:"}
+    said = {1: "40 to 50 m:", 9: ", ".join(8 * ["40 to 50"]) + " m (9 places in all):"}
     for places, words in said.items():
         seen = SimpleNamespace(unseen=dict, flanges=found.flanges * places)
         (note,) = type(found).notes.fget(seen)
