@@ -92,7 +92,7 @@ RIGID, PART_RK4 = Division(1e-4, 0.15, 0.08, 10.0), 2.5e-4
 ELASTIC = Division(1.25e-3 / 3.0, 0.2, 0.2, 4.0)
 # rails with masses vibrate on the contact at some 700 Hz: the blow of a flat lasts 0.7 ms.  Where
 # they change their section, as at the nose of a crossing, it is not foreseen in a step as long as
-# the transfer: Q of 62 instead of 80 kN as elsewhere (`wagon_y25`, p2, 10 m/s)
+# the transfer: Q of 61 instead of 81 kN as elsewhere (`wagon_y25`, p2, 10 m/s)
 MASSES = ELASTIC._replace(part=1e-5, at_sections=40.0)
 # m/s, beyond which a change counts more there, with the cube of the speed: a blow within one step
 # is not foreseen at its begin (`coach_manchester`, co-running, 40 m/s: 201 instead of 246 kN)
