@@ -263,13 +263,14 @@ def commanded_dampers(system: System, names: Sequence[str], memory: Floats, step
     """Remark on a damper whose last command is too large for the step [s], chosen without it."""
     acts, bodies = system.actuators, system.bodies
     for i in np.flatnonzero(acts.which[:, MODE] == BY_DAMPER).tolist():
-        about = acts.which[i, ACTION] - ABOUT
-        of = bodies.inertia[:, (0, 1, 2, 1)[about]] if about >= 0 else bodies.mass
+        about, of, unit = acts.which[i, ACTION] - ABOUT, bodies.mass, "N s/m"
+        if about >= 0:  # x, y, z or an axle
+            of, unit = bodies.inertia[:, (0, 1, 2, 1)[about]], "N m s"
         if step * (constant := memory[acts.which[i, COMMAND]]) > COMMANDED * of[acts.body[i]].min():
             return (
-                f"The damper {names[i]} was commanded {constant:.3g} at the end. The step of "
-                f"{1e3 * step:.3g} ms was chosen without commands, and the force of such a damper "
-                "may alternate from step to step: compare with half the step (--check-step)."
+                f"The damper {names[i]} was commanded {constant:.3g} {unit} at the end. The step "
+                f"of {1e3 * step:.3g} ms was chosen without commands, and the force of such a "
+                "damper may alternate from step to step: compare with half the step (--check-step)."
             )
     return ""
 
