@@ -50,8 +50,9 @@ PAIRS = 4  # wheelsets in eight lanes, one a rail: left, right, left, ...
 SIDES = np.array([-1.0, 1.0] * PAIRS)
 
 # columns of Work.plane[w]: middle of the rails, their slopes; roll of the plane, its sine, cosine
-# and rate along the track; change of the vertical slope along the track
-MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, ROLL, SINE, COSINE, ROLL_SLOPE, BEND_Z = range(9)
+# and rate along the track; second and third derivatives of z and roll along the track
+MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, ROLL, SINE, COSINE, ROLL_SLOPE = range(8)
+BEND_Z, BEND_ROLL, THIRD_Z, THIRD_ROLL = range(8, 12)
 PLANE_SIZE = 16  # whole cache lines
 
 # columns of Work.rail[w, side]: friction; distance of the rail to the right of its nominal position
@@ -127,7 +128,18 @@ def locate_in_cells(track, cell, cell_u, plane, rail):
                 side * (z_slope - beside(z_slope)) / (track.rail_base * cosine),
             ),
         )
-        store_rows(plane, planes, BEND_Z, (0.5 * (z_bend + beside(z_bend)),))
+        third, per_width = 6.0 * z3, side / (track.rail_base * cosine)
+        store_rows(
+            plane,
+            planes,
+            BEND_Z,
+            (
+                0.5 * (z_bend + beside(z_bend)),
+                per_width * (z_bend - beside(z_bend)),
+                0.5 * (third + beside(third)),
+                per_width * (third - beside(third)),
+            ),
+        )
         wider, widening = 0.5 * (y - beside(y)), 0.5 * (y_slope - beside(y_slope))
         store_rows(rail, rails, 0, (friction, wider, widening, y_slope, y_bend))
 

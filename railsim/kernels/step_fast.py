@@ -18,6 +18,7 @@ from railsim.kernels.contact_columns import (
 )
 from railsim.kernels.driving import table_value_slope
 from railsim.kernels.internal import advanced, hold_within, slides_together
+from railsim.kernels.rails import BEND_ROLL, BEND_Z, THIRD_ROLL, THIRD_Z
 from railsim.kernels.rhs import euler_rates
 from railsim.kernels.state import (
     ARC_LENGTH,
@@ -51,16 +52,19 @@ from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector
 # to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
+# Irregular rigid rails: what a wheelset follows of them is known (`follow_rails`); its y and other
+# bodies, whose lag would be the main error of Y, are not smoothed.
+RAILS = 1.0 - 0.25 * SMOOTHING
 # Elastic rails have no such ringing: nothing is smoothed.  An axlebox, as an arm on its bush, keeps
 # the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.  So does the
 # spin of a driven or braked wheelset: a brake that holds it would chatter.
-SMOOTHING_ELASTIC = 1.0
+UNSMOOTHED = 1.0
 LONGER = 100.0
 # The creep force of a wheelset that slides along the track has no slope, but the sign of the slip:
 # where the secant times h/m, z, is above 1 the slip would alternate from step to step.  An implicit
 # part of 1 - 1/z of the secant ends that; this is the 1, with what a secant may be short of slopes.
 SECANT = 1.4
-SPIN = 4  # component of a body about its y axis
+Y, SPIN = 1, 4  # components of a body along and about its y axis
 
 
 @compiled(inline=True)
@@ -160,6 +164,8 @@ def remember(system, work, state, derivative, h):
     before = state[smoothed_begin(n, m) : drive_begin(n, m)]
     for k in range(6 * n):
         before[k] = 0.0
+    if system.track.has_irregularity and not system.support.elastic:
+        place_on_rails(system, work, state, before)
     for b in range(n):
         if system.bodies.kind[b] == WHEELSET:
             soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h, h)
@@ -173,11 +179,43 @@ def remember(system, work, state, derivative, h):
 
 
 @compiled(python=False)
+def place_on_rails(system, work, state, before):
+    """Let the smoothed accelerations of wheelsets begin with those of irregular rails."""
+    square = state[SPEED] * state[SPEED]
+    for w in range(system.contact.body.shape[0]):
+        k = 6 * system.contact.body[w]
+        before[k + 2] = square * work.plane[w, BEND_Z]
+        before[k + 3] = square * work.plane[w, BEND_ROLL]
+
+
+@compiled(python=False)
+def follow_rails(system, work, state, before, h):
+    """Let the smoothed accelerations b follow what irregular rigid rails give to the wheelsets.
+
+    A wheelset on its rails has their acceleration c in z and roll, c = V^2 d2z/ds2, and one of its
+    own, r.  Let b be r smoothed plus c in the middle of the half step over which b extrapolates the
+    speed, 3/4 h ahead: with dc/dt = V^3 d3z/ds3, constant over a step, that is
+    b <- b + SMOOTHING (a - b) + h dc/dt (1 - SMOOTHING/4).  The last term is added here.
+    """
+    speed = state[SPEED]
+    first, body = velocity_begin(system.bodies.kind.shape[0]), system.contact.body
+    change = RAILS * h * speed * speed * speed
+    for w in range(body.shape[0]):
+        k = 6 * body[w]
+        z, roll = change * work.plane[w, THIRD_Z], change * work.plane[w, THIRD_ROLL]
+        before[k + 2] += z
+        before[k + 3] += roll
+        state[first + k + 2] += 0.5 * h * z
+        state[first + k + 3] += 0.5 * h * roll
+
+
+@compiled(python=False)
 def step_fast(system, work, state, derivative, decay, h):
     """Advance `state` by `h` with the derivative already evaluated there.
 
     With the acceleration a of this step and b, the smoothed one of the steps before:
-    u = v + h (a - b/2), q <- q + h u, b <- b + SMOOTHING (a - b), v <- u + h/2 b.
+    u = v + h (a - b/2), q <- q + h u, b <- b + SMOOTHING (a - b), v <- u + h/2 b; on irregular
+    rigid rails see `follow_rails`.
 
     v - h/2 b is the velocity in the middle of the last step; where that was of another length h_0,
     v is moved by (h_0 - h)/2 (a - b), so that it is that of a last step of length h.
@@ -194,12 +232,15 @@ def step_fast(system, work, state, derivative, decay, h):
     # negative in results of earlier versions
     last = abs(state[LAST_STEP]) if state[LAST_STEP] != 0.0 else h
     shift = 0.5 * (last - h)
+    uneven = system.track.has_irregularity and not system.support.elastic
     for b in range(n):
         q = 6 * b
         v = velocity_begin(n) + q
         kind = bodies.kind[b]
-        follows = system.support.elastic and kind != AXLEBOX
-        beta = spin = SMOOTHING_ELASTIC if follows else SMOOTHING
+        follows = (uneven or system.support.elastic) and kind != AXLEBOX
+        beta = aside = spin = UNSMOOTHED if follows else SMOOTHING
+        if uneven and kind == WHEELSET:
+            beta = spin = SMOOTHING
         if kind == WHEELSET:
             soften_contact(bodies, work.contact_jacobian, b, rate, before, h, last)
             for e in range(system.drives.body.shape[0]):
@@ -230,9 +271,11 @@ def step_fast(system, work, state, derivative, decay, h):
         state[q + 5] += h * (derivative[q + 5] + d3)
         for k in range(6):
             change = rate[q + k] - before[q + k]
-            weight = spin if k == SPIN else beta
+            weight = spin if k == SPIN else aside if k == Y else beta
             state[v + k] += h * rate[q + k] + (0.5 * weight * h + shift) * change
             before[q + k] += weight * change
+    if uneven:
+        follow_rails(system, work, state, before, h)
     drives = drive_begin(n, m)
     # after a step that is shorter by far there is nothing to extrapolate from
     ratio = h / last if h < LONGER * last else 0.0

@@ -6,9 +6,9 @@ differences fade with a time constant of 0.1 s, so that a single blow counts lit
 vibration of the angular frequency w they are A^2/2 and A^2 (1 - cos w h).
 
 A guiding force that alternates from step to step is no motion of the vehicle: the step is too long.
-Its second difference is then 4 A with changing sign: minus the product with the one before is
-16 A^2, on average and faded likewise; of what a step follows, below a quarter of the steps'
-frequency, the product is positive.
+Its second difference is then 4 A with changing sign: half its product with the last but one less
+the last is 16 A^2, on average and faded likewise; of what a step follows, below a third of the
+steps' frequency (w h < 2 pi/3), the mean, in proportion to cos 2 w h - cos w h, is negative.
 """
 
 from math import acos, exp, pi, sqrt, tan
@@ -22,9 +22,9 @@ MEMORY = 0.1  # s
 # columns of Work.vibration[w, side]: 1 once begun, memory of the filter, last value, mean squares
 # of value and difference; then of the largest vibration so far its amplitude [N], where it was [m]
 # and its frequency [Hz]; of the guiding force last value, last difference and second difference,
-# 16 A^2 of its alternation, of the largest so far, and where that was [m]
+# 16 A^2 of its alternation, of the largest so far, where that was [m]; second difference before
 BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, POSITION, FREQUENCY = range(9)
-LAST_Y, SLOPE, BEND, TURNS, ALTERNATION, ALTERNATES_AT = range(9, 15)
+LAST_Y, SLOPE, BEND, TURNS, ALTERNATION, ALTERNATES_AT, BEND_BEFORE = range(9, 16)
 VIBRATION = 16  # whole cache lines
 
 
@@ -46,11 +46,13 @@ def note_alternation(vibration, w, side, guiding, fading, s):
     """Take up the guiding force of a wheel."""
     slope = guiding - vibration[w, side, LAST_Y]
     bend = slope - vibration[w, side, SLOPE]
-    product = bend * vibration[w, side, BEND]
-    turns = fading * (vibration[w, side, TURNS] + product) - product
+    last = vibration[w, side, BEND]
+    product = 0.5 * bend * (vibration[w, side, BEND_BEFORE] - last)
+    turns = fading * (vibration[w, side, TURNS] - product) + product
     vibration[w, side, LAST_Y] = guiding
     vibration[w, side, SLOPE] = slope
     vibration[w, side, BEND] = bend
+    vibration[w, side, BEND_BEFORE] = last
     vibration[w, side, TURNS] = turns
     if turns > vibration[w, side, ALTERNATION]:
         vibration[w, side, ALTERNATION] = turns

@@ -154,6 +154,11 @@ def level_track_with_friction(system: kernel.System) -> kernel.System:
     return level._replace(track=level.track._replace(rail=rail))
 
 
+def uneven_rigid_rails(system: kernel.System) -> int:
+    """1 where the fast scheme follows irregular rigid rails, which its judged steps do too."""
+    return int(system.track.has_irregularity and not system.support.elastic)
+
+
 def against_rails(system: kernel.System, state: Floats) -> Floats:
     """Lateral displacement and roll of each wheelset against its rails, from recorded states.
 

@@ -26,7 +26,7 @@ from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import tracks_under
-from railsim.model.work import CONSTANT_SPEED, without_loads
+from railsim.model.work import CONSTANT_SPEED, uneven_rigid_rails, without_loads
 from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
@@ -115,7 +115,8 @@ def _brought(
     rail = system.track.rail
     friction = float(np.max(rail[:, MU_LEFT, 0])), float(np.max(rail[:, MU_RIGHT, 0]))
     auxiliary = curve_to_settle_in(model, track, speed, *curve, friction, times, *lengths)
-    smooth = without_loads(system)._replace(track=track_tables(auxiliary), drive=CONSTANT_SPEED)
+    tables = track_tables(auxiliary)._replace(has_irregularity=uneven_rigid_rails(system))
+    smooth = without_loads(system)._replace(track=tables, drive=CONSTANT_SPEED)
     contact = smooth.contact
     damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))
     state = rolling.copy()

@@ -35,7 +35,7 @@ from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
 from railsim.model.solutions import solution
 from railsim.model.time_step import Situation, Stability
-from railsim.model.work import level_track_with_friction
+from railsim.model.work import level_track_with_friction, uneven_rigid_rails
 from railsim.simulation.auxiliary_track import Progress
 from railsim.simulation.flange import at_rest_beside, in_flange_contact
 
@@ -194,7 +194,8 @@ class StepChoice:
     ) -> Stability:
         rolling = equilibrium(model, speed, self._inputs).state if state is None else state
         model = replace(model, system=with_steepest_dampers(model.system))
-        level = level_track_with_friction(model.system)
+        level, uneven = level_track_with_friction(model.system), uneven_rigid_rails(model.system)
+        level = level._replace(track=level.track._replace(has_irregularity=uneven))
         if len(rows := model.system.support.variation):  # judged on the stiffest rails
             support = model.system.support._replace(variation=rows.max(axis=0, keepdims=True))
             model = replace(model, system=model.system._replace(support=support))
@@ -223,9 +224,8 @@ class StepChoice:
             )
 
         shared: dict[str, Any] = {"on_straight": on_straight} if of_class else {}
-        shared["smooth"] = not (
-            self._track.irregularities or self._track.sections or self._model.wheels.uneven
-        )
+        ringing = any(part.sets_wheels_ringing() for part in self._track.irregularities)
+        shared["steady"] = not (ringing or self._track.sections or self._model.wheels.uneven)
         return Stability(model, level, rolling, self._settings.scheme, curving, **shared)
 
 

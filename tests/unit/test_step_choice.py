@@ -53,12 +53,13 @@ DIP = [{"type": "dip", "rail": "left", "s": 20.0, "length": 1.0, "depth": 0.002}
     ("speed", "changes", "step"),
     [
         (20.0, {}, 5e-3 / 3.0),  # the stiffness of the contact is implicit
-        (20.0, {"irregularities": ROUGH}, 1.25e-3),
-        (20.0, {"irregularities": DIP}, 1.25e-3),
-        (37.0, {}, 1.25e-3),  # 0.06 m of track a step
+        (40.0, {"irregularities": ROUGH}, 5e-3 / 3.0),  # which the smoothed accelerations follow
+        (20.0, {"irregularities": DIP}, 1.25e-3),  # a wheel rings on its contact
+        (20.0, {"irregularities": [{**ROUGH[0], "wavelengths": [1.0, 25.0]}]}, 1.25e-3),
+        (43.0, {"irregularities": ROUGH}, 1.25e-3),  # above the critical speed
     ],
 )
-def test_longer_steps_on_rigid_rails_where_nothing_shakes_the_wheels(speed, changes, step):
+def test_longer_steps_on_rigid_rails_below_the_critical_speed(speed, changes, step):
     track = load_track("straight").replace(support={"preset": "rigid"}, **changes)
     vehicle = load_vehicle("coach_manchester")
     steps = prepare(vehicle, track, Settings(), speed, duration=1.0).steps

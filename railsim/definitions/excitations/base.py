@@ -57,6 +57,10 @@ class Irregular(Definition):
     def resolution(self) -> float:
         """Return the length that tables must resolve, a sixteenth of its shortest wave [m]."""
 
+    def sets_wheels_ringing(self) -> bool:
+        """Return whether it may set wheels ringing on rigid rails: by ends, or waves below 3 m."""
+        return True
+
     @abstractmethod
     def summary(self) -> str:
         """Return what it is in a few words."""

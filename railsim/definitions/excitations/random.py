@@ -23,6 +23,7 @@ SpectrumName = Literal[(*SPECTRA, "own")]  # type: ignore[valid-type]
 # Points of the lattice in the shortest wavelength: interpolation error 4e-6 of the amplitude.
 POINTS_PER_WAVE = 32
 PERIOD_IN_WAVES = 20.0
+LONG = 3.0  # m: EN 13848-1 measures no shorter waves
 
 
 class Random(base.Stretch):
@@ -67,6 +68,10 @@ class Random(base.Stretch):
     def resolution(self) -> float:
         """Return a sixteenth of the shortest wavelength [m]."""
         return self.wavelengths[0] / 16.0
+
+    def sets_wheels_ringing(self) -> bool:
+        """Return whether there are shorter waves than 3 m, or ends as short."""
+        return min(self.wavelengths[0], self.fade) < LONG
 
     def summary(self) -> str:
         """Return spectrum, channels, seed, band and scale."""
