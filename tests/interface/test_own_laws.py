@@ -7,7 +7,8 @@ import pytest
 
 import railsim
 from railsim import laws
-from railsim.definitions.vehicle.laws import Law, Signal
+from railsim.definitions.elements.actuator import Actuator
+from railsim.definitions.vehicle.laws import Controller, Law, Signal
 from railsim.description.rest import describe_statics
 from railsim.errors import InputError
 from railsim.laws import binding
@@ -134,6 +135,25 @@ def test_a_controller_holds_what_it_read(coach, track):
     assert result.attributes["step"] == 2.5e-3
     # an output stands at the begin of its step, before the command that follows from it
     assert np.allclose(force[1:], -20e3 * body[:-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "words"),
+    [
+        (Signal, {"quantity": "time", "rate": 1e9}, "less than or equal to 1000000"),
+        (Signal, {"quantity": "time", "rate": 1e3, "delay": 1e9}, "at most 1e6 samples"),
+        (Controller, {"inputs": {"time": "s"}}, "'time' of the function comes from the loop"),
+        (Controller, {"inputs": {"memory": "s"}, "memory": 2}, "'memory' of the function comes"),
+        (Controller, {"memory": 10**12}, "less than or equal to 1000000"),
+        (Actuator, {"delay": 1e9}, "less than or equal to 100"),
+    ],
+)
+def test_what_no_run_can_hold_or_end_is_refused(kind, values, words):
+    """Each was a MemoryError or no end, or an input that was given and not taken."""
+    given = {"law": "sky", "period": 0.01, "outputs": ["push"]} if kind is Controller else {}
+    given |= {"kind": "actuator", **ENDS} if kind is Actuator else {}
+    with pytest.raises(ValueError, match=words):
+        kind.model_validate({**given, **values})
 
 
 def test_a_controller_steps_as_it_runs(coach, track):

@@ -1,8 +1,8 @@
 """Forces that follow a command or a law of one's own."""
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import PrivateAttr
+from pydantic import Field, PrivateAttr
 
 from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative, Positive, check
 from railsim.definitions.elements.base import PointElement, Signs
@@ -20,7 +20,7 @@ class CommandedElement(PointElement):
     `axle`: a torque on the wheelset, body 2, forwards positive, without points"""
     lag: NonNegative = 0.0
     """Time constant of the first-order lag between command and effect [s]"""
-    delay: NonNegative = 0.0
+    delay: Annotated[NonNegative, Field(le=100.0)] = 0.0
     """Time after which a command arrives [s]"""
     rate_limit: Positive | None = None
     """Largest rate of the command behind the lag [unit of the command per s]; needs `lag`"""

@@ -94,7 +94,7 @@ class Signal(base.Definition):
     """Axis; of a link its line, by default"""
     ahead: base.Finite = 0.0
     """Position on the track, ahead of the reference body [m]"""
-    rate: base.Positive | None = None
+    rate: Annotated[base.Positive, Field(le=1e6)] | None = None
     """Samples per second [1/s]; by default one each step of the loop"""
     delay: base.NonNegative = 0.0
     """Time after which a sample is known [s]; needs `rate`"""
@@ -136,6 +136,8 @@ class Signal(base.Definition):
                 raise ValueError(f"'{key}' belongs to {', '.join(those)} and only to them")
         if self.rate is None and (self.delay > 0.0 or self.noise > 0.0):
             raise ValueError("'delay' and 'noise' need 'rate'")
+        if self.rate is not None and self.delay * self.rate > 1e6:
+            raise ValueError("within 'delay' there are at most 1e6 samples")
 
 
 class Controller(base.Definition):
@@ -152,8 +154,13 @@ class Controller(base.Definition):
     one value is for all"""
     parameters: dict[base.Name, base.Finite] = base.EMPTY_TABLE
     """Values of the function's further arguments, by name"""
-    memory: base.Count | None = None
+    memory: Annotated[base.Count, Field(le=1_000_000)] | None = None
     """How many numbers its argument `memory` keeps from call to call, 0 at the begin"""
+
+    @base.check
+    def _inputs_are_not_what_the_loop_gives(self) -> None:
+        if given := {"time", "memory"} & self.inputs.keys():
+            raise ValueError(f"'{min(given)}' of the function comes from the loop, not from inputs")
 
 
 def with_sources(tables: dict[str, Any]) -> list[Fault]:
