@@ -13,6 +13,7 @@ import numpy as np
 from railsim.definitions import Settings, Vehicle
 from railsim.definitions.vehicle.laws import BODY_SIGNALS, Controller, Signal
 from railsim.errors import Fault, InputError, nearest
+from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
 from railsim.kernels import element_outputs as element
 from railsim.kernels.commands import Controllers, Signals
@@ -69,6 +70,7 @@ class _Wiring:
         self._blocks = LawBlocks()
         self._blocks.memory = model.system.own.memory.tolist()
         self._blocks.address = model.system.own.places.tolist()
+        self._acts = model.system.actuators.which.copy()
         self._faults: list[Fault] = []
         self._wires: list[int] = []
         self._commanded: dict[str, str] = {}  # controllers by their actuators
@@ -134,7 +136,12 @@ class _Wiring:
             component = OF_ELEMENT[quantity] + (0 if quantity == "power" else axis)
             for group, names in enumerate(groups):
                 if signal.element in names:
-                    return kernel.ELEMENT, names.index(signal.element), group, component
+                    number = names.index(signal.element)
+                    own = self._axes(group, number)
+                    if quantity != "power" and signal.axis not in own:
+                        found = f"found {signal.axis or 'none'}; {signal.element} acts elsewhere"
+                        self.fault(f"{key}.axis", found, " or ".join(a or "none" for a in own))
+                    return kernel.ELEMENT, number, group, component
         if signal.wheelset is not None:
             w = self._number(index.wheelsets, signal.wheelset, f"{key}.wheelset", "wheelset")
             if quantity == "wheel_speed":
@@ -143,6 +150,15 @@ class _Wiring:
         if quantity in OF_RUN:
             return kernel.TRAVEL, 0, 0, OF_RUN[quantity]
         return (kernel.CURVATURE if quantity == "curvature" else kernel.CANT), 0, 0, 0
+
+    def _axes(self, group: int, number: int) -> tuple[str | None, ...]:
+        """Axes in which an element has a deflection; a line is that of none."""
+        action = self._acts[number, acts.ACTION] if group == kernel.ACTUATOR else acts.LINE
+        if group == element.MOUNT:
+            return (None, *COMPONENTS)
+        if action == acts.LINE:
+            return (None, "x")
+        return (COMPONENTS[4 if action == acts.AXLE else action - acts.ALONG],)
 
     def _controller(self, name: str, controller: Controller) -> list[int]:
         """Row of a controller."""

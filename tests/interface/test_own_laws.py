@@ -138,6 +138,25 @@ def test_a_controller_holds_what_it_read(coach, track):
 
 
 @pytest.mark.parametrize(
+    ("acts", "element", "axis", "allowed"),
+    [
+        ("line", "push", "y", "none or x"),
+        ("line", "front.secondary_lateral_damper.left", "y", "none or x"),
+        ("y", "push", None, "y"),
+        ("roll", "push", None, "roll"),
+        ("roll", "push", "x", "roll"),
+    ],
+)
+def test_signals_of_an_element_are_those_of_its_axis(coach, track, acts, element, axis, allowed):
+    """All others would be 0 for good."""
+    signal = {"quantity": "rate", "element": element, "axis": axis}
+    vehicle = with_element(coach, {"kind": "actuator", "acts": acts}, signals={"s": signal})
+    words = rf"signals\.s\.axis: found {axis or 'none'}; {element} .*; {allowed}$"
+    with pytest.raises(InputError, match=words):
+        railsim.Simulation(vehicle, track, **WAY, record=False)
+
+
+@pytest.mark.parametrize(
     ("kind", "values", "words"),
     [
         (Signal, {"quantity": "time", "rate": 1e9}, "less than or equal to 1000000"),
