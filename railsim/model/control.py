@@ -20,7 +20,7 @@ from railsim.kernels.commands import Controllers, Signals
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.laws.binding import Takes, bind
 from railsim.model.assembly import Model
-from railsim.model.element_arrays import LawBlocks
+from railsim.model.element_arrays import SLOT, LawBlocks
 from railsim.notation import COMPONENTS
 
 OF_POINTS = kernel.POINT_POSITION, kernel.POINT_VELOCITY, kernel.POINT_ACCELERATION
@@ -97,6 +97,7 @@ class _Wiring:
                 np.array(self._wires, np.int64),
             ),
             own=self._blocks.own(),
+            actuators=self._model.system.actuators._replace(which=self._acts),
         )
         index = replace(self._model.index, signals=tuple(signals), controllers=tuple(controllers))
         return replace(self._model, system=system, index=index)
@@ -165,7 +166,11 @@ class _Wiring:
         key, begin, laws = f"controllers.{name}", len(self._wires), self._vehicle.laws or {}
         for output in controller.outputs:
             actuators = self._model.index.actuators
-            self._wires.append(self._number(actuators, output, f"{key}.outputs", "actuator"))
+            self._wires.append(i := self._number(actuators, output, f"{key}.outputs", "actuator"))
+            if actuators and controller.period < SLOT:  # more commands may be on their way
+                delay = self._model.system.actuators.row[i, acts.DELAY]
+                row = self._blocks.command(delay, controller.period)
+                self._acts[i, acts.COMMAND : acts.SLOTS + 1] = row
             if output in self._commanded:
                 found = f"found '{output}', which controllers.{self._commanded[output]} commands"
                 self.fault(f"{key}.outputs", found, "each actuator once")

@@ -137,6 +137,22 @@ def test_a_controller_holds_what_it_read(coach, track):
     assert np.allclose(force[1:], -20e3 * body[:-1], rtol=1e-12)
 
 
+def test_all_commands_under_way_arrive(coach, track):
+    """100 of them, one every 0.1 ms, each 10 ms after it was sent."""
+    laws.allow()
+    ramp = {"law": "ramp", "period": 1e-4, "outputs": ["push"]}
+    vehicle = with_element(coach, {"kind": "actuator", "delay": 0.01}).replace(
+        laws={"ramp": {"source": "def ramp(time):\n    return 1e3 * time\n", "file": "mine.py"}},
+        controllers={"ramp": ramp},
+    )
+    sim = railsim.Simulation(vehicle, track, **WAY, record=False)
+    for _ in range(5):
+        sim.step(0.005)
+        # a command is sent at the begin of the step before
+        assert sim.read("element_command") == pytest.approx([max(0.0, 1e3 * (sim.time - 0.0101))],
+                                                            abs=0.11)  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("acts", "element", "axis", "allowed"),
     [
