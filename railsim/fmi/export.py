@@ -11,9 +11,10 @@ from typing import Any
 
 from railsim.definitions import Track, Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.errors import argument_error, changed_faults, input_error, nearest, optional_package
+from railsim.errors import changed_faults, input_error, optional_package
 from railsim.files.access import check_file, whole_file
 from railsim.fmi.unit import INPUTS, VARIABLES
+from railsim.model.control import check_command
 from railsim.plot.selection import panels
 from railsim.result import Result, open_run
 from railsim.simulation import Simulation
@@ -50,12 +51,12 @@ def fmu(
 
     `vehicle`, `track`: what runs; the unit holds both as they are here, without references to
     files; `path`: file to be written, ending in ``.fmu``; `inputs`: actuators that the calling
-    program commands; by default all; `outputs`: signals of the vehicle, and quantities over time
-    with the labels wanted: ``Q``, ``Y:1:left``, ``body_acceleration:carbody:y``; `overwrite`:
-    whether a file of this name may be replaced; `**conditions`: speed, settings, start, duration,
-    until and profiles, as in `railsim.simulate`. Returns: the file. Raises InputError: an actuator,
-    signal or quantity does not exist, or the run is no run. ImportError PythonFMU3 is not
-    installed.
+    program commands; by default all that no controller does; `outputs`: signals of the vehicle, and
+    quantities over time with the labels wanted: ``Q``, ``Y:1:left``,
+    ``body_acceleration:carbody:y``; `overwrite`: whether a file of this name may be replaced;
+    `**conditions`: speed, settings, start, duration, until and profiles, as in `railsim.simulate`.
+    Returns: the file. Raises InputError: an actuator, signal or quantity does not exist, or the run
+    is no run. ImportError PythonFMU3 is not installed.
     """
     wrapper = optional_package("pythonfmu3", "fmu", "'railsim[fmi]'")
     path = Path(path)
@@ -100,11 +101,11 @@ def _commands(
     vehicle: Vehicle, actuators: Sequence[str], wanted: Sequence[str] | None
 ) -> list[dict[str, Any]]:
     elements = {element.name: element.definition for element in flatten(vehicle).elements}
-    wanted = actuators if wanted is None else wanted
+    if wanted is None:
+        followed = {name for c in (vehicle.controllers or {}).values() for name in c.outputs}
+        wanted = [name for name in actuators if name not in followed]
     for name in wanted:
-        if name not in actuators:
-            allowed = nearest(name, actuators) if actuators else "the vehicle has none"
-            raise argument_error("inputs", f"no actuator '{name}'", allowed)
+        check_command(vehicle, "inputs", name, actuators)
     # a law knows the unit of its own command
     units = {name: getattr(elements[name], "command_unit", "") for name in wanted}
     words = "command of actuator "

@@ -12,7 +12,7 @@ import numpy as np
 
 from railsim.definitions import Settings, Vehicle
 from railsim.definitions.vehicle.laws import BODY_SIGNALS, Controller, Signal
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, argument_error, nearest
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
 from railsim.kernels import element_outputs as element
@@ -37,6 +37,16 @@ OF_ELEMENT = {
     "force": element.FORCE,
     "power": element.POWER,
 }
+
+
+def check_command(vehicle: Vehicle, key: str, name: str, actuators: Sequence[str]) -> None:
+    """Raise InputError where `name` is no actuator, or one that a controller commands."""
+    for by, controller in (vehicle.controllers or {}).items():
+        if name in controller.outputs:
+            raise argument_error(key, f"'{name}', which controllers.{by} commands", "another one")
+    if name not in actuators:
+        allowed = nearest(name, actuators) if actuators else "the vehicle has none"
+        raise argument_error(key, f"no actuator '{name}'", allowed)
 
 
 def periods(vehicle: Vehicle) -> list[float]:

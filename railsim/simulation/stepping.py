@@ -27,6 +27,7 @@ from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.laws import allowed
+from railsim.model.control import check_command
 from railsim.model.time_step import divide_strikes
 from railsim.model.work import work_arrays
 from railsim.notation import REQUESTED
@@ -352,17 +353,13 @@ class Simulation:
 
         Raises
         ------
-        InputError : there is no such actuator, the value is not finite, or too many commands are
-            on their way to one with a delay.
+        InputError : there is no such actuator, a controller of the vehicle commands it, the value
+            is not finite, or too many commands are on their way to one with a delay.
         """
-        names = self.actuators
-        if actuator not in names:
-            found = f"no actuator '{actuator}'"
-            allowed = nearest(actuator, names) if names else "the vehicle has none"
-            raise argument_error("actuator", found, allowed)
+        check_command(self._vehicle, "actuator", actuator, self.actuators)
         if not math.isfinite(value):
             raise argument_error("value", f"found {value} for '{actuator}'", "a finite number")
-        run, number = self._run, names.index(actuator)
+        run, number = self._run, self.actuators.index(actuator)
         memory = run.work.memory
         if value == memory[run.system.actuators.which[number, COMMAND]]:
             return

@@ -285,6 +285,22 @@ def test_wrong_variables_are_input_errors(active, track, tmp_path, change, words
     assert not list(tmp_path.iterdir())
 
 
+def test_inputs_of_a_unit_are_not_what_a_controller_commands(active, track, tmp_path):
+    """A command of 0 from the program would replace the controller's at each step."""
+    pull = {**dict(active.elements)["push"].model_dump(exclude_none=True), "delay": 0.1}
+    both = active.replace(
+        elements={**dict(active.elements), "pull": pull},
+        laws={"ramp": {"source": "def ramp(time):\n    return 1e3 * time\n"}},
+        controllers={"ramp": {"law": "ramp", "period": 0.01, "outputs": ["push"]}},
+    )
+    way = {**WAY, "allow_code": True, "outputs": ["Q:1"]}
+    found = fmu(both, track, tmp_path / "coach.fmu", **way)
+    facts = json.loads(zipfile.ZipFile(found).read("resources/variables.json"))
+    assert [one["name"] for one in facts["inputs"]] == ["pull"]
+    with pytest.raises(InputError, match=r"inputs: 'push', which controllers\.ramp commands"):
+        fmu(both, track, tmp_path / "other.fmu", inputs=["push"], **way)
+
+
 def test_low_pass_of_what_is_stored_does_not_pass_for_one_of_the_outputs(active, track, tmp_path):
     settings = railsim.Settings().with_values({"outputs.low_pass": {"frequency": 40.0}})
     with pytest.raises(InputError, match=r"settings: outputs\.low_pass: given"):

@@ -151,6 +151,8 @@ def test_all_commands_under_way_arrive(coach, track):
         # a command is sent at the begin of the step before
         assert sim.read("element_command") == pytest.approx([max(0.0, 1e3 * (sim.time - 0.0101))],
                                                             abs=0.11)  # fmt: skip
+    with pytest.raises(InputError, match=r"'push', which controllers\.ramp commands"):
+        sim.set("push", 1.0)
 
 
 @pytest.mark.parametrize(
