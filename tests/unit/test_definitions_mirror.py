@@ -9,6 +9,7 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
+from railsim.errors import InputError
 from railsim.model.assembly import assemble
 from railsim.model.statics import static_loads
 from railsim.profiles import load_profile
@@ -148,3 +149,26 @@ def test_left_and_right_wheel_of_a_wheelset_have_profiles_of_their_own():
     middle = np.abs(found.lateral) < 2e-3
     slopes = np.polyfit(found.lateral[middle], found.rolling_radius[middle], 1)[0]
     assert slopes == pytest.approx([-0.05, 0.025], rel=0.05)  # and as the wheelset rolls
+
+
+@pytest.mark.parametrize(
+    ("acts", "turned"),
+    [("x", False), ("y", True), ("z", False), ("roll", True), ("pitch", False), ("yaw", True)],
+)
+def test_mirrored_actuators_answer_a_command_with_the_mirrored_force(acts, turned):
+    """Forces are vectors, moments axial vectors; in the file of the mirror image as well."""
+    coach = load_vehicle("coach_manchester")
+    act = {"kind": "actuator", "bodies": ["carbody", "front.frame"], "point": [9.5, 0.3, -0.9]}
+    vehicle = coach.replace(elements={**dict(coach.elements), "act": {**act, "acts": acts}})
+    image = mirrored_vehicle(vehicle)
+    for one in (
+        image,
+        image.with_values({"name": "image"}),
+        Vehicle.model_validate(image.model_dump()),
+    ):
+        (flat,) = (element for element in flatten(one).elements if element.name == "act")
+        assert flat.definition.rows()[0].sense == (-1.0 if turned else 1.0)
+    assert flatten(mirrored_vehicle(image)) == flatten(vehicle)
+    line = {**act, "point": None, "points": [[9.5, 0.0, -0.9], [9.5, 0.3, -0.9]]}
+    with pytest.raises(InputError, match="has no 'against_axis'"):
+        vehicle.replace(elements={**dict(coach.elements), "act": {**line, "against_axis": True}})

@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field
 
-from railsim.definitions.base import EMPTY_TABLE, Finite, Name, NonNegative, Positive, check
+from railsim.definitions.base import EMPTY_TABLE, Finite, Flag, Name, NonNegative, Positive, check
 from railsim.definitions.elements.base import PointElement, Signs
 from railsim.definitions.elements.rows import AXES, Act
 
@@ -30,7 +30,8 @@ class CommandedElement(PointElement):
     """Largest power, that of force and rate of the deflection [W]"""
     stroke: Positive | None = None
     """Deflection to either side at which the force that pushes on outwards is gone [m or rad]"""
-    _sense: float = PrivateAttr(1.0)
+    against_axis: Flag = False
+    """Acts against its axis, as the mirror image of an actuator does"""
 
     @property
     def has_points(self) -> bool:
@@ -45,6 +46,8 @@ class CommandedElement(PointElement):
             raise ValueError("acts = \"axle\" has no 'sides' and no 'stroke'")
         if self.acts == "line" and (self.points is None or self.points[0] == self.points[1]):
             raise ValueError("acts = \"line\" needs two different 'points'")
+        if self.against_axis and self.acts in ("line", "axle"):
+            raise ValueError(f"acts = \"{self.acts}\" has no 'against_axis'")
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored placement, where one command has the mirrored effect."""
@@ -52,15 +55,14 @@ class CommandedElement(PointElement):
             return self
         k = AXES.index(self.acts)
         handed = signs[0] * signs[1] * signs[2] if k >= 3 else 1.0
-        mirrored = self.model_copy()
-        mirrored._sense = handed * signs[k % 3]
-        return mirrored
+        turned = handed * signs[k % 3] < 0.0
+        return self.model_copy(update={"against_axis": self.against_axis != turned})
 
     def act(self, **values: object) -> Act:
         """Return what it becomes, with the values of its kind."""
         return Act(
             action=self.acts,
-            sense=self._sense,
+            sense=-1.0 if self.against_axis else 1.0,
             lag=self.lag,
             delay=self.delay,
             rate_limit=self.rate_limit,
