@@ -39,7 +39,7 @@ from railsim.kernels.rails import (
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.state import ARC_LENGTH, SPEED, velocity_begin
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import System, Work
+from railsim.kernels.system import RADIUS, System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.kernels.track_frame import FRAME_SIZE
 from railsim.linear.circle import POSITION, circle, placed
@@ -236,6 +236,21 @@ def follow_rails(model: Model, state: Floats) -> None:
         state[rate + 1] += speed * (plane[w, SLOPE_Y] - height * plane[w, ROLL_SLOPE])
         state[rate + 2] += speed * plane[w, SLOPE_Z]
         state[rate + 3] += speed * plane[w, ROLL_SLOPE]
+
+
+def rest_on_wheels(model: Model, state: Floats) -> None:
+    """Lift the wheelsets onto wheels that are not round, moving as these lead them."""
+    system, velocities = model.system, velocity_begin(model.index.n_bodies)
+    for w, body in enumerate(system.contact.body):
+        s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[body]]
+        radius = system.bodies.row[body, RADIUS]
+        phi, turn = s / radius - state[6 * body + 4], state[SPEED] / radius
+        of_sides = [model.wheels.at(w, side, float(phi)) for side in range(2)]
+        for first, (left, right) in zip(
+            (6 * body, velocities + 6 * body), np.transpose(of_sides) * [[1.0], [turn]], strict=True
+        ):
+            state[first + 2] -= 0.5 * (left + right)
+            state[first + 3] += (left - right) / system.track.rail_base
 
 
 def _run(
