@@ -20,7 +20,7 @@ def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
     step = "chosen" if settings.step is None else f"{settings.step * 1e3:.4g} ms"
     return [
-        f"{vehicle.name} on {track.name} at {speed:g} m/s ({3.6 * speed:.4g} km/h)"
+        f"{vehicle.name_with_load} on {track.name} at {speed:g} m/s ({3.6 * speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
         f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
         f"{track.gauge * 1e3:g} mm, friction {_friction(track, settings)}",

@@ -166,6 +166,13 @@ def test_laws_that_are_told_are_those_in_force(settings, words):
     assert words in "\n".join(assumptions(coach, track, given, 20.0))
 
 
+def test_inputs_name_the_load_case():
+    """What was printed of a laden run was that of the vehicle as its file has it."""
+    laden = railsim.load_vehicle("coach_manchester", ["load=laden"])
+    first = assumptions(laden, railsim.load_track("straight"), railsim.Settings(), 20.0)[0]
+    assert first.startswith(f"{laden.name}, load case laden on ")
+
+
 def test_run_may_start_anywhere(tmp_path):
     path = tmp_path / "run.h5"
     given = [*COACH, "--speed", "20", "--start", "100", "--until", "110", "--out", str(path)]
