@@ -19,6 +19,7 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
+from railsim.kernels.vibration import AMPLITUDE
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
@@ -109,6 +110,7 @@ class Run:
         self.work = work_arrays(self.system)
         self.state: Floats = prepared.state.copy()
         self.work.memory[:] = prepared.memory
+        self.unloaded = np.zeros_like(self.work.unloaded)  # before the evaluation [s]
         self.derivative = np.zeros_like(self.state)
         self.stages = np.zeros((3, len(self.state)))
         self.fresh = prepared.fresh  # whether nothing was before the state
@@ -165,6 +167,8 @@ class Run:
         if not self.evaluates and self.state[TIME] >= begin - ROUND_OFF:
             take_extremes(self.extremes, self.work.extremes)
             self.work.extremes[:] = no_extremes(self.work.extremes.shape[1])
+            self.unloaded[:] = self.work.unloaded
+            self.work.vibration[..., AMPLITUDE] = 0.0  # else that of the start is the largest
             self.evaluates = True
 
     def last_record(self) -> tuple[int, int, int]:

@@ -44,6 +44,7 @@ COMMANDED = 0.3
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
 YAW_MAX = TableGrid().yaw_max
+START_ALONE = "; all within the start of the run, which tables of peaks leave out"
 
 
 @contextmanager
@@ -76,7 +77,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
             float(run.state[SPEED]),
         ),
         *beyond_experience(extremes, Q0, wheelsets),
-        lifted_wheels(extremes, run.work.unloaded, wheelsets),
+        lifted_wheels(extremes, run.work.unloaded, run.unloaded, wheelsets),
         stability(swings, extremes, duration) if hunts or not uneven else "",
         vibration(
             run.work.vibration,
@@ -147,9 +148,9 @@ def beyond_experience(
 
 
 def lifted_wheels(
-    extremes: Mapping[str, Floats], unloaded: Floats, wheelsets: Sequence[str]
+    extremes: Mapping[str, Floats], unloaded: Floats, before: Floats, wheelsets: Sequence[str]
 ) -> str:
-    """Remark on wheels that carried nothing for some time, `unloaded` [s]."""
+    """Remark on wheels `unloaded` for some time [s], `before` the evaluation of peaks began [s]."""
     number = int(np.count_nonzero(unloaded))
     if number == 0:
         return ""
@@ -159,7 +160,7 @@ def lifted_wheels(
     others = "" if number == 1 else f"; {number} wheels in all were off their rails"
     return (
         f"A wheel lifts off its rail: {who}, for {1e3 * unloaded[w, side]:.3g} ms altogether "
-        f"({where}){others}."
+        f"({where}){others}{'' if np.any(unloaded > before) else START_ALONE}."
     )
 
 

@@ -185,6 +185,12 @@ def test_lifted_wheels_are_remarked_on():
     assert "4 wheels in all" in remark
 
 
+def test_wheels_that_lift_in_the_start_alone_are_said_to():
+    assert "leave out" not in over_the_dip().remarks[0]
+    lifts = over_the_dip(outputs={"evaluate_after": 0.88}).remarks[0]
+    assert lifts.endswith("all within the start of the run, which tables of peaks leave out.")
+
+
 def test_forces_beyond_experience_are_remarked_on():
     track = load_track("straight").replace(irregularities=[{**AT, "depth": 8e-3, "rail": "left"}])
     result = simulate(load_vehicle("coach_manchester"), track, speed=SPEED, until=UNTIL)
