@@ -7,8 +7,8 @@ A fault mode needs only one judged section, in any zone.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from railsim.result import Result
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"
 SHARE = 90.0  # per cent of the sections, of the track's quality
+MOST_NAMED = 4  # populations that lack the same in a zone, in a sentence each
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,21 @@ class Condition:
     def record(self) -> dict[str, object]:
         """Return it as plain strings."""
         return dict(self.__dict__)
+
+
+def sentences(conditions: Iterable[Condition]) -> list[str]:
+    """Conditions in one line each; what many populations lack alike in a zone is one line."""
+    alike: dict[Condition, list[str]] = {}
+    for condition in conditions:
+        zone, _, population = condition.place.partition(", ")
+        of_zone = alike.setdefault(replace(condition, place=zone if population else ""), [])
+        of_zone.append(condition.place)
+    found = list[str]()
+    for condition, places in alike.items():
+        if (number := len(places)) > MOST_NAMED:
+            places = [f"{condition.place}, {number} populations"]
+        found += [replace(condition, place=place).sentence for place in places]
+    return found
 
 
 @dataclass(frozen=True)
@@ -245,5 +261,6 @@ def _loads(reports: Sequence[ZoneReport]) -> Condition:
     loads = sorted({r.population.vehicle.load or "design" for r in sound if r.values})
     known = any(r.population.vehicle.loads for r in sound)
     state = _stated(len(loads) > 1) if known or len(loads) > 1 else NOT_CHECKED
-    words = ", ".join(loads) if known else "the vehicle's file has no load cases"
-    return Condition("load states", "", state, words or "none", "empty and laden", "[R]")
+    words = ", ".join(loads) or "none, as no section counts"
+    words = words if known else "the vehicle's file has no load cases"
+    return Condition("load states", "", state, words, "empty and laden", "[R]")

@@ -19,7 +19,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from railsim.assessment.conditions import MET, Condition
+from railsim.assessment.conditions import MET, Condition, sentences
 from railsim.assessment.criteria import SAFETY, VERDICTS, WORDS
 from railsim.assessment.zones import ZoneReport
 from railsim.result import Result
@@ -54,7 +54,7 @@ def all_verdicts(
     """Return the verdicts by criterion, on all runs, also those that did not reach their end."""
     derailed = [status_words(n, r) for n, r in runs.items() if r.status == "derailed"]
     stopped = [f"{status_words(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
-    missing = [condition.sentence for condition in conditions if condition.state != MET]
+    missing = sentences([condition for condition in conditions if condition.state != MET])
     found = {}
     for name in VERDICTS:
         exceeded = [why for report in reports for why in _exceeded(report, name)]

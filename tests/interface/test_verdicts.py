@@ -1,6 +1,7 @@
 """What decides a verdict: one made-up record for every rule."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from made_record import FINE, Q0, curve, made, track
 
 import railsim
 from railsim.assessment import assess
+from railsim.assessment.conditions import Condition, sentences
 from railsim.assessment.verdict import all_verdicts
 from railsim.cli import main
 from railsim.errors import InputError
@@ -329,7 +331,7 @@ def test_load_cases_of_the_vehicle_count_also_where_no_section_does():
     text = railsim.load_vehicle("coach_manchester").to_toml()  # has a load case `laden`
     (found,) = assess(made(track({"type": "STR", "length": 60.0}), 1.0, vehicle=text))
     loads = condition(found, "load states")
-    assert (loads.state, loads.found) == ("not met", "none")
+    assert (loads.state, loads.found) == ("not met", "none, as no section counts")
 
 
 def test_curves_to_one_hand_only_do_not_meet_the_conditions():
@@ -430,3 +432,16 @@ def test_regression_takes_curves_of_both_hands_and_no_straight_track():
     rows = {(one.criterion.name, one.place): one.regression for one in found.influences}
     for row in rows["Y_qst", "wheelset 1 outer"], rows["sum_Y", "wheelset 1"]:
         assert row.value == pytest.approx(40e3, rel=1e-4)
+
+
+def test_what_many_populations_lack_alike_is_one_sentence():
+    """A study over friction, load and rails had its reasons on three screens, zone by zone."""
+    places = [f"zone {zone}, friction {mu}" for mu in range(5) for zone in (2, 3)]
+    lacking = [Condition("number of sections", p, "not met", "none", "25") for p in places]
+    words = "number of sections not met: none; required 25"
+    assert sentences(lacking) == [f"zone {zone}, 5 populations: {words}" for zone in (2, 3)]
+    assert sentences(lacking[:8]) == [
+        f"zone {zone}, friction {mu}: {words}" for zone in (2, 3) for mu in range(4)
+    ]
+    alone = [replace(lacking[0], place=place) for place in ("zone 2", "zone 4", "")]
+    assert sentences(alone) == [f"zone 2: {words}", f"zone 4: {words}", words]
