@@ -189,6 +189,8 @@ def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> Non
     value, words = limit
     shown = value * quantity.scale
     axes.axhline(shown, color=style.LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
+    axes.update_datalim([(0.0, shown)], updatex=False)  # `axhline` on the edge leaves no margin
+    axes.autoscale_view(scalex=False)
     shift, va = ((-3, 2.5), "bottom") if value < 0 else ((-3, -2.5), "top")
     look = {"fontsize": 7.5, "color": style.LIMIT, "path_effects": style.HALO}
     style.note(axes, words, (1.0, shown), shift, "right", va, frame=style.BESIDE, **look)

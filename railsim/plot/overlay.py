@@ -129,13 +129,15 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
 
 def _shared(results: Sequence[Result]) -> str:
     """What of vehicle, track, friction and speed is the same for all results."""
-    tracks = [run.track() for run in results]
+    tracks, several = [run.track() for run in results], len({r.vehicle().name for r in results}) > 1
     told = (
-        [run.vehicle().name_with_load for run in results], [track.name for track in tracks],
+        [run.vehicle().name_with_load for run in results],
+        [f"load case {run.vehicle().load}" for run in results if several and run.vehicle().load],
+        [track.name for track in tracks],
         [f"friction {track.friction_words}" for track in tracks],
         [run.speed_words for run in results],
     )  # fmt: skip
-    same = [names[0] for names in told if len(set(names)) == 1]
+    same = [names[0] for names in told if len(names) == len(results) and len(set(names)) == 1]
     return " · ".join(map(unformatted, same))
 
 

@@ -121,6 +121,17 @@ def test_a_limit_is_within_its_axes_where_the_values_are_rounding_errors():
         assert low < -60.0 < 0.0 < high
 
 
+def test_a_limit_near_the_largest_value_is_not_on_the_edge(result):
+    """Values up to 0.76 had an axis up to 0.8017: the line at 0.8 was cut."""
+    low, high = result["Y_over_Q"][:, 0].min(), result["Y_over_Q"][:, 0].max()
+    scale = 0.8017 / (high + 0.05 * (high - low))  # matplotlib adds 5 %
+    arrays = {name: result[name] * (scale if name == "Y_over_Q" else 1.0) for name in result}
+    near = Result(arrays, result.quantities, result.coordinates, result.attributes)
+    axes = overlay({"one": near}, ["Y_over_Q:1"]).axes[0]
+    low, high = axes.get_ylim()
+    assert high - 0.8 > 0.03 * (high - low)
+
+
 def test_wheelsets_that_were_not_chosen_leave_no_gap(result):
     """A picture of one wheelset was as wide as one of four."""
     width = [histories(result, (name,), by="wheelset").get_figwidth() for name in ("Q:1", "Q")]
@@ -140,6 +151,11 @@ def test_titles_name_the_load_case():
     assert laden.title.startswith(name)
     assert overlay({"a": laden, "b": laden}).get_suptitle().startswith(name)
     assert name.partition(", load")[0] not in overlay({"a": laden, "b": run}).get_suptitle()
+    text = loaded.replace(f'"{run.vehicle().name}"', '"Another"', 1)
+    other = Result(
+        {n: run[n] for n in run}, run.quantities, run.coordinates, {**facts, "vehicle_toml": text}
+    )
+    assert overlay({"a": laden, "b": other}).get_suptitle().startswith("load case laden · ")
 
 
 @pytest.mark.parametrize("mode", ["constant", "table"])
