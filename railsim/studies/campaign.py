@@ -125,10 +125,12 @@ def left_out(
 
     And the runs without a section that counts, as of a vehicle too slow for a cant deficiency.
     """
+    loads = {case.labels["vehicle"]: case.vehicle.loads for case in cases}
     tested = {(case.labels["vehicle"], case.labels.get("condition")) for case in cases}
     for vehicle, (state, needed) in product(map(short_name, vehicles), plan.conditions.items()):
         if (vehicle, state) not in tested:
-            load = [f"a load case '{needed.load}'"] if needed.load else []
+            has = f" (it has {', '.join(known)})" if (known := loads.get(vehicle)) else ""
+            load = [f"a load case '{needed.load}'{has}"] if needed.load else []
             wheels = [f"wheels {' or '.join(needed.wheels)}"] if needed.wheels else []
             words = " and ".join((*load, *wheels))
             yield f"{vehicle}: not tested in the condition '{state}', which needs {words}"

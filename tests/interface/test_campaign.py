@@ -121,7 +121,8 @@ def test_fault_modes_change_the_vehicle_and_load_cases_that_are_unknown_are_left
     cases = scenario_cases(load_scenario(scenario), ["coach_manchester"])
     assert [case.labels["condition"] for case in cases] == ["whole", "no_lateral_damper", "soft"]
     (said,) = left_out(load_scenario(scenario), ["coach_manchester"], cases)
-    assert said.endswith("not tested in the condition 'crushed', which needs a load case 'crushed'")
+    needed = "which needs a load case 'crushed' (it has laden)"
+    assert said.endswith(f"not tested in the condition 'crushed', {needed}")
     whole, removed, soft = (case.vehicle for case in cases)
     dampers = [len(flatten(v).elements) for v in (whole, removed, soft)]
     assert dampers[1] == dampers[0] - 4
