@@ -337,6 +337,9 @@ def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
     energy.set_yticks(range(len(most)), [wheel.place for wheel in most])
     energy.invert_yaxis()
     damage.tick_params(labelleft=False)
+    if not any(wheel.rail_damage for _, wheels in runs for wheel in wheels):  # else axes about 0
+        damage.set_xlim(0.0, 1.0)
+        note(damage, "0 of every wheel", (0.5, 0.5), (0, 0), "center", frame="axes fraction")
     _life_model(life, runs)
     _shakedown_map(map_, runs)
     energy.set_xlabel(r"mean wear number $T\gamma$ (N)")

@@ -557,6 +557,14 @@ def test_wear_of_a_known_wear_number():
     assert labels == [f"{run}, {3.6 * FAST:.0f} km/h"] * 2
 
 
+def test_rails_without_damage_have_an_axis_from_zero_on():
+    """It went from -0.05 to 0.05, and the panel was empty."""
+    run = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(5.0 + 0.0 * s))
+    damage = assessment_figure(list(assess(run, "wear"))).axes[1]
+    assert damage.get_xlim()[0] == 0.0
+    assert damage.texts[0].get_text() == "0 of every wheel"
+
+
 def with_patches(whole, patches):
     """A run with quantities of its contact patches."""
     return Result(
