@@ -25,6 +25,7 @@ SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are l
 LOWEST = 0.1  # Hz, of an oscillation that loses its stability: sways on cones of 0.005 have 0.28
 SLOWEST = 1e-3  # Hz; below it a mode is no oscillation
 GROWS = 0.05  # 1/s of motions about an unstable state
+ROUNDING = 1e-9  # 1/s, growth that counts as none: without friction some modes are not damped
 SAME = 0.6  # pairing of neighbouring modes that needs no look in between
 UNRELATED = 0.1  # pairing below which two modes are not the same
 EQUAL = 0.02  # relative distance of eigenvalues that cannot be distinguished
@@ -212,9 +213,9 @@ def loss_of_stability(
         if parameter not in known:
             # half of the time without vectors, by which modes are told apart where one is undamped
             values = np.asarray(eigvals(at(parameter).matrix), dtype=complex)
-            known[parameter] = float(np.max(values[_searched(values)].real))
+            known[parameter] = float(np.max(values[_searched(values)].real)) - ROUNDING
             if counts is not None and known[parameter] >= 0.0:
-                known[parameter] = float(modes(parameter).eigenvalues[0].real)
+                known[parameter] = float(modes(parameter).eigenvalues[0].real) - ROUNDING
         return known[parameter]
 
     if growth(low) >= 0.0:

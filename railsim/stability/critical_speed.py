@@ -53,6 +53,7 @@ ONWARDS, ABOVE = (0.5, 0.1), 0.1
 # damping of friction that slides, at least: with stuck friction sways of shipped wagons have -0.022
 SLIDING = 0.03
 AGAIN = 1.25  # ratio of speeds at which is looked whether rest is stable again
+NO_FRICTION = "the friction is 0: without creep forces there is no hunting, and none is sought"
 AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
 OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
@@ -138,6 +139,9 @@ def critical_speed(
     tell = progress or (lambda _: None)
     tell(0.05)
     wanted = [method for method in METHODS if method in methods and method != "linear"]
+    if not any(track.frictions):
+        found.remarks.append(NO_FRICTION)
+        wanted, found.nonlinear = [], dict.fromkeys(wanted)
     if not wanted:
         return found
     of_runs = prepared(settings, Contact(conicity=conicity))
@@ -200,9 +204,6 @@ def checked(
     return float(slowest), float(fastest)
 
 
-# linear -------------------------------------------------------------------------------------------
-
-
 def _hunts(prepared: LinearVehicle) -> Callable[[Eigenmodes], bool]:
     """Whether a mode is hunting: by its name, or as it grows by more than sliding would damp.
 
@@ -238,9 +239,10 @@ def _linear(
     parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
 
     def words(mode: Eigenmodes) -> str:
+        damping = 100.0 * mode.damping_ratios[0].round(9) + 0.0  # no rounding, nor a zero's sign
         return (
-            f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, damping "
-            f"{100.0 * mode.damping_ratios[0]:.3g} % at {mode.linearisation.parameter:g} m/s"
+            f"{mode_name(parts, mode)}, {mode.frequencies[0]:.3g} Hz, damping {damping:.3g} % at "
+            f"{mode.linearisation.parameter:g} m/s"
         )
 
     lost, stuck = _loss_of_hunting(prepared, low, high), None
@@ -259,9 +261,9 @@ def _linear(
             )
     if lost.parameter is not None:
         mode = lost.modes[0]
-        name = mode_name(parts, mode)
         found.remarks += _stable_again(prepared, lost.parameter, high)
-        return LinearLoss(lost.parameter, float(mode.frequencies[0]), name), stuck
+        frequency = float(mode.frequencies[0])
+        return LinearLoss(lost.parameter, frequency, mode_name(parts, mode)), stuck
     found.unstable_at_low = lost.already
     why = f"no linear critical speed from {low:g} to {high:g} m/s; least damped"
     why = "unstable at the lower end of the range" if lost.already else why
@@ -315,9 +317,6 @@ def _conicity(prepared: LinearVehicle) -> Conicity | None:
 @lru_cache(8)  # maps and optimisations ask for the same geometry over and over
 def _conicities(geometry: ContactGeometry) -> Floats:
     return geometry.equivalent_conicity(OF_CONICITY)
-
-
-# non-linear ---------------------------------------------------------------------------------------
 
 
 def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:

@@ -415,6 +415,17 @@ def test_without_a_critical_speed_on_rigid_rails_a_remark_says_so(monkeypatch, a
     assert found.remarks == [f"on rigid rails: {words} m/s"]
 
 
+def test_without_friction_nothing_hunts_and_that_is_said():
+    """Its longitudinal modes have no damping but by creep: growth by rounding was called loss."""
+    law, free = railsim.Settings(creep_law="polach"), RIGID.replace(friction=0.0)
+    coach, how = load_vehicle("cooperrider_vehicle"), {"settings": law, "over_amplitude": False}
+    found = critical_speed(coach, free, methods="ramp", **how)
+    assert (found.linear, found.unstable_at_low) == (None, False)
+    assert found.nonlinear == {"ramp": None}
+    assert "wheelsets longitudinal, 13.4 Hz, damping 0 % at 5 m/s" in found.remarks[-2]
+    assert "without creep forces there is no hunting" in found.remarks[-1]
+
+
 @pytest.mark.further
 def test_the_critical_mode_is_undamped_there():
     coach = load_vehicle("coach_flexicoil")

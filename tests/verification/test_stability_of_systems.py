@@ -97,6 +97,19 @@ def test_suspended_wheelset_loses_stability_at_the_speed_of_the_closed_form(coni
     assert lost.modes[0].frequencies[0] == pytest.approx(2.4631, rel=1e-4)
 
 
+@pytest.mark.parametrize(("damping", "critical"), [(0.0, None), (2e-3, 40.0)])
+def test_an_oscillation_that_only_rounding_undamps_is_stable(damping, critical):
+    """A spring-held mass of growth d (V/40 - 1): without d nothing but 3e-14 1/s is left of it."""
+
+    def at(speed):
+        growth = damping * (speed / 40.0 - 1.0) + 3e-14
+        return Linearisation(("x", "v"), np.array([[0, 1], [-1e4, 2 * growth]]), np.zeros(2), speed)
+
+    lost = loss_of_stability(at, 5.0, 90.0)
+    assert not lost.already
+    assert lost.parameter == (critical and pytest.approx(critical, rel=1e-4))
+
+
 def test_cooperriders_bogie_loses_stability_at_its_published_speed():
     """L3: "about 68.66" (bifurcation.de); 68.667 m/s and 3.998 Hz computed independently."""
     lost = loss_of_stability(bogie, 30.0, 120.0)
