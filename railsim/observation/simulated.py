@@ -119,7 +119,7 @@ class SimulatedRun:
                 start=self._start, until=end, settings=self._settings(s),
             )  # fmt: skip
         if result.status != "complete":
-            return f"{result.status}: {result.status_reason}"
+            return f"{result.status}: {result.attributes['status_reason']}"
         rate = (len(result["time"]) - 1) / float(result["time"][-1] - result["time"][0])
         channels = [
             amplified(_series(result, name), rate, channel)
