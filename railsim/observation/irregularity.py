@@ -14,12 +14,13 @@ divided into pieces (`pieces.py`).
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.fft import next_fast_len
 
 from railsim.arrays import Complexes, Flags, Floats
-from railsim.constants import CANT_BASE
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.contact.geometry import geometry_of
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track.definition import Track
@@ -29,6 +30,7 @@ from railsim.errors import Faults, ModelError, argument_error, input_error, near
 from railsim.linear.track_response import QUANTITIES, TrackResponse, track_response
 from railsim.linear.vehicle import LinearVehicle
 from railsim.measurement import Measurement
+from railsim.measurement.alignment import CURVATURES
 from railsim.measurement.counterpart import amplifier
 from railsim.observation import innovations
 from railsim.observation.contact import Noise, in_the_mean
@@ -54,6 +56,8 @@ LEVEL = 30.0  # rms of what channels read over what is assumed: beyond this a un
 FLANGE = 0.7  # rad, contact angle
 CHANNELS = ("lateral", "vertical", "cross_level", "gauge")  # of a spectrum, as `QUANTITIES`
 STRAIGHT = 1e-5  # 1/m, curvature that counts as none
+# Means over a length [m] that show another curve: twice a bias, half of 1/R at R = 2.5 km
+WINDOW, MOST_Y, MOST_CURVATURE = 100.0, 0.4, 2e-4  # m/s2, 1/m
 
 
 @dataclass(frozen=True)
@@ -126,6 +130,7 @@ def irregularity(
     remarks = list(measurement.remarks)
     if left := [name for name in measurement.channels if name not in used]:
         remarks.append(f"Not used: {', '.join(left)}; the smoother reads accelerations.")
+    remarks += _other_curves(track, measurement, used)
     pieces = pieces_of(measurement, list(used))
     begin, end = measurement.distance[[0, -1]].tolist()
     if not is_uniform(track) and (begin < -MARGIN or end > track.length + MARGIN):
@@ -143,6 +148,39 @@ def irregularity(
     if not simulations:
         remarks += _curves(track, measurement)
     return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks, bare)
+
+
+def _other_curves(track: Track, measurement: Measurement, used: dict[str, str]) -> list[str]:
+    """Remark where a record has not the curves or cants of the track, by means over `WINDOW`.
+
+    Compared are kappa, where there is a channel of it, and v^2 kappa - g sin(cant angle) with the
+    median of all accelerations in y, each of which has its own bias.
+    """
+    s, v, plan = measurement.distance, np.maximum(measurement.speed, 1.0), Alignment(track)
+    turns = [
+        measurement[n] / (v if n == "yaw_rate" else 1.0) for n in CURVATURES if n in measurement
+    ]
+    names = [n for n in used if used[n].endswith(".y") and not measurement.channel(n).high_pass]
+    kappa, remarks = plan.curvature(s), []
+    steady = v**2 * kappa - GRAVITY * np.sin(plan.cant_angle(s))
+    edges = np.searchsorted(s, np.arange(s[0], s[-1], WINDOW)).tolist()
+    for words, channels, of_track, most in (
+        ("curvature of {:.2g} 1/m", turns[:1], kappa, MOST_CURVATURE),
+        ("lateral acceleration of {:.2g} m/s2", [measurement[n] for n in names], steady, MOST_Y),
+    ):
+        rows = [slice(*ends) for ends in pairwise(edges) if channels]
+        means = [[m for x in channels if np.isfinite(m := np.mean(x[one]))] for one in rows]
+        read = np.array([np.median(values or [np.nan]) for values in means])
+        off = read - np.array([np.mean(of_track[one]) for one in rows])
+        if len(far := np.flatnonzero(np.abs(off) > most)):
+            k = far[np.argmax(np.abs(off[far]))]
+            at, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", read[k] - off[k] + 0.0
+            remarks.append(
+                f"The record is not of the curves and cants of track '{track.name}': at {at} it "
+                f"has a {words.format(read[k])} in the mean, the track one of {has:.2g}; they "
+                f"differ by more than {most:g} in {len(far)} of {len(rows)} such lengths."
+            )
+    return remarks
 
 
 def _curves(track: Track, measurement: Measurement) -> list[str]:
@@ -182,9 +220,7 @@ class _Smooth:
         self.bias = np.array([bias[kind] for kind in kinds])
         self._alignment = Alignment(track)
         self.model = cache(self._model)
-        self.said: list[
-            str
-        ] = []  # on pieces, and channels that read another thing than they should
+        self.said: list[str] = []  # on pieces, and channels that read what they should not
         self._wrong: set[int] | None = None
         self.flanges = _flanges(self.linear, track)
         self._last: tuple[tuple[float, ...], Complexes] | None = None

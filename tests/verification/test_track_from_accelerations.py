@@ -374,6 +374,40 @@ def test_a_curve_without_simulated_runs_is_said_and_spoils_nothing_elsewhere(sho
     assert rms(off) < 0.3e-3  # was 6 mm; 0.4 mm stated
 
 
+@pytest.mark.parametrize("curved", [True, False])
+def test_a_record_of_curves_that_the_track_has_not_is_said_with_both_figures(curved):
+    """R 600 m, 100 mm, 27.8 m/s: 27.8^2/600 - 9.81 sin(0.1/1.5) = 0.635 m/s2; a gap in one box."""
+    curve, s = canted_curve(600.0, 0.1, 900.0), np.arange(0.0, 900.0, 0.5)
+    along = Alignment(curve)
+    steady = 27.8**2 * along.curvature(s) - 9.80665 * np.sin(along.cant_angle(s))
+    gap = np.where((s > 420.0) & (s < 440.0), np.nan, steady)
+    channels = {"a": steady + 0.2, "b": steady - 0.2, "c": steady, "d": gap}
+    points = (f"axlebox_{k}_left:y" for k in (1, 2, 3, 4))
+    how = {n: {"quantity": f"sensor_acceleration:{p}"} for n, p in zip("abcd", points, strict=True)}
+    channels["yaw_rate"], how["yaw_rate"] = 27.8 * along.curvature(s), {"quantity": "yaw_rate"}
+    definition = MeasurementFile(
+        format="railsim-measurement/1", name="m", file="-", channels=how, rate=55.6, speed=27.8
+    )
+    run = Measurement(definition, s / 27.8, s, np.full(len(s), 27.8), channels)
+    used = {name: f"box_{name}.y" for name in "abcd"}
+    said = import_module("railsim.observation.irregularity")._other_curves(
+        curve if curved else STRAIGHT, run, used
+    )
+    assert len(said) == (0 if curved else 2)
+    if not curved:
+        assert "s = 400 to 500 m it has a curvature of 0.0017 1/m" in said[0]
+        assert "s = 400 to 500 m it has a lateral acceleration of 0.63 m/s2" in said[1]
+        assert all("the track one of 0;" in words for words in said)
+
+
+def test_a_simulated_run_that_ends_early_says_why(coach, monkeypatch):
+    """That its reason is an attribute of the file ended in a traceback."""
+    ended = SimpleNamespace(status="derailed", attributes={"status_reason": "wheel lift"})
+    monkeypatch.setattr("railsim.observation.simulated.simulate", lambda *_, **__: ended)
+    run = SimulatedRun(coach, STRAIGHT, PIECE, {}, [])
+    assert run(np.zeros((len(QUANTITIES), 1400))) == "derailed: wheel lift"
+
+
 @pytest.mark.further
 @pytest.mark.parametrize(("radius", "cant", "speed"), [(600.0, 0.1, 27.8), (2500.0, 0.1, 50.0)])
 def test_twins_through_curves(coach, radius, cant, speed):
