@@ -12,7 +12,7 @@ FILES = ("curving.json", "curving.png")
 @click.command()
 @cli.vehicle_argument
 @cli.values("--radius", "In m, positive to the right.", "R,R,... or A:B:N", required=True)
-@cli.option("--cant", "In m, positive in curves of either hand.", "H", float, default=0.15)
+@cli.option("--cant", "In m, of the outer rail in curves of either hand.", "H", float, default=0.15)
 @cli.values("--cant-deficiency", "Cant deficiencies in m.", "I,I,... or A:B:N", default="0")
 @cli.values("--friction", "Default: the track's.", "MU,MU,... or A:B:N")
 @cli.rails_option

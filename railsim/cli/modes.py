@@ -32,7 +32,7 @@ CYCLE = {"frames": 40, "cycles": 1}
 @cli.linearisation_options
 @cli.option("--conicity", "Straight cones of this slope as wheels.", "G", float)
 @cli.option("--radius", "Radius in m, positive to the right; default straight.", "R", float)
-@cli.option("--cant", "In m, negative in left-hand curves, too.", "H", float, default=0.0)
+@cli.option("--cant", "In m, positive: left rail higher.", "H", float, default=0.0)
 @cli.option("--animate", "Begin the page of --out with this mode, as mode.html.", "NAME")
 @cli.given_options("creep law and contact")
 @cli.output_options("Folder for modes.json, modes.png and, at one speed, modes.html, animated.")

@@ -291,7 +291,8 @@ def modes(
     conicity : float, optional
         Wheels replaced by straight cones of this slope [1].
     radius, cant : float
-        Of the track on which the vehicle rolls, both negative in left-hand curves [m].
+        Of the track on which the vehicle rolls, both negative in left-hand curves: a positive
+        cant is a higher left rail [m].
     held : bool
         Hold the wheelsets: modes of the suspended masses alone.
     hold : sequence of str

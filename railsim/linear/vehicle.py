@@ -179,7 +179,7 @@ class LinearVehicle:
         shape = "straight track"
         if self.curvature or self.cant:
             shape = f"R {1.0 / self.curvature:.6g} m" if self.curvature else shape
-            shape += f", cant {1e3 * self.cant:g} mm"
+            shape += f", cant {1e3 * self.cant:g} mm (positive: left rail higher)"
         where = conditions(self.track, Settings())
         return f"{shape}, rails {where['rails']}, friction {where['friction']}"
 

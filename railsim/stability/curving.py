@@ -83,7 +83,7 @@ class Curving(Plottable):
     """Steady curving on a grid.
 
     - `radius`, `cant_deficiency`, `friction`: the grid [m], [m], [1]
-    - `cant`: [m]
+    - `cant`: of the outer rail over the inner one [m]
     - `speed`: [m/s]
     - `converged`: 1 by Newton's method, 2 by time integration, 3 by means of a motion that does not
       come to rest, 0 where the vehicle leaves the track, or no step is stable: NaN
@@ -152,7 +152,8 @@ class Curving(Plottable):
     @property
     def title(self) -> str:
         """Vehicle, track and cant in words."""
-        return f"{self.vehicle}: steady curving, cant {1e3 * self.cant:g} mm, {self.place}"
+        cant = f"cant {1e3 * self.cant:g} mm (outer rail higher)"
+        return f"{self.vehicle}: steady curving, {cant}, {self.place}"
 
     def table(self) -> Table:
         """Return leading wheelset, its outer wheel and the wear number of all at every point."""

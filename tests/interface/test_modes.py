@@ -126,7 +126,9 @@ def test_a_vehicle_of_which_all_is_held_has_no_modes(capsys):
 def test_cant_of_a_left_hand_curve_is_negative(capsys, cant, told):
     """As in track files: with 0.1 m the inner rail would be the higher one."""
     assert main(["modes", "coach_manchester", "--radius", "-600", "--cant", cant]) == 0
-    assert ("cant on the wrong side" in "".join(capsys.readouterr())) == told
+    said = "".join(capsys.readouterr())
+    assert ("cant on the wrong side" in said) == told
+    assert f"cant {1e3 * float(cant):g} mm (positive: left rail higher)" in said
 
 
 @pytest.fixture

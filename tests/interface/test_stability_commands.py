@@ -191,7 +191,9 @@ def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
 def test_picture_of_a_short_wagon_in_a_curve_has_its_whole_title(monkeypatch):
     monkeypatch.setattr(curving, "SETTLING", 1.0)  # whatever the state
     monkeypatch.setattr(curving, "SAMPLED", 0.1)
-    figure = railsim.curving(railsim.load_vehicle("wagon_uic_link"), radius=[300.0]).plot()
+    found = railsim.curving(railsim.load_vehicle("wagon_uic_link"), radius=[300.0])
+    assert "cant 150 mm (outer rail higher)" in found.title  # in curves of either hand
+    figure = found.plot()
     figure.draw_without_rendering()
     for axes in figure.get_axes():
         for title in (axes.title, axes._left_title):
