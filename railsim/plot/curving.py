@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from railsim.arrays import Floats, Indices
-from railsim.plot.style import Picture, distinct, note, say, signed, styled, wheelset_colours
+from railsim.plot.style import Picture, distinct, note, say, signed, styled, wheelset_looks
 from railsim.stability.curving import MEAN, METHODS, TIME, Curving
 
 LEFT, RIGHT = 0, 1
@@ -135,16 +135,16 @@ def _plan(axes: Axes, found: Curving) -> None:
     x = np.array(found.wheelset_position)
     for y in (-HALF, HALF):
         axes.axhline(y, color="0.75", lw=2.5, zorder=1)
-    colours = wheelset_colours(found.wheelsets)
+    looks = wheelset_looks(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
         yaw = EXAGGERATED * found.attack[r, 0, 0, w]
         middle = np.array([x[w], EXAGGERATED * found.lateral[r, 0, 0, w]])
         along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
         ends = [middle - HALF * across, middle + HALF * across]
-        axes.plot(*np.transpose(ends), color=colours[name], lw=1.6, zorder=2)
+        axes.plot(*np.transpose(ends), color=looks[name]["color"], lw=1.6, zorder=2)
         for end in ends:
             wheel = [end - WHEEL * along, end + WHEEL * along]
-            axes.plot(*np.transpose(wheel), color=colours[name], lw=4.0, zorder=3)
+            axes.plot(*np.transpose(wheel), color=looks[name]["color"], lw=4.0, zorder=3)
     # to the right is downwards
     axes.set(xlim=(np.min(x) - 2.0, np.max(x) + 2.0), ylim=(1.9, -1.9), aspect="equal")
     axes.set(xticks=[], yticks=[], anchor="W")  # room for the title of a short vehicle
@@ -161,9 +161,9 @@ def _first(found: Curving) -> str:
 
 def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
-    colours = wheelset_colours(found.wheelsets)
+    looks = wheelset_looks(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
         both = _parted(found.radius[order], 1e3 * found.lateral[order, 0, 0, w])
-        axes.plot(*both, color=colours[name], marker=".", ms=4, label=name)
+        axes.plot(*both, ms=4, label=name, **looks[name])
     axes.set_title(f"lateral displacement (mm), {_first(found)}")
     axes.legend(fontsize=7.5)

@@ -21,6 +21,8 @@ from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels
 from railsim.result import Result
 from railsim.text import unformatted
 
+MARKED = 16  # places of a curve with markers
+
 
 @style.styled()
 def histories(
@@ -124,19 +126,21 @@ def _draw(
     axes: Axes, result: Result, panel: Panel, horizontal: Floats, by: str, window: slice
 ) -> None:
     quantity = panel.quantity
-    wheelsets = style.wheelset_colours(result.wheelsets)
+    wheelsets = style.wheelset_looks(result.wheelsets)
+    every = max(len(horizontal) // MARKED, 1)
     others = [line for line in panel.lines if "wheelset" not in line.labels]
     for index, line in enumerate(panel.lines):
         side = line.labels.get("side", "left")
+        look = {"color": style.distinct(index)}
         if by == "wheelset" and "side" in line.labels:
-            colour = style.DISTINCT[0] if side == "left" else style.DISTINCT[1]
+            look = {"color": style.DISTINCT[0] if side == "left" else style.DISTINCT[1]}
         elif "wheelset" in line.labels:
-            colour = wheelsets[line.labels["wheelset"]] if by == "wheel" else "0.25"
-        else:
-            colour = style.distinct(index)
+            look = wheelsets[line.labels["wheelset"]] if by == "wheel" else {"color": "0.25"}
         values, above = line.values[window] * quantity.scale, 3.0 - 0.01 * index
+        marked = every * (index + 1) // (len(panel.lines) + 1), every  # not all at one place
         # the leading wheelset stays visible
-        axes.plot(horizontal, values, color=colour, ls=style.SIDE_LINES[side], zorder=above)
+        look = {"ls": style.SIDE_LINES[side], "zorder": above, "markevery": marked, **look}
+        axes.plot(horizontal, values, ms=3.5, **look)
     if quantity.name != "mileage":  # whose zero is far away
         axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = capitalised(quantity)
@@ -201,12 +205,12 @@ def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
     lines = [line for panel in drawn for line in panel.lines]
     handles = []
     if by == "wheel":
-        colours = style.wheelset_colours(result.wheelsets)
+        looks = style.wheelset_looks(result.wheelsets)
         names = short_names(result.wheelsets)
         for number, name in enumerate(result.wheelsets, start=1):
             if any(line.labels.get("wheelset") == name for line in lines):
                 words = f"{number} {unformatted(names[name])}"
-                handles.append(style.key(words, color=colours[name], lw=2.0))
+                handles.append(style.key(words, lw=2.0, ms=4.5, **looks[name]))
     for side, colour in zip(style.SIDE_LINES, style.DISTINCT, strict=False):
         if any(line.labels.get("side") == side for line in lines):
             handles += style.side_keys([side], color="0.25" if by == "wheel" else colour)

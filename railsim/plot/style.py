@@ -2,7 +2,7 @@
 
 Colours can be distinguished by colour-blind readers too (Okabe and Ito, "Color universal design",
 2008): a bogie has a hue, its leading wheelset the dark shade, the left side a solid and the right
-side a dashed line.
+side a dashed line.  A bogie has a marker, too, for print in black and white.
 """
 
 import warnings
@@ -41,6 +41,9 @@ STYLE: Any = {
 HUES = (("#004a80", "#56a8e0"), ("#b8450a", "#f0a13c"), ("#00664b", "#5cc0a0"),
         ("#7d3a68", "#d493bd"), ("#4d4d4d", "#a6a6a6"))  # fmt: skip
 """Dark and light shade of the first, second, ... bogie."""
+
+MARKERS = (".", "o", "^", "s", "D")
+"""Of the first, second, ... bogie: two hues of one shade look alike in black and white."""
 
 DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#555555", "#8c2d19")
 """Colours of things that have no order, such as results that are compared."""
@@ -103,21 +106,21 @@ def styled() -> Iterator[None]:
         yield
 
 
-def wheelset_colours(names: Sequence[str]) -> dict[str, Any]:
-    """Return a colour for every wheelset: a hue for each bogie, from dark to light within it.
+def wheelset_looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return a colour and a marker for every wheelset: a hue for each bogie, from dark to light.
 
     Wheelsets belong together when the first parts of their dotted names agree.
     """
     bogies: dict[str, list[str]] = {}
     for name in names:
         bogies.setdefault(name.split(".")[0], []).append(name)
-    if len(bogies) == len(names):
-        return {name: distinct(i) for i, name in enumerate(names)}
-    colours: dict[str, Any] = {}
+    looks: dict[str, dict[str, Any]] = {}
     for i, members in enumerate(bogies.values()):
-        dark, light = map(to_rgb, HUES[i % len(HUES)])
-        colours |= zip(members, map(tuple, np.linspace(dark, light, len(members))), strict=True)
-    return colours
+        alone = len(bogies) == len(names)
+        dark, light = map(to_rgb, (distinct(i),) * 2 if alone else HUES[i % len(HUES)])
+        for name, colour in zip(members, np.linspace(dark, light, len(members)), strict=True):
+            looks[name] = {"color": tuple(colour), "marker": MARKERS[i % len(MARKERS)]}
+    return looks
 
 
 @dataclass(frozen=True)

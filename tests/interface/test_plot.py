@@ -30,7 +30,7 @@ from railsim.plot.style import (
     label_grid,
     shade,
     spans,
-    wheelset_colours,
+    wheelset_looks,
 )
 from railsim.plot.track import track_figure
 from railsim.report.runs import page
@@ -210,10 +210,22 @@ def test_as_many_results_as_can_be_told_have_colours_of_their_own():
 
 
 def test_bogies_have_a_hue_and_their_leading_wheelsets_the_dark_shade():
-    colours = [to_hex(colour) for colour in wheelset_colours(WHEELSETS).values()]
+    looks = wheelset_looks(WHEELSETS).values()
+    colours = [to_hex(look["color"]) for look in looks]
     assert colours == [HUES[0][0], HUES[0][1], HUES[1][0], HUES[1][1]]
-    single = wheelset_colours(["front", "rear"])
-    assert len(set(single.values())) == 2
+    assert [look["marker"] for look in looks] == [".", ".", "o", "o"]
+    single = wheelset_looks(["front", "rear"]).values()
+    assert len({(look["color"], look["marker"]) for look in single}) == 2
+
+
+def test_bogies_differ_in_black_and_white_in_curves_and_legend(result):
+    """Their hues have nearly one grey: #56a8e0 and #f0a13c 151 and 173 of 255."""
+    figure = histories(result, ["sum_Y"])
+    drawn = figure.axes[0].lines[:4]
+    assert [line.get_marker() for line in drawn] == [".", ".", "o", "o"]
+    assert all(0 < line.get_markevery()[0] < line.get_markevery()[1] for line in drawn)
+    keys = figure.legends[0].get_lines()[:4]
+    assert [line.get_marker() for line in keys] == [".", ".", "o", "o"]
 
 
 def test_curve_and_transitions_are_shaded_where_they_are(result):
