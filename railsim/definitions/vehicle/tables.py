@@ -102,7 +102,7 @@ class Service(base.Definition):
     cant_deficiency: Annotated[base.Positive, Field(le=0.5)]
     """Admissible cant deficiency [m]"""
     category: Literal["passenger", "freight", "locomotive", "multiple_unit"] = "passenger"
-    """Category, which decides on limits"""
+    """Category, which decides on limits; track machines have none, their k1 was not found"""
     floor_height: base.Positive = 1.2
     """Height of the floor above the rails, where accelerations are taken [m]"""
     points: dict[base.Name, Point] = base.EMPTY_TABLE
