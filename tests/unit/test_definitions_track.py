@@ -251,6 +251,31 @@ def test_rules_of_alignment_are_those_of_the_instructions(
 
 # R 300 m at 20 m/s: I + d = 1500 * 400/(9.81 * 300) = 203.9 mm
 @pytest.mark.parametrize(
+    ("radius", "words"),
+    [
+        (2996.0, None),
+        (2990.0, "than 0.35 V2 = 2995 m at 92 km/h: 0.22 m/s2"),
+        (2145.0, "than 0.35 V2 = 2995 m at 92 km/h: 0.31 m/s2"),
+        (2100.0, "at 92 km/h, and than 0.25 V2: 0.31 m/s2"),
+    ],
+)
+@pytest.mark.parametrize("sense", [1, -1])
+def test_vertical_curves_too_sharp_for_the_speed_are_remarked_on(radius, words, sense):
+    """At 92.5 km/h EN 13803 has 0.35 V^2 = 2995 m, exceptionally 0.25 V^2 = 2139 m."""
+    change = sense * 30.0 / radius
+    vertical = [
+        {"type": "CST", "length": 50.0, "gradient": 0.0},
+        {"type": "LIR", "length": 30.0},
+        {"type": "CST", "length": 120.0, "gradient": change},
+    ]
+    plan = [{"type": "STR", "length": 200.0}]
+    track = load_track("straight").replace(plan=plan, cant=[], vertical=vertical, speed=92.5 / 3.6)
+    said = [str(r) for r in track_remarks(track) if r.key.startswith("vertical")]
+    assert len(said) == (words is not None)
+    assert all(words in one and f"radius of {radius:.0f} m" in one for one in said)
+
+
+@pytest.mark.parametrize(
     ("cant", "length", "speed", "expected"),
     [
         (0.10, 80.0, 20.0, None),  # 100/80 mm/m, I 104 mm, 26 mm/s: within all rules

@@ -9,7 +9,8 @@ with V in km/h and cant d, deficiency I in mm over the cant base of 1.5 m:
 - change of the deficiency of 75 mm/s at most, exceptionally 90;
 - transitions of d V/180, I V/270 and 60 m at least.
 
-A track without `speed`, or of another gauge than 1435 mm, is not judged.
+Vertical curves of 0.35 V^2 m at least, exceptionally 0.25 V^2, where v^2/R is 0.22 and 0.31 m/s2
+(EN 13803, from memory).  A track without `speed`, or of another gauge than 1435 mm, is not judged.
 """
 
 import math
@@ -25,18 +26,20 @@ MOST_DEFICIENCY, MOST_EXCESS = 160.0, 110.0  # mm
 RAMP, RAMP_EXCEPTIONAL = 180.0, 216.0  # mm/m times km/h
 CHANGE, CHANGE_EXCEPTIONAL = 75.0, 90.0  # mm/s
 SHORTEST = 60.0  # m
+VERTICAL, VERTICAL_EXCEPTIONAL = 0.35, 0.25  # m over (km/h)^2
 ROUND_OFF = 1.0 + 1e-6
 
 
 def alignment_remarks(
-    plan: Sequence[Section], cant: Sequence[Section], speed: float
+    plan: Sequence[Section], cant: Sequence[Section], vertical: Sequence[Section], speed: float
 ) -> list[Remark]:
-    """Return where plan [1/m] and cant [m] over arc length break the rules at a speed [m/s]."""
+    """Return where plan [1/m], cant [m] and gradient break the rules at a speed [m/s]."""
     return [
         *_cants(plan, cant, speed),
         *_ramps(cant, speed),
         *_deficiencies(plan, cant, speed),
         *_transitions(plan, cant, speed),
+        *_vertical_curves(vertical, speed),
     ]
 
 
@@ -111,3 +114,16 @@ def _transitions(
         if section.length * ROUND_OFF < needed:
             text = f"a transition of {section.length:g} m is shorter than {needed:.0f} m"
             yield Remark(section.key, f"{text}, the largest of d V/180, I V/270 and 60 m")
+
+
+def _vertical_curves(vertical: Sequence[Section], speed: float) -> Iterator[Remark]:
+    V = 3.6 * speed
+    for section in (one for one in vertical if one.slope):
+        radius, needed = 1.0 / abs(section.slope), VERTICAL * V**2
+        if radius * ROUND_OFF < needed:
+            rule = f"0.35 V2 = {needed:.0f} m at {V:.0f} km/h"
+            beyond = (
+                ", and than 0.25 V2" if radius * ROUND_OFF < VERTICAL_EXCEPTIONAL * V**2 else ""
+            )
+            text = f"a vertical radius of {radius:.0f} m is smaller than {rule}{beyond}"
+            yield Remark(section.key, f"{text}: {speed**2 / radius:.2f} m/s2")

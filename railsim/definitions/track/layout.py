@@ -115,7 +115,7 @@ def track_remarks(track: "Track") -> list[Remark]:
             text = f"a stiffness of {spring[0]:g} N/m; railways have 1e7 to 1e9 N/m"
             remarks.append(Remark(f"support.{name}", text))
     if track.speed is not None and abs(track.gauge - NORMAL_GAUGE) <= WIDENED:
-        remarks += alignment_remarks(plan, cant, track.speed)
+        remarks += alignment_remarks(plan, cant, vertical, track.speed)
     for section in (*plan, *cant, *vertical):
         if section.slope != 0.0 and section.length < track.rounding - SMALL:
             text = (
