@@ -17,6 +17,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import wrong_type
 from railsim.errors import InputError, input_error
 from railsim.files import sources
+from railsim.files.access import DEFINITION_BYTES, read_text
 from railsim.files.sources import Source
 
 if TYPE_CHECKING:
@@ -169,10 +170,13 @@ def load_wear_law(path: str | Path) -> "WearLawFile":
 
 
 def load_own_sections(path: str | Path) -> "OwnSections":
-    """Load test sections of the user's own."""
-    from railsim.definitions.own_sections import OwnSections
+    """Load test sections of the user's own: TOML, or CSV with the keys of a section as header."""
+    from railsim.definitions.own_sections import OwnSections, of_csv
 
-    return loaded(OwnSections, sources.read_source(Path(path), "limits"), ())
+    path, data = Path(path), None
+    if path.suffix.lower() == ".csv":
+        data = of_csv(read_text(path, DEFINITION_BYTES))
+    return loaded(OwnSections, sources.read_source(path, "sections", data), ())
 
 
 def load_study(path: str | Path, overrides: Overrides = ()) -> "Study":

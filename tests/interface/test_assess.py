@@ -19,7 +19,7 @@ from railsim.assessment.tables import tables
 from railsim.assessment.wear import wear_law
 from railsim.cli import main
 from railsim.cli.assess import FILES
-from railsim.definitions.loading import load_comfort_limits
+from railsim.definitions.loading import load_comfort_limits, load_own_sections
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
@@ -271,6 +271,24 @@ def test_own_sections_take_the_place_of_those_of_the_program(tmp_path):
     # the instants nearest to the ends are up to 115 mm off
     assert row.estimate.mean == pytest.approx(10e3 + 50.0 * 395.0, abs=5.0)
     assert not any("lengths" in one.name for one in found.conditions)
+
+
+@pytest.mark.parametrize("separator", [",", "; "])
+def test_own_sections_in_csv_are_those_in_toml(tmp_path, separator):
+    rows = "{begin = 410, end = 480, track = 'a'}", "{begin = 310.5, end = 380, zone = 4}"
+    lines = ["begin", "end", "zone", "track"], ["410", "480", "", "a"], ["310.5", "380", "4"]
+    table = tmp_path / "s.csv"
+    table.write_text("\n".join(separator.join(line) for line in lines))
+    assert load_own_sections(table) == load_own_sections(own_sections(tmp_path, *rows))
+
+
+def test_what_is_wrong_in_sections_of_csv_is_told_with_its_key(tmp_path):
+    table = tmp_path / "s.csv"
+    table.write_text("begin,end\n390,4x\n500,570,1\n")
+    with pytest.raises(InputError) as told:
+        load_own_sections(table)
+    assert "sections.0.end: '4x'" in str(told.value)
+    assert "sections.1.: unknown key; allowed: begin, end, track, zone" in str(told.value)
 
 
 def test_own_sections_of_other_lengths_and_places_are_told(tmp_path):
