@@ -29,7 +29,7 @@ FILES = [f"assessment{ending}" for ending in ENDINGS]
 @cli.choice("--method", "With wheel forces, or with accelerations only.", "normal|simplified")
 @cli.option("--admissible-speed", "Speed in m/s, instead of the vehicle's.", "V", cli.as_speed)
 @cli.option("--cant-deficiency", "Admissible cant deficiency in m.", "I", float)
-@cli.choice("--category", "Instead of the vehicle's; track machines: none.", CATEGORIES, default=None)
+@cli.choice("--category", "Instead of the vehicle's.", CATEGORIES, default=None)
 @cli.flag("--causal", "Causal filters, with phase, as in measuring amplifiers.")
 @cli.flag("--coarse", "Also accept results below 1000 samples per second.")
 @cli.option("--sections", "File of test sections, instead of those cut from the track.", "F")
