@@ -35,7 +35,7 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
     ).check()
     entries = [entry for kind in kinds or known for entry in library_entries(kind)]
     if draw is not None:
-        _draw(entries, Path(draw), output.overwrite)
+        _draw(entries, Path(draw), output)
     parts: list[str | Table] = []
     for kind in kinds or known:
         rows = [entry for entry in entries if entry["kind"] == kind]
@@ -50,13 +50,15 @@ def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> Non
     output.answer(entries, parts)
 
 
-def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:
+def _draw(entries: list[dict[str, Any]], folder: Path, output: cli.Output) -> None:
     from railsim.definitions.loading import load_any
 
     drawn = [entry for entry in entries if entry["kind"] in ("vehicles", "tracks")]
-    check_folder(folder, [f"{entry['name']}.png" for entry in drawn], overwrite=overwrite)
+    check_folder(folder, [f"{entry['name']}.png" for entry in drawn], overwrite=output.overwrite)
     make_folder(folder)
-    for entry in drawn:
-        entry["picture"] = str(folder / f"{entry['name']}.png")
-        definition: Any = load_any(entry["file"])
-        definition.plot(entry["picture"], overwrite=overwrite)
+    with output.progress("drawing") as show:
+        for number, entry in enumerate(drawn, start=1):
+            entry["picture"] = str(folder / f"{entry['name']}.png")
+            definition: Any = load_any(entry["file"])
+            definition.plot(entry["picture"], overwrite=output.overwrite)
+            show(number / len(drawn))

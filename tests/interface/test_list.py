@@ -3,12 +3,14 @@
 import json
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import pytest
 
 import railsim
 from railsim.cli import main
 from railsim.definitions.loading import load_vehicle
+from railsim.definitions.track.definition import Track
 from railsim.errors import InputError
 from railsim.files.sources import shipped_names
 
@@ -47,6 +49,18 @@ def test_what_is_offered_as_a_measurement_is_one():
 def test_unknown_kind_is_refused(capsys):
     assert main(["list", "vehicle"]) == 2
     assert "vehicles" in capsys.readouterr().err
+
+
+def test_drawing_all_shows_its_progress(tmp_path, monkeypatch):
+    """Of 42 pictures, most of a minute, nothing was to be seen."""
+    told = []
+    bar = contextmanager(lambda *_, **__: iter([told.append]))
+    monkeypatch.setattr("railsim.cli.common.progress_bar", bar)
+    monkeypatch.setattr(Track, "plot", lambda *_, **__: None)
+    assert main(["list", "tracks", "--draw", str(tmp_path / "pictures")]) == 0
+    count = len(told)
+    assert count > 15
+    assert told == pytest.approx([k / count for k in range(1, count + 1)])
 
 
 @pytest.mark.further
