@@ -92,7 +92,7 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
         bar.update(fraction - bar.n)
         if bar.disable and fraction >= told[1] + 0.05 and time.monotonic() >= told[0] + BETWEEN:
             told = time.monotonic(), fraction
-            echo(f"{words}: {100.0 * fraction:.0f} %", err=True)
+            echo(f"{getattr(bar, 'desc', words)}: {100.0 * fraction:.0f} %", err=True)
 
     doing.setLevel(logging.INFO)
     doing.addHandler(handler)

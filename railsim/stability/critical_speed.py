@@ -30,15 +30,14 @@ from railsim.linear.naming import mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
 from railsim.notation import COMPONENTS
 from railsim.profiles import Profile
+from railsim.simulation.auxiliary_track import DOING
 from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.continuation import followed_branches
 from railsim.stability.diagram import diagram
 from railsim.stability.motion import LeftRange, VehicleMotion
-from railsim.stability.ramp import EXCITATIONS, SMALL, ramp
+from railsim.stability.ramp import EXCITATIONS, SMALL, Progress, ramp
 from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
 from railsim.units import speed_in_si
-
-Progress = Callable[[float], None]
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation")
 AMPLITUDE_LIMIT = 3e-3  # m
@@ -124,6 +123,7 @@ def critical_speed(
     found.remarks += smooth.remarks
     found.conicity_over_amplitude = _conicity(smooth)
     found.linear, stuck = _linear(found, smooth)
+    (tell := progress or (lambda _: None))(0.02)
     if over_amplitude:
         found.linear_over_amplitude = _over_amplitude(smooth, low, high)
         if found.linear is not None and smooth.system.support.elastic:
@@ -136,7 +136,6 @@ def critical_speed(
                     found.remarks.append(f"on rigid rails: {words} m/s")
             except ModelError as error:
                 found.remarks.append(f"on rigid rails: {error}")
-    tell = progress or (lambda _: None)
     tell(0.05)
     wanted = [method for method in METHODS if method in methods and method != "linear"]
     if not any(track.frictions):
@@ -151,6 +150,7 @@ def critical_speed(
     shape = _hunting_shape(of_runs, begins.parameter or high)
     motion = VehicleMotion(of_runs, settings.scheme, shape)
     for number, method in enumerate(wanted):
+        DOING.info(f"{method}, method {number + 1} of {len(wanted)}")
 
         def share(fraction: float, number: int = number) -> None:
             tell(0.05 + 0.95 * (number + fraction) / len(wanted))

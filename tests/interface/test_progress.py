@@ -9,6 +9,7 @@ import railsim.identification
 from railsim.cli import main, progress
 from railsim.errors import input_error
 from railsim.kernels import cache
+from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.run_progress import RunProgress
 
 
@@ -63,6 +64,17 @@ def test_a_log_gets_lines_that_are_a_twentieth_apart(capsys, monkeypatch):
             for hundredths in range(11):
                 show(0.01 * hundredths)
     assert capsys.readouterr().err.splitlines() == ["wear: 5 %", "wear: 10 %"]
+
+
+def test_a_line_in_a_log_says_what_is_being_done(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "BETWEEN", 0.0)
+    with progress.progress_bar("critical speed", quiet=False) as show:
+        DOING.info("ramp, method 1 of 3")
+        show(0.3)
+        DOING.info("")
+        show(0.6)
+    lines = ["critical speed, ramp, method 1 of 3: 30 %", "critical speed: 60 %"]
+    assert capsys.readouterr().err.splitlines() == lines
 
 
 def test_a_log_gets_a_line_for_every_ten_runs_of_identify(capsys, monkeypatch):

@@ -426,6 +426,27 @@ def test_without_friction_nothing_hunts_and_that_is_said():
     assert "without creep forces there is no hunting" in found.remarks[-1]
 
 
+def test_progress_names_each_method(monkeypatch, caplog):
+    def lost(prepared, *_):
+        modes = (eigenmodes(prepared.linearised(58.0)).taken([-1]),)
+        return LossOfStability(None, False, modes)
+
+    monkeypatch.setattr(CRITICAL, "_loss_of_hunting", lost)
+    monkeypatch.setattr(CRITICAL, "VehicleMotion", lambda *_: None)
+    for name in ("_by_ramp", "_by_diagram", "_by_continuation"):
+        monkeypatch.setattr(CRITICAL, name, lambda *arguments: arguments[-1](1.0))
+    monkeypatch.setattr(CRITICAL, "_conclude", lambda *_: None)
+    caplog.set_level("INFO", "railsim.doing")
+    coach, law, told = load_vehicle("cooperrider_vehicle"), railsim.Settings(creep_law="polach"), []
+    how = {"settings": law, "over_amplitude": False, "progress": told.append}
+    critical_speed(coach, RIGID, methods=CRITICAL.METHODS, **how)
+    methods = ("ramp", "bifurcation", "continuation")
+    assert [record.getMessage() for record in caplog.records if record.name == "railsim.doing"] == [
+        f"{name}, method {k} of 3" for k, name in enumerate(methods, start=1)
+    ]
+    assert told == pytest.approx([0.02, 0.05, 0.05 + 0.95 / 3, 0.05 + 0.95 * 2 / 3, 1.0])
+
+
 @pytest.mark.further
 def test_the_critical_mode_is_undamped_there():
     coach = load_vehicle("coach_flexicoil")
