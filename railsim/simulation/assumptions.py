@@ -7,7 +7,8 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.simulation.sampling import output_words
+from railsim.model.control import periods
+from railsim.simulation.sampling import output_words, sampled
 
 
 def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float) -> list[str]:
@@ -18,7 +19,11 @@ def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float
     wheelsets = (body.wheelset for body in flatten(vehicle).bodies)
     wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
-    step = "chosen" if settings.step is None else f"{settings.step * 1e3:.4g} ms"
+    most = [(sampled(settings).output_interval(speed), "output")]  # which no step exceeds
+    most += [(period, "controllers and sampled signals") for period in periods(vehicle)]
+    step = f"chosen, {1e3 * min(most)[0]:.4g} ms at most ({min(most)[1]})"
+    if settings.step is not None:
+        step = f"{settings.step * 1e3:.4g} ms"
     return [
         f"{vehicle.name_with_load} on {track.name} at {speed:g} m/s ({3.6 * speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",

@@ -149,6 +149,23 @@ def test_support_is_told_and_whether_its_values_are_the_presets():
 
 
 @pytest.mark.parametrize(
+    ("settings", "rate", "words"),
+    [
+        ({}, None, "step chosen, 5 ms at most (output), output 200 per s"),
+        ({"output_rate": 4000.0}, 500.0, "step chosen, 0.25 ms at most (output)"),
+        ({"output_spacing": 0.1}, 2000.0, "0.5 ms at most (controllers and sampled signals)"),
+        ({"step": 1e-3}, None, "step 1 ms, output"),
+    ],
+)
+def test_what_bounds_the_step_is_told(settings, rate, words):
+    """0.1 m at 20 m/s are 5 ms; a signal of 2000 values per second has one every 0.5 ms."""
+    signal = {"quantity": "time"} | ({"rate": rate} if rate else {})
+    coach = railsim.load_vehicle("coach_manchester").replace(signals={"clock": signal})
+    given = railsim.Settings.model_validate(settings)
+    assert words in assumptions(coach, railsim.load_track("straight"), given, 20.0)[-1]
+
+
+@pytest.mark.parametrize(
     ("settings", "words"),
     [
         ({}, "(with slip down to 0.4 of it, 0.6 s/m), third body 0.5 (not 0.2 in the slip area"),
