@@ -150,34 +150,32 @@ def irregularity(
     return joined(measurement.name, vehicle.name, found, smooth.flanges, remarks, bare)
 
 
-def _other_curves(track: Track, measurement: Measurement, used: dict[str, str]) -> list[str]:
+def _other_curves(track: Track, read: Measurement, used: dict[str, str]) -> list[str]:
     """Remark where a record has not the curves or cants of the track, by means over `WINDOW`.
 
     Compared are kappa, where there is a channel of it, and v^2 kappa - g sin(cant angle) with the
     median of all accelerations in y, each of which has its own bias.
     """
-    s, v, plan = measurement.distance, np.maximum(measurement.speed, 1.0), Alignment(track)
-    turns = [
-        measurement[n] / (v if n == "yaw_rate" else 1.0) for n in CURVATURES if n in measurement
-    ]
-    names = [n for n in used if used[n].endswith(".y") and not measurement.channel(n).high_pass]
+    s, v, plan = read.distance, np.maximum(read.speed, 1.0), Alignment(track)
+    turns = [read[n] / (v if n == "yaw_rate" else 1.0) for n in CURVATURES if n in read]
+    across = [read[n] for n in used if used[n].endswith(".y") and not read.channel(n).high_pass]
     kappa, remarks = plan.curvature(s), []
     steady = v**2 * kappa - GRAVITY * np.sin(plan.cant_angle(s))
     edges = np.searchsorted(s, np.arange(s[0], s[-1], WINDOW)).tolist()
     for words, channels, of_track, most in (
         ("curvature of {:.2g} 1/m", turns[:1], kappa, MOST_CURVATURE),
-        ("lateral acceleration of {:.2g} m/s2", [measurement[n] for n in names], steady, MOST_Y),
+        ("lateral acceleration of {:.2g} m/s2", across, steady, MOST_Y),
     ):
         rows = [slice(*ends) for ends in pairwise(edges) if channels]
-        means = [[m for x in channels if np.isfinite(m := np.mean(x[one]))] for one in rows]
-        read = np.array([np.median(values or [np.nan]) for values in means])
-        off = read - np.array([np.mean(of_track[one]) for one in rows])
+        means = [[m for x in channels if np.isfinite(m := float(np.mean(x[one])))] for one in rows]
+        own = np.array([np.median(np.array(values or [np.nan])) for values in means])
+        off = own - np.array([np.mean(of_track[one]) for one in rows])
         if len(far := np.flatnonzero(np.abs(off) > most)):
             k = far[np.argmax(np.abs(off[far]))]
-            at, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", read[k] - off[k] + 0.0
+            at, has = f"s = {s[edges[k]]:.0f} to {s[edges[k + 1]]:.0f} m", own[k] - off[k] + 0.0
             remarks.append(
                 f"The record is not of the curves and cants of track '{track.name}': at {at} it "
-                f"has a {words.format(read[k])} in the mean, the track one of {has:.2g}; they "
+                f"has a {words.format(own[k])} in the mean, the track one of {has:.2g}; they "
                 f"differ by more than {most:g} in {len(far)} of {len(rows)} such lengths."
             )
     return remarks

@@ -6,6 +6,7 @@ lateral displacement and yaw, with the curve shaded and the limits of EN 14363 w
 
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -131,7 +132,7 @@ def _draw(
     others = [line for line in panel.lines if "wheelset" not in line.labels]
     for index, line in enumerate(panel.lines):
         side = line.labels.get("side", "left")
-        look = {"color": style.distinct(index)}
+        look: dict[str, Any] = {"color": style.distinct(index)}
         if by == "wheelset" and "side" in line.labels:
             look = {"color": style.DISTINCT[0] if side == "left" else style.DISTINCT[1]}
         elif "wheelset" in line.labels:

@@ -21,9 +21,8 @@ def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
     most = [(sampled(settings).output_interval(speed), "output")]  # which no step exceeds
     most += [(period, "controllers and sampled signals") for period in periods(vehicle)]
-    step = f"chosen, {1e3 * min(most)[0]:.4g} ms at most ({min(most)[1]})"
-    if settings.step is not None:
-        step = f"{settings.step * 1e3:.4g} ms"
+    chosen = f"chosen, {1e3 * min(most)[0]:.4g} ms at most ({min(most)[1]})"
+    step = chosen if settings.step is None else f"{settings.step * 1e3:.4g} ms"
     return [
         f"{vehicle.name_with_load} on {track.name} at {speed:g} m/s ({3.6 * speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
