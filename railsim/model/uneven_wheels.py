@@ -1,13 +1,12 @@
 """Wheels that are not round, in the arrays of a run.
 
 Equilibrium, linear analyses and the choice of the step see round wheels, as they see smooth rails;
-`rolling` gives the system that runs, with the check rails.  A run begins on the wheels as they are.
+`rolling` gives the system that runs, with the check rails.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from railsim.arrays import Floats, Integers
 from railsim.contact.curves import rail_curve, tape_circle_position
@@ -17,7 +16,7 @@ from railsim.definitions.vehicle.flatten import FlatVehicle
 from railsim.definitions.vehicle.out_of_round import Flat, Sections, Uneven
 from railsim.kernels.contact_table import FLANGE, N_PATCH, TREAD
 from railsim.kernels.system import System
-from railsim.kernels.wheel_surface import DY, FIRST, FLAT, N_PHI, N_Y, SURFACE_ROW, WAVE, Y0
+from railsim.kernels.wheel_surface import FIRST, FLAT, N_PHI, N_Y, SURFACE_ROW, WAVE
 from railsim.model.check_rails import CheckRails
 from railsim.model.rail_ranges import RailRanges
 from railsim.profiles.profile import Profile
@@ -38,21 +37,20 @@ class UnevenWheels(NamedTuple):
         """Whether a wheel is not round."""
         return bool((self.surface_of >= 0).any())
 
+    def heights(self, w: int, angle: float) -> Floats:
+        """Return e and e_phi of both treads of wheelset `w` in mid-gauge [m], at an angle."""
+        found, turn = np.zeros((2, 2)), 2.0 * np.pi
+        for side, table in enumerate(self.surface_of[w, :, TREAD]):
+            if table >= 0:
+                first, n, n_y = self.surface_row[table, [FIRST, N_PHI, N_Y]].astype(int).tolist()
+                values = self.surface[first + n_y // 2 : first + n * n_y : n_y, :2]
+                nodes = np.linspace(0.0, turn, n, endpoint=False)
+                found[side] = [np.interp(angle, nodes, x, period=turn) for x in values.T]
+        return found
+
     def longest_step(self, speed: float) -> float:
         """Longest step that resolves the waves around the wheels [s]."""
         return float(min(self.surface_row[:, WAVE], default=np.inf)) / (PER_LENGTH * speed)
-
-    def at(self, w: int, side: int, phi: float) -> tuple[float, float]:
-        """Height of a wheel at an angle [m] and its derivative, at the nominal rolling circle."""
-        table = self.surface_of[w, side, TREAD]
-        if table < 0:
-            return 0.0, 0.0
-        first, n_phi, n_y, y0, dy = self.surface_row[table, [FIRST, N_PHI, N_Y, Y0, DY]]
-        at, step = round(min(max(-y0 / dy, 0.0), n_y - 1.0)), 2.0 * np.pi / n_phi
-        cell, x = divmod(phi % (2.0 * np.pi), step)
-        rows = [int(first + k % n_phi * n_y + at) for k in (cell, cell + 1)]
-        curve = CubicHermiteSpline([0.0, step], *self.surface[rows, :2].T)
-        return float(curve(x)), float(curve(x, 1))
 
 
 ROUND = UnevenWheels(

@@ -27,7 +27,7 @@ from railsim.simulation.conditions import Inputs, TakenUp, check_agreement
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.first_start import compiled_beside
 from railsim.simulation.outputs import OutputPlan, run_extremes
-from railsim.simulation.run_in import rest_on_wheels, start_state
+from railsim.simulation.run_in import start_state
 from railsim.simulation.run_progress import RunProgress
 from railsim.simulation.sampling import filtering, low_pass_remark, output_words, sampled
 from railsim.simulation.step_choice import StepChoice, inputs_hash
@@ -70,8 +70,6 @@ def prepare(
             on_run_in,
             remarks.append if settings.start_state == "steady" else None,
         )
-        if model.wheels.uneven:
-            rest_on_wheels(model, state)
         remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(before.motion, model.n_state)

@@ -12,6 +12,8 @@ rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
 - onto irregular rails over the last seconds of the real track before the start;
 - where it does not stay on the rails that way, over the whole track from its beginning: so it can
   start wherever a run passes.
+
+The wheels are round up to there; on wheels that are not, the wheelsets are put as they stand.
 """
 
 import math
@@ -113,6 +115,8 @@ def start_state(
             system = system._replace(drive=CONSTANT_SPEED)
             _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
         state[-3:] = 0.0, start, speed
+        if model.wheels.uneven:
+            follow_wheels(model, state, track.rail_base)
         return state
 
     steps = _approach(model, track, start, speed, step)
@@ -238,19 +242,23 @@ def follow_rails(model: Model, state: Floats) -> None:
         state[rate + 3] += speed * plane[w, ROLL_SLOPE]
 
 
-def rest_on_wheels(model: Model, state: Floats) -> None:
-    """Lift the wheelsets onto wheels that are not round, moving as these lead them."""
-    system, velocities = model.system, velocity_begin(model.index.n_bodies)
+def follow_wheels(model: Model, state: Floats, base: float) -> None:
+    """Put the wheelsets on wheels that are not round, moving as these lead them.
+
+    z = -(e_l + e_r)/2 and roll = -(e_r - e_l)/`base` [m] about the rails, e and its rate e_phi V/r0
+    as in `railsim.kernels.wheel_surface`.
+    """
+    system, n = model.system, model.index.n_bodies
     for w, body in enumerate(system.contact.body):
+        radius, first = system.bodies.row[body, RADIUS], 6 * body
         s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[body]]
-        radius = system.bodies.row[body, RADIUS]
-        phi, turn = s / radius - state[6 * body + 4], state[SPEED] / radius
-        of_sides = [model.wheels.at(w, side, float(phi)) for side in range(2)]
-        for first, (left, right) in zip(
-            (6 * body, velocities + 6 * body), np.transpose(of_sides) * [[1.0], [turn]], strict=True
-        ):
-            state[first + 2] -= 0.5 * (left + right)
-            state[first + 3] += (left - right) / system.track.rail_base
+        e = model.wheels.heights(w, s / radius - state[first + 4])
+        e[:, 1] *= state[SPEED] / radius
+        for at, left, right in zip((first, velocity_begin(n) + first), e[0], e[1], strict=True):
+            roll = (left - right) / base
+            state[at + 1] -= system.bodies.nominal[body, 1] * roll
+            state[at + 2] -= 0.5 * (left + right)
+            state[at + 3] += roll
 
 
 def _run(
