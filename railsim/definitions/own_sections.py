@@ -1,7 +1,8 @@
 """Files of test sections of the user's own, `railsim-sections/1`, as a laboratory has them."""
 
+import csv
 from contextlib import suppress
-from itertools import combinations, zip_longest
+from itertools import combinations
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -60,11 +61,10 @@ def of_csv(text: str) -> dict[str, Any]:
     """Return the tables of a file of a section a line, comma or semicolon, keys as header."""
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     separator = ";" if ";" in "".join(lines[:1]) else ","
-    cells = [[cell.strip(' "') for cell in line.split(separator)] for line in lines]
-    sections: list[dict[str, Any]] = []
-    for row in cells[1:]:
-        sections.append({k: v for k, v in zip_longest(cells[0], row, fillvalue="") if v})
-        for key in {"begin", "end"} & sections[-1].keys():
+    rows = csv.DictReader(lines, restkey="", delimiter=separator, skipinitialspace=True)
+    sections: list[dict[str, Any]] = [{k: v for k, v in row.items() if v} for row in rows]
+    for section in sections:
+        for key in {"begin", "end"} & section.keys():
             with suppress(ValueError):  # what is no number is said with its key
-                sections[-1][key] = float(sections[-1][key])
+                section[key] = float(section[key])
     return {"format": OwnSections.format_name(), "sections": sections}
