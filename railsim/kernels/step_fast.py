@@ -52,9 +52,10 @@ from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector
 # to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
-# Irregular rigid rails: what a wheelset follows of them is known (`follow_rails`); its y and other
-# bodies, whose lag would be the main error of Y, are not smoothed.
-RAILS = 1.0 - 0.25 * SMOOTHING
+# Irregular rigid rails: what a wheelset follows of them is known (`follow_rails`).  Its y, whose lag
+# would be the main error of Y, is not smoothed, and other bodies are less: without, steps on side
+# frames and friction wedges are judged stable that are not where a contact is stiffer.
+RAILS, OF_BODIES = 1.0 - 0.25 * SMOOTHING, 0.6
 # Elastic rails have no such ringing: nothing is smoothed.  An axlebox, as an arm on its bush, keeps
 # the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.  So does the
 # spin of a driven or braked wheelset: a brake that holds it would chatter.
@@ -237,10 +238,11 @@ def step_fast(system, work, state, derivative, decay, h):
         q = 6 * b
         v = velocity_begin(n) + q
         kind = bodies.kind[b]
-        follows = (uneven or system.support.elastic) and kind != AXLEBOX
+        follows = system.support.elastic and kind != AXLEBOX
         beta = aside = spin = UNSMOOTHED if follows else SMOOTHING
-        if uneven and kind == WHEELSET:
-            beta = spin = SMOOTHING
+        if uneven and kind != AXLEBOX:
+            aside = UNSMOOTHED if kind == WHEELSET else OF_BODIES
+            beta = spin = SMOOTHING if kind == WHEELSET else OF_BODIES
         if kind == WHEELSET:
             soften_contact(bodies, work.contact_jacobian, b, rate, before, h, last)
             for e in range(system.drives.body.shape[0]):
