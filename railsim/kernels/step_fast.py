@@ -52,7 +52,7 @@ from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector
 # to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
-# Irregular rigid rails: what a wheelset follows of them is known (`follow_rails`).  Its y, whose lag
+# Irregular rigid rails: what a wheelset follows of them is known (`follow_rails`); its y, whose lag
 # would be the main error of Y, is not smoothed, and other bodies are less: without, steps on side
 # frames and friction wedges are judged stable that are not where a contact is stiffer.
 RAILS, OF_BODIES = 1.0 - 0.25 * SMOOTHING, 0.6
