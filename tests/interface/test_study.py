@@ -18,6 +18,7 @@ import h5py
 import numba
 import numpy as np
 import pytest
+from deadly import deadly_work
 from example_result import ROOT, feed
 from planned import combinations
 from selection import points
@@ -737,6 +738,7 @@ def workers_of(process):
 
 
 @pytest.mark.slow
+@pytest.mark.further  # processes that die in the next test
 def test_killed_worker_costs_nothing_but_time(tmp_path):
     """Its runs begin again, those of the others too where the pool goes down."""
     given = arguments(tmp_path, 20, 21, 22)[:-2]
@@ -764,20 +766,16 @@ def test_killed_worker_costs_nothing_but_time(tmp_path):
 
 @pytest.mark.slow
 def test_run_whose_process_dies_twice_is_given_up_and_the_others_go_on(tmp_path, monkeypatch):
-    """A vehicle's file may want more memory than there is; the others' runs are not lost."""
+    """A vehicle's file may want more memory than there is; the others' runs are not lost.
+
+    Nor that of 22 m/s, whose process dies once.
+    """
     monkeypatch.setattr(execute, "_work", deadly_work)
-    outcome = railsim.study(COACH, CURVE, [20.0, 21.0, 22.0], until=10.0, out=tmp_path, workers=2)
+    out = tmp_path / "study"
+    outcome = railsim.study(COACH, CURVE, [20.0, 21.0, 22.0], until=10.0, out=out, workers=2)
     assert [record["status"] for record in outcome.records] == ["complete", "failed", "complete"]
     assert "its process died twice" in outcome.failed[0]["status_reason"]
-
-
-def deadly_work(index, job):
-    from railsim.studies import execute  # in the process of the worker
-
-    if job.case.speed == 21.0:
-        execute._shared[1][index] = os.getpid()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return execute._work(index, job)
+    assert os.listdir(tmp_path / "study.died") == ["22"]
 
 
 @pytest.mark.parametrize("workers", [0, -1, 2.5, "2"])
