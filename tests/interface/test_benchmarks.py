@@ -22,7 +22,7 @@ SMALL = {
     "growth.py": ["--coaches", "1", "--grids", "5", "--rates", "--lengths"],
     "irregular.py": ["--counts", "--until", "20"],
     "journal.py": ["40"],
-    "mechanisms.py": ["--starts", "1", "--search", "atr95_lift_4", "--repeats", "1"],
+    "mechanisms.py": ["--starts", "1", "--search", "atr95_lift_2", "--repeats", "1"],
     "optimise.py": ["out", "small.toml", "--side", "3", "--seeds", "0"],
     "peers.py": ["--small"],
     "springs.py": ["--repeats", "1"],
