@@ -16,6 +16,8 @@ import railsim.contact.stored_table  # uses the class that the fixture replaces
 import railsim.contact.table
 import railsim.model.solutions
 from railsim.contact.table import TableGrid
+from railsim.laws import PERMITTED
+from railsim.threads import environment_kept
 
 gc.disable()  # until all is collected
 ROOT = Path(__file__).parent.parent
@@ -40,6 +42,17 @@ def reference_dir():
     if not folder.is_dir():
         pytest.skip(f"no reference data at {folder}")
     return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def permitted_laws():
+    """What tests permit by `railsim.laws.allow` ends with their file.
+
+    In an environment that is not that of the server of workers, all workers begin by themselves:
+    two seconds each.
+    """
+    with environment_kept(PERMITTED):
+        yield
 
 
 @pytest.fixture(scope="session")
