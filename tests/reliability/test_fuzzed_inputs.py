@@ -65,7 +65,7 @@ def test_damaged_definitions(tmp_path, capsys):
         command = "info" if seed % 5 == 0 else "validate"
         return outcome([command, path], capsys, f"definition {seed}")
 
-    assert {0, 2} == set(tried(180, case))  # the damage is neither always fatal nor always harmless
+    assert {0, 2} == set(tried(90, case))  # the damage is neither always fatal nor always harmless
 
 
 def test_damaged_recordings(tmp_path, capsys):
@@ -80,7 +80,7 @@ def test_damaged_recordings(tmp_path, capsys):
         given = ["validate", tmp_path / "track.toml"]
         return outcome(given, capsys, f"recording {seed}")
 
-    assert {0, 2} == set(tried(60, case))
+    assert {0, 2} == set(tried(40, case))
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_damaged_bytes_of_results(result, tmp_path):
             np.testing.assert_array_equal(found[name], clean[name], err_msg=f"{seed}: {name}")
         return "accepted"
 
-    outcomes = tried(100, case)
+    outcomes = tried(60, case)
     assert outcomes.count("refused") > 0.9 * len(outcomes)
 
 
@@ -258,7 +258,7 @@ def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
             index = json.loads((folder / "study.json").read_text())
             assert index["status"] == "complete"
 
-    tried(24, case)
+    tried(16, case)
 
 
 def journal_changed(data, rng):
