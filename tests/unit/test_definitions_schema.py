@@ -57,7 +57,8 @@ def test_shipped_file_satisfies_its_schema_as_written_and_resolved(kind, name):
     written, resolved = sources.read_toml(path), sources.read_source(path, kind).data
     validator = validator_of(written["format"])
     validator.validate(written)
-    validator.validate(resolved)
+    if resolved != written:
+        validator.validate(resolved)
 
 
 @pytest.mark.parametrize(
