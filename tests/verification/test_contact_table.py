@@ -76,7 +76,7 @@ def test_heights_of_worn_profiles_agree_too(seed):
     assert np.median(np.abs(errors)) < 15e-6
 
 
-@points(("wheel", "rail"), [(None, "60E1"), (7, "benchmark"), (1, "60E1")], always=(0, 1))
+@points(("wheel", "rail"), [(None, "60E1"), (7, "benchmark"), (1, "60E1")], always=(0,))
 def test_normal_force_is_the_gradient_of_one_potential_over_the_whole_table(wheel, rail):
     table = table_of(wheel, rail)
     step = np.diag([1e-8, 1e-8, 1e-8, 1e-9])
@@ -160,10 +160,13 @@ def test_worn_and_conformal_pairs_have_forces_without_jumps(pair):
     [
         pytest.param(
             15.0,
-            marks=pytest.mark.xfail(
-                reason="a patch shared by tread and flange root is turned by up to 11 mrad",
-                strict=False,
-            ),
+            marks=[
+                pytest.mark.xfail(
+                    reason="a patch shared by tread and flange root is turned by up to 11 mrad",
+                    strict=False,
+                ),
+                pytest.mark.further,
+            ],
         ),
         30.0,
         45.0,

@@ -48,7 +48,7 @@ def ways(monkeypatch):
     return found
 
 
-@pytest.mark.parametrize("support", ["rigid", "ballasted"])
+@points("support", ["rigid", "ballasted"], always=(1,))
 def test_state_of_rest_is_the_end_of_a_long_run(support, monkeypatch):
     """Wheel forces within 1e-4 of the load: the car's sway decays with 0.25 1/s at least."""
     track = railsim.load_track("curve_r250").replace(support={"preset": support})

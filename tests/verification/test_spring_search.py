@@ -18,7 +18,7 @@ WIRES = "[0.022, 0.024, 0.027, 0.028, 0.038, 0.040, 0.041, 0.043]"
 QUICK = ["search.candidates=512", "search.results=3", f"search.wire_diameters={WIRES}"]
 
 
-@pytest.fixture(scope="module", params=["mass", "fatigue"])
+@pytest.fixture(scope="module", params=[pytest.param("mass", marks=pytest.mark.further), "fatigue"])
 def found(request):
     suspension = load_spring("turasas_axlebox", [*QUICK, f"search.objective={request.param}"])
     return suspension, search(suspension)
