@@ -142,6 +142,20 @@ def coarse_contact_tables_in_module():
         yield
 
 
+@contextlib.contextmanager
+def empty_pictures():
+    """Pictures are empty files: a second each where a test looks at other files only."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("railsim.plot.style.save", lambda _, path, **__: Path(path).touch())
+        yield
+
+
+@pytest.fixture
+def undrawn():
+    """See `empty_pictures`: a block of a test."""
+    return empty_pictures
+
+
 # The same examples in every run; `--hypothesis-profile search` draws new ones. A first call may
 # compile, and the machine may be busy: time is no property.
 settings.register_profile("railsim", deadline=None, derandomize=True)

@@ -188,12 +188,13 @@ def test_runs_that_differ_in_the_vehicle_are_compared(folder, capsys):
     assert all(group["results"] == [COACH, "coach_flexicoil"] for group in groups)
 
 
-def test_runs_of_the_same_name_are_compared(tmp_path, simulated, capsys):
+def test_runs_of_the_same_name_are_compared(tmp_path, simulated, capsys, undrawn):
     for name, speeds in (("before", [10.0, 12.0]), ("after", [12.0])):
         railsim.study(COACH, CURVE, speeds, out=tmp_path / name, workers=1)
     out = tmp_path / "c"
     folders = [str(tmp_path / name) for name in ("before", "after")]
-    assert main(["compare", *folders, "--out", str(out)]) == 0
+    with undrawn():
+        assert main(["compare", *folders, "--out", str(out)]) == 0
     printed = capsys.readouterr()
     assert "1 runs of" in printed.err
     assert "along the track, leading wheelset" in printed.out

@@ -30,9 +30,12 @@ def command(tmp_path):
 
 
 @pytest.mark.usefixtures("small_contact_tables")
-def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys, monkeypatch):
+def test_steps_are_kept_and_a_longer_distance_goes_on(
+    command, tmp_path, capsys, monkeypatch, undrawn
+):
     folder = tmp_path / "worn"
-    assert main([*command, "--distance", "100", "--json"]) == 0
+    with undrawn():
+        assert main([*command, "--distance", "100", "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
     (kept,) = (folder / "steps").iterdir()
     content = kept.read_bytes()
@@ -74,7 +77,8 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys,
     assert page.read_text() == told
     # damage: told and computed again
     kept.write_bytes(content.replace(b"0", b"1", 3))
-    assert main([*command, "--distance", "200", "--overwrite"]) == 0
+    with undrawn():
+        assert main([*command, "--distance", "200", "--overwrite"]) == 0
     assert (
         capsys.readouterr().err == f"remark: {kept}: the record is damaged: it is computed again\n"
     )
@@ -112,7 +116,7 @@ def test_bad_input_is_met_before_anything_is_computed(
 
 
 @pytest.mark.usefixtures("small_contact_tables")
-def test_loop_that_is_refused_keeps_what_was_done(command, tmp_path, capsys, monkeypatch):
+def test_loop_that_is_refused_keeps_what_was_done(command, tmp_path, capsys, monkeypatch, undrawn):
     """Of 200 km 150 are done: a whole step and a part of the second."""
     folder = tmp_path / "worn"
     parts_of_step = railsim.studies.wear_loop.parts_of_step
@@ -125,7 +129,8 @@ def test_loop_that_is_refused_keeps_what_was_done(command, tmp_path, capsys, mon
         return number
 
     monkeypatch.setattr("railsim.studies.wear_loop.parts_of_step", refused_at_last)
-    assert main([*command, "--distance", "200"]) == 2
+    with undrawn():
+        assert main([*command, "--distance", "200"]) == 2
     said = capsys.readouterr()
     assert "worn too far" in said.err
     firsts = [line.split()[0] for line in said.out.splitlines() if line]
