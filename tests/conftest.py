@@ -145,8 +145,13 @@ def coarse_contact_tables_in_module():
 @contextlib.contextmanager
 def empty_pictures():
     """Pictures are empty files: a second each where a test looks at other files only."""
+
+    def save(_, path, **__):
+        Path(path).touch()
+        return Path(path)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("railsim.plot.style.save", lambda _, path, **__: Path(path).touch())
+        patch.setattr("railsim.plot.style.save", save)
         yield
 
 

@@ -721,13 +721,14 @@ def test_surface_fatigue_is_that_of_the_worst_patch():
         assert wheel.fatigue_index == pytest.approx(T_over_N - 300e6 / p0)
 
 
-def test_command_prints_writes_and_fails_only_when_asked(hunting_file, tmp_path, capsys):
+def test_command_prints_writes_and_fails_only_when_asked(hunting_file, tmp_path, capsys, undrawn):
     path = hunting_file
     assert main(["assess", path]) == 0
     shown = capsys.readouterr().out
     assert "verdict: incomplete" in shown
     assert "not checked against the printed standard" in shown
-    assert main(["assess", path, "--json", "--out", str(tmp_path / "out")]) == 0
+    with undrawn():
+        assert main(["assess", path, "--json", "--out", str(tmp_path / "out")]) == 0
     data = json.loads(capsys.readouterr().out)[0]
     assert data["standard"] == "en14363"
     keys = {"name", "place", "mean", "deviation", "estimate", "limit", "share", "source", "checked"}

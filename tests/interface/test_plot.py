@@ -390,8 +390,9 @@ def test_picture_has_the_format_of_its_ending(file, tmp_path, ending, capsys):
     assert {"png": b"PNG", "svg": b"<svg", "pdf": b"%PDF"}[ending] in head
 
 
-def test_default_picture_is_beside_the_result_and_not_overwritten(file, capsys):
-    assert main(["plot", str(file)]) == 0
+def test_default_picture_is_beside_the_result_and_not_overwritten(file, capsys, undrawn):
+    with undrawn():
+        assert main(["plot", str(file)]) == 0
     assert main(["plot", str(file)]) == 2
     assert "--overwrite" in capsys.readouterr().err
     assert main(["plot", str(file), "Y", "--overwrite", "--json"]) == 0
