@@ -50,8 +50,6 @@ LONG = frozenset(
         "interface/test_stationary.py::test_load_to_one_side_is_leant_to_its_own_side",
         "verification/test_model_validation.py::test_one_late_channel_does_not_move_the_others",
         "verification/test_rail_wear.py::test_every_vehicle_of_a_mix_that_hunts_is_named",
-        "interface/test_examples.py::test_example_runs_and_draws_its_picture[02_does_it_pass]",
-        "interface/test_examples.py::test_example_runs_and_draws_its_picture[06_which_modes]",
         "interface/test_examples.py::test_example_runs_and_draws_its_picture[11_skyhook]",
         "interface/test_stability_commands.py::"
         "test_damaged_point_of_a_map_is_computed_again_and_told",
