@@ -32,7 +32,7 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import ARC_LENGTH, N_SCALARS, SPEED, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET, System
-from railsim.kernels.track_frame import MU_LEFT, OMEGA
+from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT, OMEGA
 from railsim.model.assembly import Model
 from railsim.model.preloads import least_squares, with_preloads, with_these_preloads
 from railsim.model.solutions import solution
@@ -107,7 +107,7 @@ def _at_rest(model: Model) -> AtRest:
 
 def stored_equilibrium(model: Model, speed: float, inputs: str) -> Equilibrium:
     """As `equilibrium`, from the disk where it was found before; `inputs` as there."""
-    friction = model.system.track.rail[:, MU_LEFT : MU_LEFT + 2, 0]
+    friction = model.system.track.rail[:, MU_LEFT : MU_RIGHT + 1, 0]
     digest = hashlib.sha256(f"{inputs} {speed!r} {model.system.contact.values.shape}".encode())
     digest.update(np.ascontiguousarray(friction).data)
 
@@ -178,8 +178,8 @@ def _with_friction(level: System, system: System):  # type: ignore[no-untyped-de
     """
     rail = level.track.rail.copy()
     row = min(max(int(-system.track.s_start / system.track.ds), 0), len(system.track.rail) - 1)
-    friction = system.track.rail[row, MU_LEFT : MU_LEFT + 2, 0]
-    rail[:, MU_LEFT : MU_LEFT + 2, 0] = np.maximum(friction, ONE_SIDED * np.max(friction))
+    friction = system.track.rail[row, MU_LEFT : MU_RIGHT + 1, 0]
+    rail[:, MU_LEFT : MU_RIGHT + 1, 0] = np.maximum(friction, ONE_SIDED * np.max(friction))
     return level.track._replace(rail=rail)
 
 
@@ -234,9 +234,11 @@ def conditions(
     """Unknowns and equations of balance as entries of the state, and the inertias of equations.
 
     The unknown of a wheelset's spin is its rate, of all others the position; without `rolling` it
-    does not spin.  `held`: neither wheelsets nor their track move.
+    does not spin, and without friction nothing turns it.  `held`: neither wheelsets nor their track
+    move.
     """
     n, bodies, support = model.index.n_bodies, system.bodies, system.support
+    rolling = rolling and bool(system.track.rail[:, MU_LEFT : MU_RIGHT + 1, 0].any())
     unknowns, equations, inertias = [], [], []
     for body, kind in enumerate(bodies.kind):
         for component in components_of(int(kind)):

@@ -257,7 +257,7 @@ def with_class_friction(model: Model, *, least: bool = False) -> Model:
     track = model.system.track
     rail = track.rail.copy()
     friction = rail[:, MU_LEFT : MU_RIGHT + 1, 0]
-    number = np.ceil(friction / FRICTION_CLASS - 1e-9) - float(least)
+    number = np.maximum(np.ceil(friction / FRICTION_CLASS - 1e-9) - float(least), 0.0)
     rail[:, MU_LEFT : MU_RIGHT + 1, 0] = FRICTION_CLASS * number
     return replace(model, system=model.system._replace(track=track._replace(rail=rail)))
 

@@ -161,7 +161,7 @@ def test_steps_divide_the_output_interval_and_the_periods_of_controllers(
 
 
 def test_other_end_of_a_class_has_its_highest_speed_and_lowest_friction(monkeypatch):
-    """From 1.2^16 to 1.2^17 m/s, from 0.2 to 0.3 and from 0.3 to 0.4."""
+    """From 1.2^16 to 1.2^17 m/s, from 0.2 to 0.3 and from 0.3 to 0.4; none is not below 0."""
     asked = []
 
     def judged(self, kind, model, speed, step, judge):
@@ -173,3 +173,6 @@ def test_other_end_of_a_class_has_its_highest_speed_and_lowest_friction(monkeypa
     prepare(load_vehicle("coach_manchester"), track, Settings(), 20.0, duration=1.0).steps.at(20.0)
     assert asked[0] == ("class", *(pytest.approx(x) for x in (1.2**16, 0.3, 0.4)))
     assert asked[1] == ("end of class", *(pytest.approx(x) for x in (1.2**17, 0.2, 0.3)))
+    track = track.replace(friction=(0.0, 0.3001))
+    prepare(load_vehicle("coach_manchester"), track, Settings(), 20.0, duration=1.0).steps.at(20.0)
+    assert asked[-1] == ("end of class", *(pytest.approx(x) for x in (1.2**17, 0.0, 0.3)))

@@ -8,9 +8,11 @@ from dynamics import load_vehicle
 from selection import points
 
 import railsim
+from railsim.definitions.mirror import mirrored_track
 from railsim.definitions.settings import Settings
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.state import velocity_begin
 from railsim.linear.steady import NotConverged, SteadyRolling
 from railsim.model import time_step
 from railsim.model.assembly import assemble
@@ -145,6 +147,23 @@ def test_state_led_to_another_speed_and_friction_is_the_one_found_there(
     assert led[1][-1] == found[1][-1]
     forces = [wheel_forces(*at) / load for at in (led, found)]
     assert forces[0] == pytest.approx(forces[1], abs=1e-4)
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_without_friction_wheelsets_turn_as_before_in_curves_of_either_hand():
+    """No torque turns them; 1700 to 7200 rad/s without any cause made each hand another state."""
+    right = with_friction(railsim.load_track("curve_r500"), 0.0)
+    left = mirrored_track(right)
+    forces = []
+    for track in (right, left):
+        model, state, load = rolling("coach_manchester", track, 25.0)
+        system, found = flange.in_flange_contact(model, track, state, STEP)
+        forces.append(wheel_forces(system, found) / load)
+        spins = velocity_begin(model.index.n_bodies) + 6 * system.contact.body + 4
+        radius = system.bodies.radius[system.contact.body]
+        assert found[spins] == pytest.approx(-25.0 / radius, rel=1e-4)
+    mirrored = forces[1][:, ::-1] * (1.0, -1.0)
+    assert forces[0] == pytest.approx(mirrored, abs=1e-4)
 
 
 def growth_beyond_the_vehicle(model, at, step):
