@@ -15,6 +15,7 @@ from railsim.definitions.vehicle.laws import BODY_SIGNALS, Controller, Signal
 from railsim.errors import Fault, InputError, argument_error, nearest
 from railsim.kernels import actuators as acts
 from railsim.kernels import controllers as kernel
+from railsim.kernels import element_columns as layout
 from railsim.kernels import element_outputs as element
 from railsim.kernels.commands import Controllers, Signals
 from railsim.kernels.contact_columns import W_Q, W_Y
@@ -148,7 +149,7 @@ class _Wiring:
             for group, names in enumerate(groups):
                 if signal.element in names:
                     number = names.index(signal.element)
-                    own = self._axes(group, number)
+                    own = self._axes(group, number, quantity)
                     if quantity != "power" and signal.axis not in own:
                         found = f"found {signal.axis or 'none'}; {signal.element} acts elsewhere"
                         self.fault(f"{key}.axis", found, " or ".join(a or "none" for a in own))
@@ -162,11 +163,22 @@ class _Wiring:
             return kernel.TRAVEL, 0, 0, OF_RUN[quantity]
         return (kernel.CURVATURE if quantity == "curvature" else kernel.CANT), 0, 0, 0
 
-    def _axes(self, group: int, number: int) -> tuple[str | None, ...]:
-        """Axes in which an element has a deflection; a line is that of none."""
+    def _axes(self, group: int, number: int, quantity: str) -> tuple[str | None, ...]:
+        """Axes in which an element has a deflection, or a force; a line is that of none."""
         action = self._acts[number, acts.ACTION] if group == kernel.ACTUATOR else acts.LINE
         if group == element.MOUNT:
-            return (None, *COMPONENTS)
+            mounts = self._model.system.mounts
+            value = {name: mounts.row[number, at] for name, at in layout.MOUNT_COLUMNS.items()}
+            along = np.any([value[n] for n in ("stiffness", "damping", "preload")], axis=0)
+            along[mounts.law[mounts.law[:, 0] == number, 1]] = True
+            # of K_d, see `rotation_potential`
+            about = value["rotation"].sum() - value["rotation"] + value["rotation_damping"]
+            own = [*along, *about]
+            if quantity != "force":
+                own = [mounts.flags[number, layout.TRANSLATES]] * 3 + [True] * 3
+            return (None,) * bool(own[0]) + tuple(
+                a for a, on in zip(COMPONENTS, own, strict=True) if on
+            )
         if action == acts.LINE:
             return (None, "x")
         return (COMPONENTS[4 if action == acts.AXLE else action - acts.ALONG],)

@@ -175,10 +175,42 @@ def test_signals_of_an_element_are_those_of_its_axis(coach, track, acts, element
 
 
 @pytest.mark.parametrize(
+    ("values", "quantity", "axis", "allowed"),
+    [
+        ({"stiffness": [0.0, 1e6, 0.0]}, "force", "roll", "y"),
+        (
+            {"stiffness": [0.0, 1e6, 0.0], "rotational_stiffness": [0.0, 0.0, 1e4]},
+            "force",
+            None,
+            "y or yaw",
+        ),
+        (
+            {"stiffness": [1e6, 0.0, 0.0], "damping": [0.0, 0.0, 1e3]},
+            "force",
+            "y",
+            "none or x or z",
+        ),
+        ({"stiffness": [0.0, 1e6, 0.0]}, "rate", "roll", None),
+    ],
+)
+def test_forces_of_a_bushing_are_those_of_its_stiffness_and_damping(
+    coach, track, values, quantity, axis, allowed
+):
+    signal = {"quantity": quantity, "element": "push", "axis": axis}
+    vehicle = with_element(coach, {"kind": "bushing", **values}, signals={"s": signal})
+    if allowed is None:
+        assert railsim.Simulation(vehicle, track, **WAY, record=False).read("time") == 0.0
+        return
+    with pytest.raises(InputError, match=rf"axis: found {axis or 'none'}; push .*; {allowed}$"):
+        railsim.Simulation(vehicle, track, **WAY, record=False)
+
+
+@pytest.mark.parametrize(
     ("kind", "values", "words"),
     [
         (Signal, {"quantity": "time", "rate": 1e9}, "less than or equal to 1000000"),
         (Signal, {"quantity": "time", "rate": 1e3, "delay": 1e9}, "at most 1e6 samples"),
+        (Signal, {"quantity": "time", "resolution": 1e-320}, "0 or at least 1e-15"),
         (Controller, {"inputs": {"time": "s"}}, "'time' of the function comes from the loop"),
         (Controller, {"inputs": {"memory": "s"}, "memory": 2}, "'memory' of the function comes"),
         (Controller, {"memory": 10**12}, "less than or equal to 1000000"),

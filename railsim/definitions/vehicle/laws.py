@@ -138,6 +138,8 @@ class Signal(base.Definition):
             raise ValueError("'delay' and 'noise' need 'rate'")
         if self.rate is not None and self.delay * self.rate > 1e6:
             raise ValueError("within 'delay' there are at most 1e6 samples")
+        if 0.0 < self.resolution < 1e-15:
+            raise ValueError("'resolution' is 0 or at least 1e-15: numbers near 1 are no finer")
 
 
 class Controller(base.Definition):
