@@ -56,8 +56,8 @@ def command(
     its spectra beside those of ERRI B176.
 
     Of a STUDY, its folder or summary.csv: values of its summary such as Y_over_Q_abs or
-    sum_abs_Y_mid1 over the parameter of most values, a curve for each value of the next, or as
-    set by --against, --family and --kind.
+    sum_abs_Y_mid1 over the parameter of most values, a curve for each vehicle and track or, of one
+    alone, for each value of the next, or as set by --against, --family and --kind.
 
     \b
     Example:
@@ -135,8 +135,11 @@ def _study_figure(
     )
     x = against or next((name for name in order if name != family), None)
     ordered = x and (against or family or (varied[x].numeric and x not in seeds))
-    family = family or next((name for name in order if name != x), None)
     kind = kind or ("curves" if ordered else "ranking")
+    rest = [name for name in order if name != x]
+    # what differs in kind is not mixed in one median
+    parted = [name for name in ("vehicle", "track") if name in rest and kind == "curves"]
+    members = [family] if family else parted or rest[:1]
     early = [record["status"] != "complete" for record in records]
     if kind == "ranking" or x is None:
         ends = [
@@ -145,18 +148,31 @@ def _study_figure(
         named = [f"{record['name']}{end}" for record, end in zip(records, ends, strict=True)]
         figure = ranking_figure(quantities, named)
     elif kind == "map":
-        if family is None:
+        if not members:
             found = f"only '{x}' was varied"
             raise input_error("--kind", found, "a study over two parameters", key="map")
-        figure = map_figure(quantities, varied[x], varied[family])
+        figure = map_figure(quantities, varied[x], varied[members[0]])
     else:
-        figure = curves_figure(quantities, varied[x], varied[family] if family else None, early)
+        figure = curves_figure(quantities, varied[x], _joined([varied[m] for m in members]), early)
+    mixed = [name for name in rest if name not in members]
+    if mixed and kind != "ranking":
+        say_above(figure, f"Not told apart: {', '.join(mixed)} (options: --against, --family)")
     if any(early):
         crosses = " (crosses)" if kind == "curves" else ""
         runs = f"{sum(early)} of {len(records)} runs ended early{crosses}"
         say_above(figure, f"{runs}: their values until then")
     say_above(figure, _same(folder_of(file).resolve().name, records, varied))
     return figure
+
+
+def _joined(columns: "Sequence[Column]") -> "Column | None":
+    """Several parameters as one; None for none."""
+    from railsim.plot.study import Column
+
+    if len(columns) < 2:
+        return next(iter(columns), None)
+    values = zip(*(column.values for column in columns), strict=True)
+    return Column(", ".join(c.words for c in columns), [", ".join(map(str, v)) for v in values])
 
 
 def _same(name: str, records: Sequence[Mapping[str, Any]], varied: Collection[str]) -> str:

@@ -15,7 +15,7 @@ from test_study import simulated as simulated
 import railsim
 import railsim.studies.run
 from railsim.cli import main
-from railsim.cli.plot import _study_figure
+from railsim.cli.plot import _joined, _study_figure
 from railsim.compare import differences
 from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
 
@@ -45,6 +45,19 @@ def test_study_is_drawn(folder, capsys, chosen):
     assert main(["plot", str(folder), *chosen]) == 0
     assert capsys.readouterr().out.strip() == str(folder / "study.png")
     assert (folder / "study.png").stat().st_size > 5000
+
+
+def test_medians_mix_no_vehicles_and_say_what_else(folder):
+    """A curve for each vehicle and track; the friction is in the bands, and that is said."""
+    figure = _study_figure(str(folder), ("Y_peak",), None, None, None)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "coach_flexicoil", "coach_manchester"
+    ]  # fmt: skip
+    assert "Not told apart: track.friction (options" in figure.get_suptitle()
+    by_friction = _study_figure(str(folder), ("Y_peak",), None, "track.friction", None)
+    assert "Not told apart: vehicle (options" in by_friction.get_suptitle()
+    both = _joined([Column("Vehicle", ["a", "b"]), Column("Track", ["t", "u"])])
+    assert (both.words, both.values) == ("Vehicle, Track", ["a, t", "b, u"])
 
 
 @pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[:1]])
