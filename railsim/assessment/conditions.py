@@ -104,20 +104,33 @@ def _number(place: str, found: str, wanted: Zone, *, met: bool) -> Condition:
 
 
 def missing_zones(
-    population: Population, reports: Sequence[ZoneReport], limits: RunningLimits
+    population: Population,
+    reports: Sequence[ZoneReport],
+    limits: RunningLimits,
+    outside: Sequence[TestSection] = (),
 ) -> list[Condition]:
-    """Zones in which a population has no sections; a fault mode needs one in any zone."""
+    """Zones in which a population has no sections; a fault mode needs one in any zone.
+
+    `outside`: sections in no zone, told with the zone whose radii are nearest.
+    """
     own = [report for report in reports if report.population is population]
     if population.fault:
         if any(report.values for report in own):
             return []
-        found = "; ".join(["none", *reasons([s for report in own for s in report.sections])])
+        every = [*(s for report in own for s in report.sections), *outside]
+        found = "; ".join(["none", *reasons(every)])
         about = "sections of the fault mode", population.name, NOT_MET
         return [Condition(*about, found, "one at least", "ours")]
     there = {report.zone for report in own}
     zones = [pair for pair in sorted(limits.zones.items()) if pair[0] not in there]
     behind = f", {population.name}" if population.name else ""
-    return [_number(f"zone {name}{behind}", "none", zone, met=False) for name, zone in zones]
+    near: dict[str, list[TestSection]] = {}
+    curved = {name: zone.radius for name, zone in limits.zones.items() if zone.radius}
+    for s in outside if curved else ():
+        name = min(curved, key=lambda n: min(abs(abs(s.radius) - end) for end in curved[n]))
+        near.setdefault(name, []).append(s)
+    words = {name: "; ".join(["none", *reasons(near.get(name, ()))]) for name, _ in zones}
+    return [_number(f"zone {name}{behind}", words[name], zone, met=False) for name, zone in zones]
 
 
 def zone_conditions(

@@ -135,7 +135,8 @@ def assess_running(
         of_all = [s for run in members for s in run.sections]
         reports = zone_reports(population, values, of_all, service, limits, method)
         zones += reports
-        conditions += missing_zones(population, reports, limits)
+        outside = [s for s in of_all if not s.zone]
+        conditions += missing_zones(population, reports, limits, outside)
         for report in reports if not population.fault else ():
             there = [r for r in counted if r.section.zone == report.zone and r.population == name]
             conditions += zone_conditions(report, there, limits, service)
@@ -274,8 +275,12 @@ def _remarks(
     done: Sequence[_Run], zones: Sequence[ZoneReport], limits: RunningLimits
 ) -> tuple[str, ...]:
     found = [remark for run in done for remark in run.record.remarks()]
-    odd = {s.reason for run in done for s in run.sections if not s.zone}
-    found += [f"section outside all zones: {reason}" for reason in sorted(odd)]
+    found += [
+        f"{run.record.name}: section {s.begin:.0f} to {s.end:.0f} m outside all zones: {s.reason}"
+        for run in done
+        for s in run.sections
+        if not s.zone
+    ]
     if not all(row.checked for zone in zones for row in zone.rows):
         found.append(f"limits of {limits.edition} not checked against the printed standard")
     return tuple(dict.fromkeys(found))

@@ -15,9 +15,11 @@ from railsim.assessment.conditions import (
     SectionRow,
     _independent,
     _quality,
+    missing_zones,
     vehicle_conditions,
     zone_conditions,
 )
+from railsim.assessment.running import _remarks
 from railsim.assessment.sections import TestSection
 from railsim.assessment.verdict import Verdict, overall
 from railsim.definitions.loading import load_running_limits
@@ -124,6 +126,19 @@ def test_conditions_of_a_zone(change, name, met):
         )
         share = 0 if worst is None else 100 / count
         assert f"{share:.0f} % worse than QN2" in found[name].found
+
+
+def test_curves_tighter_than_all_zones_are_told_with_the_nearest_one():
+    why = "no zone has the radius 120 m"
+    outside = TestSection("", 85.0, 275.0, -120.0, 0.13, 8.0, why)
+    sound = SimpleNamespace(name="laden", fault=False)
+    found = {c.place: c.found for c in missing_zones(sound, [], LIMITS, [outside])}
+    assert found["zone 4, laden"] == f"none; 1 section outside the conditions: {why}"
+    assert {found[f"zone {number}, laden"] for number in "123"} == {"none"}
+    (fault,) = missing_zones(SimpleNamespace(name="", fault=True), [], LIMITS, [outside])
+    assert fault.found == found["zone 4, laden"]
+    run = SimpleNamespace(sections=[outside], record=SimpleNamespace(name="r", remarks=list))
+    assert _remarks([run], (), LIMITS)[0] == f"r: section 85 to 275 m outside all zones: {why}"
 
 
 def test_nine_sections_of_ten_have_the_quality_that_is_stated():
