@@ -68,12 +68,12 @@ def track_figure(track: Track, title: str = "") -> Figure:
         shade(axes[1 + k], shown, named=k == 0)
         if k + 1 < len(rows):
             axes[1 + k].tick_params(labelbottom=False)
-    for position, _ in remarks:
+    for position in (at for positions, _ in remarks for at in positions):
         look: Any = {"marker": "^", "ms": 5, "color": LIMIT, "clip_on": False}
         axes[1].plot(position, 0.0, transform=axes[1].get_xaxis_transform(), **look)
     axes[-1].set_xlabel("Distance along the track $s$ (m)")
     if remarks:
-        words = "\n".join(f"s = {position:.0f} m: {text}" for position, text in remarks)
+        words = "\n".join(f"s = {at[0]:.0f} m: {text}" for at, text in remarks)
         figure.supxlabel(f"Remarks\n{words}", x=0.012, ha="left", fontsize=8, color=LIMIT)
     return figure
 
@@ -161,8 +161,8 @@ def _constants(track: Track) -> str:
     return ", ".join(words)
 
 
-def _marked(track: Track) -> list[tuple[float, str]]:
-    """Return position and text of what is unusual in the alignment; equal texts once."""
+def _marked(track: Track) -> list[tuple[list[float], str]]:
+    """Return positions and text of what is unusual in the alignment; equal texts once."""
     plans = layout.curvature_sections, layout.cant_sections, layout.gradient_sections
     begins = {section.key: section.begin for plan in plans for section in plan(track)}
     found: dict[str, list[float]] = {}
@@ -170,11 +170,13 @@ def _marked(track: Track) -> list[tuple[float, str]]:
         if remark.key in begins:
             found.setdefault(remark.text, []).append(begins[remark.key])
     times = {text: f"; {len(at)} times" if len(at) > 1 else "" for text, at in found.items()}
-    marked = sorted((min(at), text + times[text]) for text, at in found.items())
+    marked = sorted((sorted(at), text + times[text]) for text, at in found.items())
     if len(marked) <= MOST_REMARKS:
         return marked
-    *shown, (position, text) = marked[:MOST_REMARKS]
-    return [*shown, (position, f"{text}; and {len(marked) - MOST_REMARKS} more")]
+    *shown, (at, text) = marked[:MOST_REMARKS]
+    more = marked[MOST_REMARKS:]
+    at += [position for others, _ in more for position in others]
+    return [*shown, (at, f"{text}; and {len(more)} more")]
 
 
 def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Floats) -> None:

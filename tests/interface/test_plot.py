@@ -451,6 +451,17 @@ def test_track_figure_shows_everything_that_changes_along_the_track():
     assert "s = 360 m: a cant of 150 mm is more than (R - 100 m)/2 = 75 mm" in words
 
 
+def test_remarks_mark_all_their_positions():
+    """Two curves, each with a step at its begin and end; the first of equal remarks was marked."""
+    straight, curve = {"type": "STR", "length": 100.0}, {"type": "CIR", "length": 60.0}
+    plan = [straight, curve | {"radius": 250.0}, straight, curve | {"radius": 250.0}, straight]
+    track = load_track("straight").replace(
+        plan=plan, cant=[{"type": "CST", "length": 420.0, "cant": 0.0}]
+    )
+    marks = [line for line in track_figure(track).axes[1].lines if line.get_marker() == "^"]
+    assert {float(line.get_xdata()[0]) for line in marks} == {100.0, 160.0, 260.0, 320.0}
+
+
 def test_radii_in_the_plan_have_their_sign():
     plan = track_figure(load_track("s_curve_r150")).axes[0]
     assert [text.get_text() for text in plan.texts] == ["R 150 m", "R \N{MINUS SIGN}150 m"]
