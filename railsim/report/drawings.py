@@ -122,9 +122,14 @@ def track_svg(track: Track) -> str:
     """Draw curvature and cant of a track over its length, curves shaded and labelled."""
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, POINTS + 1)
+    lines = (
+        ("curvature", 1e3 * alignment.curvature(s), "1/km"),
+        ("cant", 1e3 * alignment.cant(s), "mm"),
+    )
+    drawn = [line for line in lines if line[1].any()]
     width, height = 1000.0, 78.0
-    below = height + 16.0  # where the cant begins, below the line with the radii
-    whole = below + height
+    below = height + 16.0  # where the second begins, below the line with the radii
+    whole = below + height if len(drawn) > 1 else below if drawn else 20.0
     across = s / track.length * width
     shapes, names = [], []
     for section in curvature_sections(track):
@@ -143,12 +148,11 @@ def track_svg(track: Track) -> str:
                 f'text-anchor="middle">{radius}</text>'
             )
     shapes += names
-    for words, values, unit, top in (
-        ("curvature", 1e3 * alignment.curvature(s), "1/km", 0.0),
-        ("cant", 1e3 * alignment.cant(s), "mm", below),
-    ):
+    if not drawn:
+        shapes.append('<text x="4" y="14">straight, without cant</text>')
+    for top, (words, values, unit) in zip((0.0, below), drawn, strict=False):
         low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
-        span = (high - low) or 1.0
+        span = high - low
         y = top + height - 8.0 - (values - low) / span * (height - 30.0)
         zero = top + height - 8.0 + low / span * (height - 30.0)
         text = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, y, strict=True))

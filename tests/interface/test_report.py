@@ -390,6 +390,18 @@ def test_a_drawn_track_has_its_curvature_and_cant_to_scale_and_wide_curves_their
     assert [cant[s] for s in (100.0, 350.0, 900.0)] == [164.0, 140.0, 116.0]
 
 
+def test_drawn_tracks_have_no_lines_of_nothing():
+    """Of straight track without cant two lines "0 to 0" were drawn."""
+    straight = track_svg(railsim.load_track("straight"))
+    assert re.findall(r">([^<]+)<", straight) == ["straight, without cant", "s = 0 to 1000 m"]
+    assert "<polyline" not in straight
+    curve = railsim.load_track("curve_r250").replace(
+        cant=[{"type": "CST", "length": 980.0, "cant": 0.0}]
+    )
+    words = re.findall(r">([^<]+)<", track_svg(curve))
+    assert words == ["R 250 m", "curvature: 0 to 4 1/km", "s = 0 to 980 m"]
+
+
 def test_friction_beside_a_drawn_track_is_that_of_its_left_and_right_rail():
     """Of 0.35 left and 0.15 right "0.15, 0.35" was told."""
     (used,) = inputs_of([{"name": "a", "labels": {}}], {"a": example_result()})
