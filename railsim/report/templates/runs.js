@@ -92,8 +92,10 @@
       g.save();
       g.strokeStyle = g.fillStyle = colour("--bad"); g.lineWidth = devicePixelRatio; g.setLineDash([6, 4]);
       g.beginPath(); g.moveTo(b.left, y); g.lineTo(b.left + b.width, y); g.stroke();
-      g.font = 11 * devicePixelRatio + "px system-ui, sans-serif"; g.textAlign = "right"; g.textBaseline = "bottom";
-      g.fillText(q.limit_words, b.left + b.width - 4, y - 2);
+      g.font = 11 * devicePixelRatio + "px system-ui, sans-serif"; g.textAlign = "right";
+      var room = y - b.top > 14 * devicePixelRatio; /* else below the line: radii are above the plot */
+      g.textBaseline = room ? "bottom" : "top";
+      g.fillText(q.limit_words, b.left + b.width - 4, room ? y - 2 : y + 3);
       g.restore();
     };
   }
@@ -326,7 +328,7 @@
       drawnAs("rect", picture, { x: left, y: y0 + top, width: W - left - right, height: H - top - bottom, fill: "none", stroke: colour("--strong") });
       if (beneath.limit !== null && beneath.limit >= sy.min && beneath.limit <= sy.max) {
         drawnAs("line", picture, { x1: left, x2: W - right, y1: Y(beneath.limit), y2: Y(beneath.limit), stroke: colour("--bad"), "stroke-dasharray": "6 4" });
-        drawnAs("text", picture, { x: W - right - 4, y: Y(beneath.limit) - 3, "text-anchor": "end", fill: colour("--bad") }, beneath.words);
+        drawnAs("text", picture, { x: W - right - 4, y: Y(beneath.limit) + (Y(beneath.limit) - y0 - top > 14 ? -3 : 13), "text-anchor": "end", fill: colour("--bad") }, beneath.words);
       }
       function ticks(axis, place) { (axis._splits || []).forEach(function (v, i) { var text = axis._values[i]; if (text !== null && text !== undefined && text !== "") { place(v, text); } }); }
       ticks(u.axes[0], function (v, text) { if (v >= sx.min && v <= sx.max) { drawnAs("text", picture, { x: X(v), y: y0 + H - bottom + 15, "text-anchor": "middle" }, text); } });
