@@ -25,7 +25,9 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
     `title`: By default vehicle, cant and rails.
     """
     mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
-    heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
+    # the sketch is as high as its width asks for, that of a short vehicle less
+    sketch = min(3.4, 0.5 + 36.0 / (np.ptp(found.wheelset_position) + 4.0))
+    heights = [7.4, sketch, 3.2] if mapped else [7.4, sketch]
     figure = Picture(10.2, sum(heights), title or found.title.replace(": ", "\n", 1))
     rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     _plan(figure.add_subfigure(rows[1]).subplots(), found)
