@@ -2,6 +2,7 @@
 
 import json
 import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import InputError
 from railsim.files.sources import read_source
 from railsim.notation import QUANTITIES
-from railsim.plot.curving import _parted
+from railsim.plot.curving import _parted, curving_figure
 from railsim.plot.histories import STUDY, histories, widen
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
@@ -478,6 +479,22 @@ def test_radii_in_the_plan_stand_within_its_axes(side):
     plan = figure.axes[0]
     words, axes = plan.texts[0].get_window_extent(), plan.get_window_extent()
     assert axes.y0 < words.y0 < words.y1 < axes.y1
+
+
+@pytest.mark.parametrize("base", [9.0, 19.0])
+def test_wheelsets_in_a_curve_are_drawn_over_the_whole_width(base):
+    """Of a coach they took 60 %."""
+    shape, n = (1, 1, 1), 2
+    found = SimpleNamespace(
+        radius=np.array([250.0]), cant_deficiency=np.array([0.1]), friction=np.array([0.4]),
+        converged=np.ones(shape, int), title="coach: steady curving", wheelsets=("a", "b"),
+        wheelset_position=(0.5 * base, -0.5 * base), attack=np.zeros((*shape, n)),
+        lateral=np.zeros((*shape, n)), Y=np.ones((*shape, n, 2)), T_gamma=np.ones((*shape, n, 2)),
+    )  # fmt: skip
+    figure = curving_figure(found)
+    figure.draw_without_rendering()
+    (sketch,) = [axes for axes in figure.axes if "Wheelsets" in axes.get_title(loc="left")]
+    assert sketch.get_window_extent().width > 0.9 * figure.bbox.width
 
 
 def test_no_line_joins_left_hand_curves_to_right_hand_ones():
