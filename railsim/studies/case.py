@@ -229,7 +229,7 @@ def load_case(run: RunSpec) -> Case:
     loader = Loader()
     loader.overrides(run.assignments)  # its faults come first
     run = replace(run, speed=loader.first_speed(run))
-    case = loader.case(run_name(run), run, run_labels(run))
+    case = loader.case(run_name(run, 6), run, run_labels(run))
     loader.check()
     assert case is not None  # without a fault
     return case
@@ -247,10 +247,10 @@ def short_name(path: str | Path) -> str:
     return Path(path).name.removesuffix(".toml")
 
 
-def run_name(run: RunSpec) -> str:
-    """Return the name of a run.
+def run_name(run: RunSpec, digits: int = 10) -> str:
+    """Return the name of a run; in studies its speed has many digits, as in those to be resumed.
 
-    >>> run_name(RunSpec("vehicles/coach_manchester.toml", "curve_r250", 20.0))
-    'coach_manchester_curve_r250_20'
+    >>> run_name(RunSpec("vehicles/coach_manchester.toml", "curve_r250", 40.0 / 3.6), 6)
+    'coach_manchester_curve_r250_11.1111'
     """
-    return f"{short_name(run.vehicle)}_{short_name(run.track)}_{run.speed or 0.0:.10g}"
+    return f"{short_name(run.vehicle)}_{short_name(run.track)}_{run.speed or 0.0:.{digits}g}"
