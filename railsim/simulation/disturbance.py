@@ -1,5 +1,8 @@
 """Initial disturbances: added to the state in which a run begins, wheelsets kept on their rails."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from railsim.arrays import Floats
@@ -7,6 +10,7 @@ from railsim.definitions.settings import InitialState, Settings
 from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
+from railsim.kernels.system import Work
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
 from railsim.notation import COMPONENTS, SIDES
@@ -16,6 +20,8 @@ IMPACT = 0.5  # change of a wheel load over the static one
 LONGEST, TURN = 2.5e-4, 5e-3  # way and angle over which the contacts are followed at once [m, rad]
 FARTHEST, WIDEST = 0.012, 0.1  # beyond, a wheelset is where it is put [m, rad]
 _STEPS = 30
+
+Loads = Callable[[Floats], Floats | None]
 
 
 def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tuple[str, ...]:
@@ -31,7 +37,8 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
     """
     if not settings.initial:
         return ()
-    before = _wheel_loads(model, state)
+    loads_of = partial(_wheel_loads, model, work_arrays(model.system))
+    before = loads_of(state)
     for name, change in settings.initial.items():
         _add(model, name, change, state)
     remarks = []
@@ -41,8 +48,8 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
             given = change.z or change.roll
             near = abs(change.y) <= FARTHEST and abs(change.yaw) <= WIDEST
             if (change.y or change.yaw) and near and not given:
-                _follow_contacts(model, w, change, before[w], state)
-        remarks = _impact(model, before, Q0, state)
+                _follow_contacts(model, loads_of, w, change, before[w], state)
+        remarks = _impact(model, loads_of(state), before, Q0)
     return tuple(remarks)
 
 
@@ -53,16 +60,15 @@ def _add(model: Model, body: str, change: InitialState, state: Floats) -> None:
     state[rate : rate + 6] += [getattr(change, f"v{name}") for name in COMPONENTS]
 
 
-def _wheel_loads(model: Model, state: Floats) -> Floats | None:
+def _wheel_loads(model: Model, work: Work, state: Floats) -> Floats | None:
     """Wheel loads [wheelset, side] in a state [N]; None where it is outside the model's range."""
-    work = work_arrays(model.system)
     rows = state[None].copy()
     status, *_ = right_hand_sides(model.system, work, rows, np.zeros_like(rows))
     return work.wheel[:, :, W_Q].copy() if status == RUNNING else None
 
 
 def _follow_contacts(
-    model: Model, w: int, change: InitialState, wanted: Floats, state: Floats
+    model: Model, loads_of: Loads, w: int, change: InitialState, wanted: Floats, state: Floats
 ) -> None:
     """Lift and roll wheelset `w` until its wheels carry `wanted`; as it is where that fails.
 
@@ -76,16 +82,16 @@ def _follow_contacts(
         trial[[first + 1, first + 5]] = state[[first + 1, first + 5]]
         trial[first + 1] -= left * change.y
         trial[first + 5] -= left * change.yaw
-        if not _carries(model, w, first, wanted, trial):
+        if not _carries(loads_of, w, first, wanted, trial):
             return
     state[[first + 2, first + 3]] = trial[[first + 2, first + 3]]
 
 
-def _carries(model: Model, w: int, first: int, wanted: Floats, trial: Floats) -> bool:
+def _carries(loads_of: Loads, w: int, first: int, wanted: Floats, trial: Floats) -> bool:
     """Find the height and roll at which wheelset `w` carries `wanted`, by Newton's method."""
     moved = [first + 2, first + 3]
     for _ in range(_STEPS):
-        loads = _wheel_loads(model, trial)
+        loads = loads_of(trial)
         if loads is None:
             return False
         rest = loads[w] - wanted
@@ -95,7 +101,7 @@ def _carries(model: Model, w: int, first: int, wanted: Floats, trial: Floats) ->
         for k, at in enumerate(moved):
             nudged = trial.copy()
             nudged[at] += 1e-7
-            beside = _wheel_loads(model, nudged)
+            beside = loads_of(nudged)
             if beside is None:
                 return False
             slope[:, k] = (beside[w] - loads[w]) / 1e-7
@@ -105,9 +111,8 @@ def _carries(model: Model, w: int, first: int, wanted: Floats, trial: Floats) ->
     return False
 
 
-def _impact(model: Model, before: Floats, Q0: Floats, state: Floats) -> list[str]:
+def _impact(model: Model, loads: Floats | None, before: Floats, Q0: Floats) -> list[str]:
     """Remark on a disturbance that loads or unloads wheels at once."""
-    loads = _wheel_loads(model, state)
     if loads is None:
         return []
     ratio = np.abs(loads - before) / Q0
