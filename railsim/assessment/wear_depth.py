@@ -127,13 +127,19 @@ def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
     counted = areas > 0.0
     y, b, A = centres[counted], np.maximum(widths[counted], 1e-5), areas[counted]
     edges = np.concatenate([grid() - 0.5 * SPACING, [RANGE[1]]])
-    inside = np.zeros(len(edges))
-    for start in range(0, len(y), 2000):  # in parts, to limit the memory
-        part = slice(start, start + 2000)
-        u = np.clip((edges[:, None] - y[part]) / b[part], -1.0, 1.0)
+    # first edge within each ellipse, and first one behind it
+    first, end = np.searchsorted(edges, y - b), np.searchsorted(edges, y + b)
+    whole = np.bincount(end, weights=A, minlength=len(edges) + 1)[1:-1]
+    within = np.zeros(len(edges))
+    for start in range(0, len(y), 20000):  # in parts, to limit the memory
+        part = np.arange(start, min(start + 20000, len(y)))
+        count = (end - first)[part]
+        of = np.repeat(part, count)
+        at = np.arange(len(of)) + np.repeat(end[part] - np.cumsum(count), count)
+        u = np.clip((edges[at] - y[of]) / b[of], -1.0, 1.0)
         share = 0.5 + (u * np.sqrt(1.0 - u**2) + np.arcsin(u)) / np.pi
-        inside += share @ A[part]
-    return np.asarray(np.diff(inside) / SPACING)
+        within += np.bincount(at, weights=share * A[of], minlength=len(edges))
+    return np.asarray((whole + np.diff(within)) / SPACING)
 
 
 def scattered(profile: Profile, depth: Floats) -> Floats:

@@ -40,6 +40,22 @@ def test_half_ellipse_keeps_area_and_middle(middle, width):
         assert np.max(heights) == pytest.approx(2e-6 / (0.5 * np.pi * width), rel=0.02)
 
 
+def test_half_ellipses_add_up_and_are_computed_only_where_they_lie(monkeypatch):
+    """Part of a half ellipse up to u: (t - sin t cos t)/pi, cos t = -u; also beyond the grid."""
+    random = np.random.default_rng(3)
+    y, b = random.uniform(-0.09, 0.09, 400), random.uniform(0.5e-3, 8e-3, 400)
+    A, computed = random.uniform(0.0, 1e-12, 400), []
+    arcsin = np.arcsin
+    monkeypatch.setattr(np, "arcsin", lambda u: computed.append(u.size) or arcsin(u))
+    found = spread(y, b, A)
+    monkeypatch.undo()
+    edges = np.append(grid() - 0.5 * SPACING, grid()[-1] + 0.5 * SPACING)
+    t = np.arccos(-np.clip((edges[:, None] - y) / b, -1.0, 1.0))
+    up_to = (t - np.sin(t) * np.cos(t)) / np.pi @ A
+    assert np.allclose(found, np.diff(up_to) / SPACING, rtol=1e-9, atol=1e-12 * found.max())
+    assert sum(computed) <= np.sum(2.0 * b / SPACING + 1.0)
+
+
 def test_worn_profile_loses_the_area_of_the_wear():
     profile = load_profile("S1002")
     depth = spread(np.array([0.0, -0.03]), np.array([5e-3, 2e-3]), np.array([1e-12, 3e-12]))
