@@ -105,12 +105,11 @@ class VehicleMotion:
     def step_at(self, speed: float) -> float:
         """Time step at a speed: the shorter one of those at both ends of its class [s]."""
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
-        if number not in self._steps:
-            states = [self.prepared.steady(SPEED_CLASS**end) for end in (number, number + 1)]
-            of = self.model, self.system
-            judged = (Stability(*of, state, self._scheme, lambda _: ()) for state in states)
-            self._steps[number] = min(one.choose(1.0 / OUTPUT_RATE) for one in judged)
-        return self._steps[number]
+        for end in (number, number + 1):  # two classes share an end
+            if end not in self._steps:
+                of = self.model, self.system, self.prepared.steady(SPEED_CLASS**end), self._scheme
+                self._steps[end] = Stability(*of, lambda _: ()).choose(1.0 / OUTPUT_RATE)
+        return min(self._steps[number], self._steps[number + 1])
 
     def rest(self, speed: float, amplitude: float) -> Floats:
         """State of steady rolling with a disturbance that moves a wheelset by `amplitude` [m]."""

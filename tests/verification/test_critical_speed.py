@@ -18,6 +18,7 @@ from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.model.equilibrium import tracks_under
 from railsim.plot.stability import bifurcation_figure
 from railsim.stability import continuation
+from railsim.stability import motion as motion_of
 from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
 from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import (
@@ -743,6 +744,26 @@ def test_what_moves_takes_part_in_periodic_motions_and_a_period_forgets_the_rest
     assert len(found) == 4
     assert np.array_equal(found[:, :LEARNT], before[:, :LEARNT])
     assert np.array_equal(found[:, LEARNT:], known[:, LEARNT:])
+
+
+def test_the_step_at_a_speed_that_two_classes_share_is_judged_once(monkeypatch):
+    judged, taken = [], {16: 2e-3, 17: 1e-3, 18: 1.5e-3}
+
+    class Judge:
+        def __init__(self, model, system, state, *_):
+            self.end = round(np.log(state) / np.log(1.25))
+
+        def choose(self, interval):
+            judged.append(self.end)
+            return taken[self.end]
+
+    monkeypatch.setattr(motion_of, "Stability", Judge)
+    motion = object.__new__(motion_of.VehicleMotion)
+    motion.prepared = SimpleNamespace(steady=lambda speed: speed)
+    motion.model = motion.system = motion._scheme = None
+    motion._steps = {}
+    assert motion.step_at(1.25**17.5) == motion.step_at(1.25**16.5) == 1e-3
+    assert judged == [17, 18, 16]
 
 
 def test_rest_is_not_called_stable_where_hunting_is_named_after_the_body():
