@@ -66,11 +66,11 @@ def write_report(
         return
     found = gather(files)
     with_files = [record for record in found.records if record["name"] in found.paths]
-    results = found.results(worst_runs(with_files, curves))
     study = found.inputs.get("name")
     stems = list(dict.fromkeys(folder_of(file).resolve().stem for file in files))
     names = str(study) if study else listed(stems, 4)
     every = found.results([record["name"] for record in with_files])
+    results = {name: every[name] for name in worst_runs(with_files, curves)}
     used = [] if results or not found.inputs else used_inputs(folder_of(files[0]))
     measured = [as_section(part, number) for number, part in enumerate(parts, start=1)]
     runs = found.records, results, found.remarks, every, found.inputs, used

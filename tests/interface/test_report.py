@@ -842,3 +842,15 @@ def test_results_are_counted_once_and_told_apart_by_their_folders(tmp_path, caps
         expected = [f"{folders[0]}/run", f"{folders[1]}/run", "c/run"]
         assert sorted(found.paths) == sorted(expected)
         assert found.paths["c/run"] == folders[2] / "run.h5"
+
+
+def test_a_report_opens_each_result_once_beside_its_facts(folder, tmp_path, monkeypatch):
+    opened, open_run = [], railsim.result.open_run
+    monkeypatch.setattr(
+        railsim.result, "open_run", lambda path: opened.append(path.name) or open_run(path)
+    )
+    gather([str(folder)])
+    facts = sorted(opened)
+    opened.clear()
+    assert main(["report", str(folder), "--out", str(tmp_path / "page.html"), "--quiet"]) == 0
+    assert sorted(opened) == sorted(2 * facts) == sorted(2 * ["a.h5", "b.h5", "c.h5"])
