@@ -23,6 +23,7 @@ from railsim.result.sinks import ALWAYS, Sink, SinkBefore
 ATTENUATION = 80.0  # dB
 UNFILTERED = ("time", "distance", "mileage", "curvature", "cant")
 WITH_GAPS = ("contact_y", "contact_z")
+BLOCK = 32  # rows that are filtered at once
 GAPS = " gaps"  # behind the name: where they are
 
 
@@ -154,20 +155,28 @@ class _Symmetric:
         count = (length - self._skip - 2 * self._half - 1) // self._every + 1
         if count <= 0:
             return {}
-        matrix = _banded(self._taps.tobytes(), count, self._every)
-        span = slice(self._skip, self._skip + matrix.shape[1])
+        span = slice(self._skip, self._skip + (count - 1) * self._every + len(self._taps))
         found = {}
         for name, array in self._window.items():
             part = array[span]
             if name in UNFILTERED or name.endswith(GAPS):
                 found[name] = part[self._half :: self._every][:count]
             else:
-                flat = matrix @ part.reshape(len(part), -1)
+                flat = self._filtered_rows(part.reshape(len(part), -1), count)
                 found[name] = flat.reshape(count, *part.shape[1:])
         used = self._skip + count * self._every
         drop = min(used, length)
         self._window = {name: array[drop:] for name, array in self._window.items()}
         self._skip = used - drop
+        return found
+
+    def _filtered_rows(self, flat: Floats, count: int) -> Floats:
+        """Filter columns; in blocks of rows, as most of a large matrix would be zeros."""
+        found = np.empty((count, flat.shape[1]))
+        for first in range(0, count, BLOCK):
+            matrix = _banded(self._taps.tobytes(), min(BLOCK, count - first), self._every)
+            begin = first * self._every
+            found[first : first + BLOCK] = matrix @ flat[begin : begin + matrix.shape[1]]
         return found
 
 

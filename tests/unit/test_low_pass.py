@@ -8,7 +8,7 @@ import railsim
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.notation import QUANTITIES
-from railsim.result import MemorySink
+from railsim.result import MemorySink, low_pass
 from railsim.result.low_pass import LowPassSink
 from railsim.simulation.sampling import instants_for_each, low_pass_remark, sampled
 
@@ -67,6 +67,19 @@ def test_chunks_do_not_matter_and_times_are_equal_steps(causal):
     np.testing.assert_allclose(one.Y, many.Y, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(many.time, np.arange(2001) / 200.0, atol=1e-12)
     np.testing.assert_allclose(many.distance, 20.0 * many.time, atol=1e-9)
+
+
+def test_symmetric_filter_is_a_convolution_and_multiplies_few_zeros(monkeypatch):
+    """By matrices of some rows: one of a whole chunk, here 120 rows, is zeros to nine tenths."""
+    made, banded = [], low_pass._banded
+    monkeypatch.setattr(low_pass, "_banded", lambda *a: made.append(banded(*a)) or made[-1])
+    found = passed(lambda t: np.sin(500.0 * t), frequency=80.0, chunks=15)
+    taps = made[0][0][made[0][0] != 0.0]
+    t = np.arange(10001) / 1000.0
+    expected = np.convolve(np.sin(500.0 * t), taps, mode="same")[:: 1000 // 200]
+    inside = slice(len(taps), -len(taps))
+    np.testing.assert_allclose(found.Y[inside, 0, 0], expected[inside], atol=1e-12)
+    assert max(one.size for one in made) <= 3 * max(np.count_nonzero(one) for one in made)
 
 
 def test_a_loop_that_writes_into_the_same_memory_spoils_no_instants():
