@@ -405,11 +405,17 @@ def spline_coefficients(values: Floats, stretched: Floats) -> Floats:
     """
     result = values.copy()
     near = 1.0 / (1.0 + (stretched / FINE_ROLL) ** 4)
-    for axis, share in ((2, near[:, None, None, None, None]), (3, np.ones(1))):
+    for k in np.ndindex(values.shape[:2]):  # part by part, which the processor holds at hand
+        _to_coefficients(result[k], values[k], near[1:-1, None, None])
+    return result
+
+
+def _to_coefficients(result: Floats, values: Floats, near: Floats) -> None:
+    """The same of one patch and yaw, in place; `near`: share over the roll, of the inner nodes."""
+    for axis, share in ((0, near), (1, 1.0)):
         source = np.moveaxis(result, axis, 0)
-        second = np.zeros_like(source)
-        second[1:-1] = source[2:] - 2.0 * source[1:-1] + source[:-2]
-        source -= share * second / 6.0
+        second = source[2:] - 2.0 * source[1:-1] + source[:-2]
+        source[1:-1] -= share * second / 6.0
     np.maximum(result[..., A1], 0.5 * values[..., A1], out=result[..., A1])
     np.maximum(result[..., B1], 0.5 * values[..., B1], out=result[..., B1])
     wide = 0.5 * (values[..., B1] + values[..., D_B1])
@@ -421,4 +427,3 @@ def spline_coefficients(values: Floats, stretched: Floats) -> Floats:
         low |= result[..., K] + root * result[..., K2] < 0.2 * before
     for stiffness in (K, K2):
         result[low, stiffness] = values[low, stiffness]
-    return result
