@@ -33,6 +33,45 @@ def points(names, values, always, **options):
 
 LONG = frozenset(
     {
+        "interface/test_imports.py::test_commands_import_nothing_that_they_do_not_use[result]",
+        "reliability/test_other_systems.py::test_command_works_without_what_posix_has[study]",
+        "verification/test_twin_tracks.py::"
+        "test_cross_level_is_a_wave_of_the_cant[0.0033333333333333335-0.1-10.0-0.002]",
+        "interface/test_info.py::test_vehicles_and_tracks_can_be_drawn[coach_manchester]",
+        "interface/test_modes.py::test_results_draw_themselves[<lambda>1]",
+        "interface/test_optimise.py::test_no_more_designs_than_the_given_number[nsga2]",
+        "reliability/test_surroundings.py::test_odd_surroundings[home is not there]",
+        "reliability/test_surroundings.py::test_odd_surroundings[ascii]",
+        "verification/test_step_halving.py::"
+        "test_half_the_step_changes_peaks_by_one_and_rms_by_a_fifth_of_a_per_cent[3 m/s]",
+        "verification/test_vehicles.py::"
+        "test_mirrored_vehicle_on_the_mirrored_track_gives_the_mirrored_result[articulated]",
+        "verification/test_hunting.py::test_hunting_is_said[44.4-erri_b176_low]",
+        "verification/test_hunting.py::"
+        "test_a_forced_motion_on_waves_of_one_length_is_no_hunting[lateral]",
+        "verification/test_wear_loop.py::"
+        "test_routes_wear_by_their_shares_and_deep_steps_in_parts[3]",
+        "verification/test_linear_relations.py::"
+        "test_response_to_waves_is_that_of_a_run_on_them[lateral]",
+        "unit/test_optimise_search.py::test_a_fifth_of_a_grid_finds_its_front[kursawe]",
+        "interface/test_study_pictures.py::test_seeds_are_no_axis[speeds0]",
+        "interface/test_study_pictures.py::test_study_is_drawn[chosen1]",
+        "verification/test_contact_table.py::"
+        "test_worn_and_conformal_pairs_have_forces_without_jumps[conformal rail]",
+        "interface/test_assess.py::test_command_of_other_standards[wear]",
+        "verification/test_start_in_curve.py::"
+        "test_steady_start_is_the_end_of_a_long_run_in[coach_flexicoil-elastic-300.0]",
+        "reference/test_gritti_pantograph.py::"
+        "test_a9_local_optima_from_the_printed_values_reconstructed[atr95_lift_4-optimum2]",
+        "reference/test_gritti_pantograph.py::"
+        "test_a9_local_optima_from_the_printed_values_reconstructed[atr95_lift_3-optimum1]",
+        "reference/test_gritti_pantograph.py::"
+        "test_no_seed_ends_above_the_published_design_reconstructed[3-1]",
+        "interface/test_friction_along_track.py::"
+        "test_curving_takes_the_friction_of_each_rail_as_a_run_does[1.0]",
+        "verification/test_creep_law_runs.py::"
+        "test_sum_of_lateral_forces_in_a_curve_does_not_depend_on_the_law[fastrip]",
+        "reliability/test_kills.py::test_killed_runs_and_studies",
         "interface/test_benchmarks.py::test_script_runs_in_its_small_form[springs.py]",
         "interface/test_benchmarks.py::test_script_runs_in_its_small_form[optimise.py]",
         "interface/test_benchmarks.py::test_script_runs_in_its_small_form[whole.py]",
