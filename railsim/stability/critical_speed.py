@@ -123,7 +123,8 @@ def critical_speed(
     found.remarks += smooth.remarks
     found.conicity_over_amplitude = _conicity(smooth)
     found.linear, stuck = _linear(found, smooth)
-    (tell := progress or (lambda _: None))(0.02)
+    tell = progress or (lambda _: None)
+    tell(0.02)
     if over_amplitude:
         found.linear_over_amplitude = _over_amplitude(smooth, low, high)
         if found.linear is not None and smooth.system.support.elastic:
