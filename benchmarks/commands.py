@@ -41,15 +41,20 @@ finally:
 """
 
 
-def run_command(*arguments: str, folder: Path, cache: Path | None = None) -> dict[str, Any]:
-    """Run a railsim command in a folder.
+def run_command(
+    *arguments: str,
+    folder: Path,
+    cache: Path | None = None,
+    environment: dict[str, str] | None = None,
+) -> dict[str, Any]:
+    """Run a railsim command in a folder, with further variables in its environment if given.
 
     Returns
     -------
     dict
         `wall` and `cpu` [s], `memory` of the largest process [B], exit `status`.
     """
-    environment = dict(os.environ)
+    environment = os.environ | (environment or {})
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's Python keeps what it has compiled
     if cache is not None:
         environment |= {"RAILSIM_CACHE_DIR": str(cache)}

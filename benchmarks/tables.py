@@ -3,8 +3,8 @@
     python benchmarks/tables.py
 
 `bench.json` is the output of `whole.py`, `speeds.json` that of `irregular.py`, `study.json` and
-`study_files.json` those of `study_cost.py`, `peers.json` and `growth.json` those of the scripts of
-the same names.
+`study_files.json` those of `study_cost.py`, `versions.json`, `peers.json` and `growth.json` those
+of the scripts of the same names.
 """
 
 import json
@@ -13,6 +13,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from versions import THIS, ratio
 from whole import tables
 
 ROOT = Path(__file__).parents[1]
@@ -143,6 +144,22 @@ def speed(bench: dict[str, Any], speeds: dict[str, Any], peers: dict[str, Any]) 
     return table(["", "smooth curve R 250 m, 20 m/s", "ERRI low, 40 m/s"], rows)
 
 
+def versions(found: dict[str, Any]) -> str:
+    """Loops and whole commands of earlier states beside this one."""
+    names = [*found["run"]["cpu"]]
+    lines = {f"{case}, x real time": times for case, times in found["loops"].items()}
+    lines |= {
+        "`railsim run`, one coach and curve, CPU time (s)": found["run"]["cpu"],
+        "README's main job, empty caches, wall time (s)": found["job"]["wall"],
+    }
+    rows = []
+    for line, times in lines.items():
+        values = [f"{median(times[name]):.3g}" if name in times else "" for name in names]
+        first = next(iter(times))
+        rows.append([line, *values, f"{ratio(times[first], times[THIS.name])} of {first}"])
+    return table(["run", *names, "ratio"], rows)
+
+
 def main() -> None:
     def load(name: str) -> Any:
         return json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
@@ -152,6 +169,7 @@ def main() -> None:
     known |= {"peers": peers(found), "fastsim": fastsim(found["fastsim"])}
     known |= {"irregular": irregular(speeds), "study": study(load("study"), load("study_files"))}
     known |= growth(load("growth")) | {"speed": speed(bench, speeds, found)}
+    known["versions"] = versions(load("versions"))
     makers = {name: lambda made=made: made for name, made in known.items()}
     fill_page(ROOT / "docs" / "performance.md", makers)
 

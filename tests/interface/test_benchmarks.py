@@ -28,6 +28,7 @@ SMALL = {
     "springs.py": ["--repeats", "1"],
     "study_cost.py": ["out", "--vehicles", "coach_manchester", "--tracks", "straight",
                       "--speeds", "1", "--frictions", "2", "--duration", "1", "--workers", "1"],
+    "versions.py": ["--small", "--rounds", "1", "--commands", "0", "--jobs", "0"],
     "whole.py": ["--small"],
 }  # fmt: skip
 # the threads of a process, its memory, another program's solvers
