@@ -193,7 +193,10 @@ def times(versions: Sequence[Version], repeats: int, *, job: bool) -> dict[str, 
             raise RuntimeError(f"{version.name}: exit status {done['status']}")
         for name in found:
             found[name][version.name].append(done[name])
-    print("main job:" if job else "railsim run:", "CPU time,", summary(found["cpu"]), flush=True)
+    name, what = (
+        ("main job", "wall") if job else ("railsim run", "cpu")
+    )  # workers' CPU is not counted
+    print(f"{name}: {what} time, {summary(found[what])}", flush=True)
     return found
 
 

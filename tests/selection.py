@@ -178,6 +178,80 @@ LONG = frozenset(
         "test_a22_lift_5_that_fits_its_cylinder_from_every_seed_new[2]",
         "verification/test_bridge.py::"
         "test_a_heavy_bridge_under_the_coach_deflects_as_under_its_loads[25.0]",
+        "interface/test_study.py::test_processes_end_after_a_study_that_was_killed",
+        "interface/test_study.py::"
+        "test_run_whose_process_dies_twice_is_given_up_and_the_others_go_on",
+        "interface/test_study.py::test_request_to_end_while_workers_begin_leaves_no_traceback",
+        "verification/test_identification.py::test_what_nothing_depends_on_keeps_its_value",
+        "verification/test_identification.py::test_a_bound_that_keeps_the_value_out_is_said[0.99]",
+        "verification/test_identification.py::test_misfit_is_that_in_the_band",
+        "verification/test_track_from_accelerations.py::"
+        "test_a_curve_without_simulated_runs_is_said_and_spoils_nothing_elsewhere",
+        "verification/test_creep_table.py::test_shipped_nodes_are_what_the_generator_makes[7-0]",
+        "interface/test_plot.py::"
+        "test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum",
+        "interface/test_stationary.py::"
+        "test_where_newton_fails_steady_curving_gives_the_same_guiding_force",
+        "verification/test_model_validation.py::"
+        "test_a_section_with_a_wheel_without_load_is_left_out_and_named",
+        "verification/test_model_validation.py::"
+        "test_a_place_beyond_what_is_looked_for_is_not_taken_for_another",
+        "verification/test_model_validation.py::test_a_run_that_is_compared_in_part_only_is_said",
+        "reliability/test_cluster.py::"
+        "test_study_survives_the_death_of_a_worker_and_is_that_of_one_process",
+        "interface/test_wear.py::test_loop_that_is_refused_keeps_what_was_done",
+        "interface/test_wear.py::test_straight_above_the_critical_speed_is_a_remark[60.0-True]",
+        "interface/test_optimise.py::"
+        "test_designs_are_within_bounds_of_many_digits_and_differ[31391237.0]",
+        "interface/test_examples.py::test_example_runs_and_draws_its_picture[06_which_modes]",
+        "interface/test_examples.py::"
+        "test_example_runs_and_draws_its_picture[03_manchester_or_flexicoil]",
+        "verification/test_twin_tracks.py::"
+        "test_longitudinal_level_is_a_wave_of_the_gradient_in_a_curve[10.0-0.002]",
+        "verification/test_twin_tracks.py::test_alignment_is_a_wave_of_the_plan[20.0-0.004]",
+        "interface/test_contact.py::test_exact_patches_stand_beside_those_of_the_table",
+        "verification/test_crossing_runs.py::"
+        "test_short_ramps_are_what_the_formula_leaves_out[20.0]",
+        "verification/test_crossing_runs.py::test_wheel_passes_the_nose_on_its_wrong_side",
+        "reference/test_gritti_pantograph.py::"
+        "test_lifts_2_and_3_are_found_without_their_published_parameters_reconstructed[3-0.2183-1]",
+        "interface/test_modes.py::test_wrong_input_is_told_in_a_line[arguments16-no steady state]",
+        "verification/test_actuators.py::test_slide_protection_on_falling_friction",
+        "interface/test_campaign.py::test_report_of_a_scenario_is_titled_by_its_name",
+        "verification/test_start_in_curve.py::"
+        "test_mean_of_a_vehicle_that_does_not_come_to_rest_in_a_curve",
+        "unit/test_kernel_cache.py::"
+        "test_process_that_ends_while_it_compiles_lets_one_of_the_next_ones_compile",
+        "unit/test_kernel_cache.py::test_folder_that_a_user_chose_for_numba_is_used",
+        "verification/test_spring_search.py::"
+        "test_every_nest_meets_all_checks_of_the_verification[fatigue]",
+        "verification/test_spring_search.py::"
+        "test_nests_meet_stricter_checks_and_the_largest_load_of_the_file",
+        "interface/test_spring.py::"
+        "test_existing_pages_are_kept_without_overwrite_and_the_same_every_time",
+        "interface/test_stability_commands.py::test_curving_over_a_grid",
+        "interface/test_stability_commands.py::"
+        "test_picture_of_a_short_wagon_in_a_curve_has_its_whole_title",
+        "interface/test_compare.py::"
+        "test_results_that_keep_few_quantities_are_drawn_by_what_all_have",
+        "reliability/test_ends.py::test_physical_end_keeps_its_result[in the first step]",
+        "verification/test_flange.py::test_state_of_rest_is_the_end_of_a_long_run[rigid]",
+        "verification/test_flange.py::test_growth_does_not_depend_on_the_step_of_the_way",
+        "reliability/test_disk.py::test_full_disk_is_one_line[plot-61440]",
+        "interface/test_info.py::test_a_vehicle_of_another_gauge_stands_on_the_rails_of_a_track",
+        "verification/test_robustness.py::"
+        "test_step_and_contact_damping_move_no_peak[coach_manchester-300.0-0.5-0.0]",
+        "unit/test_compiler.py::test_public_means_of_numba_give_the_same_numbers",
+        "verification/test_elements.py::test_loop_of_constant_friction_has_masings_area[triangle]",
+        "verification/test_random_combinations.py::test_random_combination[2]",
+        "verification/test_random_combinations.py::test_random_combination[3]",
+        "verification/test_support.py::test_reference_scheme_and_fast_one_agree_without_masses",
+        "verification/test_check_rail.py::"
+        "test_work_at_the_check_rail_is_part_of_the_frictional_power",
+        "verification/test_wear_depth.py::test_worn_profile_goes_back_into_the_simulation",
+        "verification/test_non_elliptic.py::test_mirrored_contour_has_the_same_patch",
+        "interface/test_interrupts.py::test_full_disk_leaves_nothing_and_is_told_in_a_line",
+        "unit/test_kernels_without_compiler.py::test_a_run_is_the_same_without_compilation",
     }
 )
-"""Tests of two seconds and more beside shorter ones of the same thing; marked `further`."""
+"""Long tests beside others of the same thing or of its parts; marked `further`."""
