@@ -35,7 +35,7 @@ from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, 
 from railsim.stability.continuation import followed_branches
 from railsim.stability.diagram import diagram
 from railsim.stability.motion import LeftRange, VehicleMotion
-from railsim.stability.ramp import EXCITATIONS, SMALL, Progress, ramp
+from railsim.stability.ramp import EXCITATIONS, SMALL, Progress, below, ramp, tops_above
 from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
 from railsim.units import speed_in_si
 
@@ -46,9 +46,6 @@ LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
 NEAR = (0.8, 1.25)  # times the speeds where rest is left: where most of a diagram's stand ...
 SHARE = 0.75  # ... this share of them
-# Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
-# what is left to the end of hunting; the range may be narrow.
-ONWARDS, ABOVE = (0.5, 0.1), 0.1
 # damping of friction that slides, at least: with stuck friction sways of shipped wagons have -0.022
 SLIDING = 0.03
 AGAIN = 1.25  # ratio of speeds at which is looked whether rest is stable again
@@ -352,13 +349,11 @@ def _by_ramp(
     above = (v for v in (stuck, unstable) if v and end > (v if v is stuck else _far_above(v)))
     for at in sorted(above):  # the sway of stuck friction is another motion, however near
         # hunting dies above speeds at which rest is unstable: what it becomes there is sought too
-        reach = min(ABOVE * at, end - at)
-        tops = [at + share * reach for share in ONWARDS]
-        for top in tops:
-            below, further = ramp(motion, found.low, top, excitations=excitations)
+        for top in (tops := tops_above(at, end)):
+            slower, further = ramp(motion, found.low, top, excitations=excitations)
             found.branches.append(further)
-            if below is not None:
-                found.nonlinear["ramp"] = lowest = below
+            if slower is not None:
+                found.nonlinear["ramp"] = lowest = slower
                 break
         if lowest is not None and lowest.speed < end:
             break
@@ -369,6 +364,10 @@ def _by_ramp(
                 "or derails (bifurcation)"
             )
     top = branch.points[0].speed
+    end = lowest.speed if lowest else top
+    for slower, further in below(motion, end, found.low, max(excitations)):
+        found.branches.append(further)
+        found.nonlinear["ramp"] = lowest = slower
     if lowest is None:
         found.remarks.append(f"ramp: nothing hunts {_after(excitations)} at {top:.4g} m/s")
     if top < found.high:

@@ -6,7 +6,7 @@ Kaiser 2012).
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -29,6 +29,10 @@ CONSTANT = 20.0  # s, of a run that decides whether an oscillation sustains itse
 CHANGE = 0.02  # of the amplitude over half of it
 MOST_HALVES = 10  # halves of such a run, at most
 STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailment
+# Where further ramps begin above a speed at which rest is unstable: shares of a tenth of it, or of
+# what is left to the end of hunting; the range may be narrow.
+ONWARDS, ABOVE = (0.5, 0.1), 0.1
+BELOW = 0.8  # ratio of speeds at which other motions are sought below the slowest one
 
 
 def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
@@ -104,6 +108,32 @@ def ramp(
     _brake(motion, points, low, DECELERATION, lambda share: tell(0.3 + 0.4 * share))
     lowest = _lowest(motion, points)
     return lowest, Branch("ramp", points, math.inf if lowest is None else lowest.speed)
+
+
+def tops_above(speed: float, end: float) -> list[float]:
+    """Speeds above one at which rest is unstable, below the end of a ramp, where others begin."""
+    reach = min(ABOVE * speed, end - speed)
+    return [speed + share * reach for share in ONWARDS]
+
+
+def below(
+    motion: Motion, speed: float, low: float, excitation: float
+) -> Iterator[tuple[Point, Branch]]:
+    """Seek, by a disturbance [m] at speeds below the end of a ramp [m/s], motions that last there.
+
+    Where one motion ends rounding may decide whether the vehicle changes to another.  From each
+    that is found a ramp goes on: yields its slowest motion, and the amplitude on it.
+    """
+    while (speed := BELOW * speed) > low:
+        try:
+            seen = excited(motion, speed, excitation)
+            if seen.amplitude > THRESHOLD and sustained(motion, seen.state, speed):
+                lowest, branch = ramp(motion, low, speed, excitations=(excitation,))
+                if lowest is not None:
+                    yield lowest, branch
+                    speed = lowest.speed
+        except LeftRange:  # every disturbance derails, or what it becomes
+            continue
 
 
 def _brake(

@@ -258,7 +258,7 @@ def test_static_loads_add_up_to_the_weight(capsys):
 @pytest.mark.usefixtures("small_contact_tables")
 def test_every_load_case_has_its_own_tables(capsys):
     data = data_of(capsys, "metro_b_motor", "--static")
-    assert list(data["load_cases"]) == ["design", "full"]
+    assert list(data["load_cases"]) == ["design", "laden"]
     for case in data["load_cases"].values():
         # both stages carry the same load case: the primary springs the weight of all but wheelsets
         masses = {row["body"]: row["mass"] for row in case["masses"]}
@@ -269,12 +269,12 @@ def test_every_load_case_has_its_own_tables(capsys):
         assert primary == pytest.approx(sprung * 9.81, rel=1e-4)
         assert secondary == pytest.approx(masses["carbody"] * 9.81, rel=1e-4)
         assert all(0.5 < row["bounce"] < 20.0 for row in case["frequencies"])
-    full = data["load_cases"]["full"]
+    laden = data["load_cases"]["laden"]
     # the air springs level the car over frames whose springs of 1.7 kN/mm carry 25.4 kN more
-    (car, frame, _) = full["heights"]
+    (car, frame, _) = laden["heights"]
     assert frame["raised"] == pytest.approx(-0.0162, abs=2e-4)
     assert car["raised"] == pytest.approx(frame["raised"], abs=1e-4)
-    text = "\n".join(lines_of(capsys, "metro_b_motor", "--static", "--load", "full"))
+    text = "\n".join(lines_of(capsys, "metro_b_motor", "--static", "--load", "laden"))
     assert "carbody stands 16 mm below its nominal height" in text
     assert "load 'design'" not in text
 

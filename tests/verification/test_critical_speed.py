@@ -191,6 +191,24 @@ def test_a_ramp_goes_on_in_a_narrow_range_too(half):
     assert found.remarks == []
 
 
+def test_motions_below_the_end_of_a_ramp_are_found_though_rest_is_stable_there():
+    """One lasts above 60 m/s, another, from 2 mm on, between 25 and 45, where rest is stable."""
+
+    class Thresholds(Cycles):
+        def stretch(self, state, begin, end, duration):
+            grows = max(begin, end) > 60.0 or (25.0 < end <= begin < 45.0 and state[0] > 2e-3)
+            self.growth = lambda _: 1.0 if grows else -1.0
+            return super().stretch(state, begin, end, duration)
+
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=70.0)
+    begins = LossOfStability(None, False, ())
+    _by_ramp(found, Thresholds(None, 5.0), begins, None, (1e-3, 3e-3), lambda _: None)
+    first, further = found.branches
+    assert first.end == pytest.approx(60.0, abs=0.2)
+    assert found.nonlinear["ramp"].speed == further.end == pytest.approx(25.0, abs=0.2)
+    assert found.remarks == []
+
+
 def test_without_a_hunting_mode_one_that_moves_the_wheelsets_is_excited(monkeypatch):
     """A pitching car moves them by rounding only: in its shape 8 mm of them derail any vehicle.
 
