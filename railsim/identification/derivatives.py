@@ -29,6 +29,7 @@ from railsim.processes import available_cores
 from railsim.profiles import Profile
 from railsim.result import Result
 from railsim.simulation import simulate
+from railsim.simulation.remarks import silent
 from railsim.table import Column, Table
 
 Output = str | Callable[[Result], Any]
@@ -53,6 +54,7 @@ class Derivative:
     error: float  # estimated, over the norm of the derivative [1]
     step: float  # of the parameter's coordinate
     kinked: float = np.nan  # share of the values at which both sides differ; NaN: forward
+    rounding: float = 0.0  # of the output, over the change that the derivative is taken from [1]
 
     @property
     def is_smooth(self) -> bool:
@@ -137,7 +139,8 @@ class _Job:
         return pool.run([(self.values, (x,)) for x in points])
 
     def values(self, x: Floats) -> list[Floats]:
-        return self.read(self.result(x))
+        with silent():
+            return self.read(self.result(x))
 
     def read(self, result: Result) -> list[Floats]:
         if result.status != "complete":
@@ -220,8 +223,10 @@ def sensitivity(
         for j, one in enumerate(wanted)
     }
     remarks = [
-        f"{output} has no derivative to {name}: its two sides differ by {100 * one.error:.0f} %"
-        + (f" ({100 * one.kinked:.3g} % of the values)" if np.isfinite(one.kinked) else "")
+        f"{output} does not depend on {name}: what it changes by is within rounding."
+        if one.rounding > STATUS
+        else f"{output} has no derivative to {name}: its two sides differ by {100 * one.error:.0f}"
+        + (f" % ({100 * one.kinked:.3g} % of the values)" if np.isfinite(one.kinked) else " %")
         + "; flange, stop, lifted wheel or sticking friction."
         for (output, name), one in derivatives.items()
         if not one.is_smooth
@@ -267,7 +272,9 @@ def _forward(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[De
         values = [(one[k] - y) / step for one in moved]
         linear, whole = -step * np.sum(values, axis=0), together[k] - y
         error = _size(whole - linear) / max(_size(linear), LEAST * _size(whole), 1e-300)
-        found.append([Derivative(value, error, step) for value in values])
+        found.append(
+            [Derivative(v, error, step, rounding=_rounding(y, step * _size(v))) for v in values]
+        )
     return found, count + 2
 
 
@@ -299,6 +306,10 @@ def _central(job: _Job, base: list[Floats], pool: Workers) -> tuple[list[list[De
     return [[found[k, j] for j in range(count)] for k in range(len(base))], runs
 
 
+def _rounding(y: Floats, change: float) -> float:
+    return 1e-13 * _size(y) / max(change, 1e-300)
+
+
 def _one(
     y: Floats, above: Floats, below: Floats, step: float, before: Derivative | None
 ) -> tuple[Derivative, float]:
@@ -308,11 +319,11 @@ def _one(
     size = max(_size(value), LEAST * sides, 1e-300)
     ratio = 0.5 * _size(up - down) / size
     # of an output that does not depend on the parameter there is nothing to round
-    rounding = 1e-13 * _size(y) / (step * size) if sides else 0.0
+    rounding = _rounding(y, step * size) if sides else 0.0
     error = ratio**2 if before is None else _size(value - before.value) / size
     error = max(error, rounding)
     if ratio > STATUS:
         error = max(error, ratio)
     scale = max(float(np.max(np.abs(value))), 1e-300)
     kinked = float(np.mean(np.abs(up - down) > 2.0 * STATUS * scale))
-    return Derivative(value, error, step, kinked), ratio
+    return Derivative(value, error, step, kinked, rounding), ratio

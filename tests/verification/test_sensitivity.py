@@ -127,3 +127,19 @@ def test_wrong_parameters_and_outputs_are_one_line(parameters, outputs, words):
         )
     assert len(caught.value.faults) == 1
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("scheme", ["central", "forward"])
+def test_a_change_within_rounding_is_no_kink_and_variants_repeat_no_remarks(scheme, caplog):
+    """1e10 m + z has steps of 2e-6 m: 1e-13 of it is ten times the change of z by the stiffness."""
+    found = railsim.sensitivity(
+        mass_on_spring(), STRAIGHT, [STIFF],
+        {"far": lambda result: 1e10 + result["sensor_displacement"][-1, -1, 2]},
+        scheme=scheme, settings=Settings.model_validate({**SETTINGS, "outputs": {"sensors": True}}),
+        speed=5.0, duration=0.1,
+    )  # fmt: skip
+    assert found.remarks == (
+        f"far does not depend on {STIFF}: what it changes by is within rounding.",
+    )
+    assert caplog.messages
+    assert len(set(caplog.messages)) == len(caplog.messages)
