@@ -286,6 +286,7 @@ class Identified:
             for parameter, factor, spread in shares
             if parameter.of_vehicle != parameter.keys
         ]
+        head += [f"# {words}" for words in self.remarks if AT_BOUND in words]
         wheels = _wheels(self.vehicle, files)
         if base is None:
             vehicle = self.fitted.with_values(wheels) if wheels else self.fitted

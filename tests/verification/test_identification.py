@@ -386,8 +386,11 @@ def test_what_nothing_shows_has_no_deviation_and_no_end_in_the_table(found, tmp_
     base.write_text(quarter().to_toml())
     covariance = one.covariance.copy()
     covariance[1, 1] = 1e12
-    path = replace(one, covariance=covariance).save_vehicle(tmp_path / "fitted.toml", base)
-    text = path.read_text()
+    words = f"{PRIMARY} ends at its bound of 0.8: the best value may lie beyond it"
+    told = replace(one, covariance=covariance, remarks=("Another.", words))
+    text = told.save_vehicle(tmp_path / "fitted.toml", base).read_text()
+    assert f"\n# {words}\n" in text  # the file goes on without the page
+    assert "Another" not in text
     assert [text.count(" not shown by the data"), text.count(" +- ")] == [1, 2]  # 1e+08 %
     table = str(replace(one, covariance=covariance).table()).splitlines()
     (line,) = (line for line in table if DAMPER in line)
