@@ -112,23 +112,23 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Float
     """Positions and points of the project's own list."""
     key = "s" if kind == "rail" else "angle"
     rows = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    reader = csv.DictReader(rows, skipinitialspace=True)
-    columns = set(reader.fieldnames or ())
-    listed = {key, "file"} <= columns
-    if not listed and not {key, "y", "z"} <= columns:
+    columns, *table = [*csv.reader(rows, skipinitialspace=True)] or [[]]
+    listed = {key, "file"} <= {*columns}
+    if not listed and not {key, "y", "z"} <= {*columns}:
         allowed = f"{key}, file, or {key}, y, z"
-        raise _wrong(path, "", f"columns {', '.join(reader.fieldnames or ())}", allowed)
+        raise _wrong(path, "", f"columns {', '.join(columns)}", allowed)
+    at, *of = map(columns.index, (key, "file") if listed else (key, "y", "z"))
     found: dict[float, list[tuple[float, float]]] = {}
     files: dict[float, str] = {}
-    for row in reader:
+    for row in table:
         try:
-            position = float(row[key])
+            position = float(row[at])
             if listed:
-                files[position] = (row["file"] or "").strip()
+                files[position] = row[of[0]].strip()
             else:
-                found.setdefault(position, []).append((float(row["y"]), float(row["z"])))
-        except (TypeError, ValueError):
-            shown = ", ".join(str(value) for value in row.values())
+                found.setdefault(position, []).append((float(row[of[0]]), float(row[of[1]])))
+        except (IndexError, ValueError):
+            shown = ", ".join(row)
             raise _wrong(path, "", f"row '{shortened(shown)}'", f"numbers {key}, y, z") from None
     if listed:
         return list(files), [_section(path, name) for name in files.values()]

@@ -11,6 +11,7 @@ import math
 import sys
 from collections.abc import Mapping
 from copy import deepcopy
+from functools import lru_cache
 from types import CodeType
 from typing import Any
 
@@ -66,15 +67,19 @@ class Expression(str):
     def __new__(cls, text: str) -> "Expression":
         """Parse a text; raises ValueError: it is no arithmetic."""
         made = super().__new__(cls, text)
-        made.tree = _parsed(text)
-        made.code = _compiled(made.tree)
-        names = {node.id for node in ast.walk(made.tree) if isinstance(node, ast.Name)}
-        made.names = frozenset(names - FUNCTIONS.keys() - CONSTANTS.keys())
+        made.tree, made.code, made.names = _understood(text)
         return made
 
     def __reduce__(self) -> tuple[type["Expression"], tuple[str]]:
         """Travel between processes as text."""
         return Expression, (str(self),)
+
+
+@lru_cache(4096)  # a file is read again and again, with other values
+def _understood(text: str) -> tuple[ast.expr, CodeType, frozenset[str]]:
+    tree = _parsed(text)
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return tree, _compiled(tree), frozenset(names - FUNCTIONS.keys() - CONSTANTS.keys())
 
 
 def _parsed(text: str) -> ast.expr:

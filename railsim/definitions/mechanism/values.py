@@ -30,7 +30,8 @@ def members(kind: type[T], node: Any, path: tuple[str, ...] = ()) -> Iterator[tu
     elif isinstance(node, list | tuple):
         inner = enumerate(node)
     for key, value in inner:
-        yield from members(kind, value, (*path, str(key)))
+        if value is not None and type(value) is not float:  # most are
+            yield from members(kind, value, (*path, str(key)))
 
 
 def parameter_values(

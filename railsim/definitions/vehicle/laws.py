@@ -206,6 +206,8 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
 def _used(node: Any, at: str = "") -> Iterator[tuple[str, str]]:
     """Yield key and name of every law that is used in plain tables."""
     for key, value in node.items() if isinstance(node, dict) else enumerate(node):
+        if isinstance(value, int | float):
+            continue  # most of a long table
         place = f"{at}.{key}" if at else str(key)
         if key == "law" and isinstance(value, str):
             yield place, value
