@@ -163,7 +163,7 @@ def undrawn():
 
 # The same examples in every run; `--hypothesis-profile search` draws new ones. A first call may
 # compile, and the machine may be busy: time is no property.
-settings.register_profile("railsim", deadline=None, derandomize=True)
+settings.register_profile("railsim", deadline=None, derandomize=True, max_examples=40)
 settings.register_profile("search", deadline=None)
 settings.load_profile("railsim")
 # Nor mixed with the numbers that stand in railsim's files: a number changed there would change them

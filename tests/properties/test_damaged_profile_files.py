@@ -36,7 +36,7 @@ GRID = TableGrid(ds=1e-3, roll_max=0.006, droll=2e-3, n_w=2)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [40, pytest.param(500, marks=pytest.mark.further)])
+@pytest.mark.parametrize("number", [20, pytest.param(500, marks=pytest.mark.further)])
 def test_damaged_files_are_refused_or_usable(number, tmp_path):
     outcomes = {"refused": 0, "usable": 0}
     clean = {"wheel": points("S1002"), "rail": points("60E1")}

@@ -155,7 +155,7 @@ def test_contacts_evaluated_again_are_counted_once():
         ("coach_manchester", 10.84, "co-running", 60.0),  # a step of 0.1 m foresees nothing
         ("wagon_y25", 8.0, "p2", 10.0),
     ],
-    always=(0, 1),
+    always=(1,),
 )
 def test_the_chosen_step_follows_the_blow_on_the_nose(vehicle, lead, support, speed):
     """The reference scheme at 0.025 ms: within 3 %; in parts of 0.42 ms 0.95, 0.66, 0.88."""

@@ -104,13 +104,14 @@ def run(depth, inclination, support, radius, speed, **settings):
     if radius < np.inf:
         plan = [element.model_dump(exclude_none=True) for element in track.plan]
         plan[2]["radius"] = radius
-        track = track.replace(plan=plan)
+        track, way = track.replace(plan=plan), {"start": 250.0, "until": 780.0}
     else:
-        settings["initial"] = {"front.outer.wheelset": {"y": 3e-3}}
+        settings["initial"], way = {"front.outer.wheelset": {"y": 3e-3}}, {}
     return simulate(
         load_vehicle("coach_manchester"),
         track,
         speed=speed,
+        **way,
         settings=Settings(**settings),
         profiles={"S1002": hollow_wheel(depth)},
     )

@@ -63,7 +63,7 @@ def test_hunting_is_said(speed, spectrum):
 
 
 def test_the_response_to_bad_track_below_the_critical_speed_is_no_hunting():
-    found = remarks(35.0, until=2000.0, spectrum="erri_b176_high")
+    found = remarks(35.0, until=1300.0, spectrum="erri_b176_high")
     assert not any("hunts" in remark for remark in found)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from selection import points
 
 from railsim.contact.curves import HALF_WIDTHS, wheel_curve
 from railsim.contact.rail_sections import kinematic_height, rail_parts, rolled_curve
@@ -52,7 +53,7 @@ def test_wing_and_nose_are_two_rails(parts):
     assert nose.height(0.119, Y).min() == pytest.approx(0.0226, abs=1e-3)
 
 
-@pytest.mark.parametrize(
+@points(
     ("y", "lowest", "where"),
     [
         (-3.0, 0.290, 0.280),
@@ -63,6 +64,7 @@ def test_wing_and_nose_are_two_rails(parts):
         (2.0, -0.471, 0.2205),
         (3.0, -0.749, 0.190),
     ],
+    always=(0, 3, 6),
 )
 def test_kinematic_path(parts, wheel, y, lowest, where):
     """Lowest point of a wheel that changes from wing to nose, within 0.015 mm and 3 mm."""

@@ -13,7 +13,7 @@ WHEELSETS = (
 )
 
 
-def lateral_at_the_end(vehicle, speed, offset=0.003, until=900.0):
+def lateral_at_the_end(vehicle, speed, offset=0.003, until=600.0):
     """Largest lateral displacement in the last 100 m after all wheelsets started off centre [m]."""
     initial = {name: {"y": offset} for name in WHEELSETS}
     result = simulate(

@@ -336,7 +336,7 @@ def test_a_trial_far_from_the_steady_state_is_no_warning():
 def test_no_steady_state_is_said_with_what_is_unbalanced():
     """Twice the speed that overturns: no wheel load can carry it."""
     with pytest.raises(NotConverged, match="no steady state"):
-        curving(load_vehicle("coach_manchester"), 250.0, 0.0, 45.0)
+        curving(test_vehicle("single_bogie"), 250.0, 0.0, 120.0)
 
 
 @pytest.fixture(scope="module")

@@ -90,7 +90,7 @@ def test_run_that_ends_while_a_wheel_rings_goes_on_to_the_same_bytes():
     np.testing.assert_array_equal(second.groups["state"]["end"], whole.groups["state"]["end"])
 
 
-@pytest.mark.parametrize(("support", "tolerance"), [("ballasted", 5e-3 * 68.8e3), ("rigid", 1e-2)])
+@points(("support", "tolerance"), [("ballasted", 5e-3 * 68.8e3), ("rigid", 1e-2)], always=(0,))
 def test_mirrored_irregular_curve_has_the_same_divided_steps(support, tolerance):
     """Which steps are divided depends on the contacts alone, not on the side they are on.
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dynamics import Settings, evaluate, load_vehicle, steady
 from rig import test_vehicle
+from selection import points
 
 from railsim.definitions.loading import load_track
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
@@ -325,7 +326,7 @@ def test_slow_run_over_a_twist_gives_the_static_change_of_load():
     assert change == pytest.approx(np.array([[1, -1], [-1, 1]]) * expected, rel=0.02)
 
 
-@pytest.mark.parametrize("support", ["rigid", "ballasted"])
+@points("support", ["rigid", "ballasted"], always=(0,))
 @pytest.mark.usefixtures("small_contact_tables")
 def test_irregular_rails_mirrored_give_the_mirrored_result(coach, support):
     """Left and right of everything exchanged, through dips, kinks, twists and random rails.

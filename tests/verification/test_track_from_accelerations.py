@@ -55,6 +55,7 @@ def contact_in_the_mean_once():
         return kept[key]
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contact, "LENGTH", 600.0)
         # the package has a function of the module's name
         patch.setattr(import_module("railsim.observation.irregularity"), "in_the_mean", once)
         yield
@@ -229,7 +230,7 @@ def test_both_wheelsets_cancel_in_the_middle_of_the_frame():
 
 @pytest.fixture(scope="module")
 def short(coach):
-    result, track, measurement = twin(coach, 700.0, V, points=("axlebox",))
+    result, track, measurement = twin(coach, 500.0, V, points=("axlebox",))
     return result, track, measurement, irregularity(measurement, coach, track, simulations=0)
 
 
@@ -471,7 +472,7 @@ def test_wrong_input(short, coach):
     with pytest.raises(InputError, match="no sensor 'axlebox_9_left'"):
         irregularity(wrong, other, track)
     curve = canted_curve(600.0, 0.1, 1000.0)
-    for shift, words in ((900.0, "900 to 1600 m"), (-100.0, "-100 to 600 m")):
+    for shift, words in ((900.0, "900 to 1400 m"), (-100.0, "-100 to 400 m")):
         with pytest.raises(InputError, match=f"{words}; 0 to 1000 m as track"):
             irregularity(measurement.moved(shift), coach, curve)
 

@@ -28,7 +28,7 @@ def test_vehicle_stands_still_on_straight_track(name):
     assert np.max(np.abs(result.wheelset_lateral)) < 1e-6
 
 
-@points("name", list(SPEEDS), always=(0, 1))
+@points("name", list(SPEEDS), always=(1,))
 def test_vehicle_runs_through_the_curve(name):
     """Newton's law to first order: sum of Y = -m (V^2/R - g cant/1.5), sum of Q = weight + 0.6 %.
 

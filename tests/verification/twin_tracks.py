@@ -18,7 +18,7 @@ from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement
 from railsim.track.tables import track_tables
 
-BEGIN, WAVES, AFTER = 40.0, 4, 30.0  # m, -, m
+BEGIN, WAVES, AFTER = 30.0, 3, 20.0  # m, -, m
 PIECE = 0.1  # m, length of an element
 ROUNDING = 0.2  # m
 
