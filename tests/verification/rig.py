@@ -168,22 +168,19 @@ class WorkOfDissipation:
         self._before, self._inner_before = now, state[self.inner].copy()
 
     def _deflections(self, state):
-        system, pose = self.system, poses(self.system, state)
-        links = np.array(
-            [
-                np.linalg.norm(pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p)
-                for (i, j), (p, q) in zip(system.links.body, system.links.point, strict=True)
-            ]
-        )
-        mounts = []
-        for (i, j), (p, q), flags in zip(
-            system.mounts.body, system.mounts.point, system.mounts.flags, strict=True
-        ):
-            gap = pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p
-            second = pose[j][1].T @ gap if flags[1] else pose[i][1].T @ gap
-            mounts.append([pose[i][1].T @ gap, second])
-        relative = [pose[i][1].T @ pose[j][1] for i, j in system.mounts.body]
-        return links, np.array(mounts).reshape(-1, 2, 3), np.array(relative).reshape(-1, 3, 3)
+        place, turn = map(np.array, zip(*poses(self.system, state).values(), strict=True))
+
+        def gaps(elements):
+            ends = place[elements.body] + np.einsum(
+                "ekab,ekb->eka", turn[elements.body], elements.point
+            )
+            return ends[:, 1] - ends[:, 0]
+
+        links, mounts = self.system.links, self.system.mounts
+        first, second = turn[mounts.body[:, 0]], turn[mounts.body[:, 1]]
+        axes = np.stack([first, np.where(mounts.flags[:, 1, None, None], second, first)], axis=1)
+        ways = np.einsum("ekba,eb->eka", axes, gaps(mounts))
+        return np.linalg.norm(gaps(links), axis=1), ways, np.einsum("eba,ebc->eac", first, second)
 
     def _links(self, now, before, inner, h):
         system, total = self.system, 0.0
@@ -197,28 +194,20 @@ class WorkOfDissipation:
         return total
 
     def _mounts(self, now, before, inner, h):
-        system, total = self.system, 0.0
-        for e, (ways, middles) in enumerate(zip(now - before, 0.5 * (now + before), strict=True)):
-            for way, middle in zip(ways, middles, strict=True):
-                for k in range(3):
-                    force = system.mounts.damping[e, k] * way[k] / h
-                    m = system.mounts.internal[e, k]
-                    if m >= 0 and system.internal.kind[m] == AIR:
-                        force += system.internal.parameter[m, 0] * (middle[k] - inner[m])
-                    elif m >= 0:
-                        force += inner[m]
-                    total += 0.5 * force * way[k]
-        return total
+        mounts, internal, ways = self.system.mounts, self.system.internal, now - before
+        # element, end, axis; the last value where an axis has no internal state, whose number is -1
+        own = np.append(inner, 0.0)[mounts.internal][:, None]
+        air = (np.append(internal.kind, -1) == AIR)[mounts.internal][:, None]
+        stiffness = np.append(internal.parameter[:, 0], 0.0)[mounts.internal][:, None]
+        force = np.where(air, stiffness * (0.5 * (now + before) - own), own)
+        return 0.5 * np.sum((force + mounts.damping[:, None] * ways / h) * ways)
 
     def _rotations(self, now, before, h):
-        total = 0.0
-        for c, new, old in zip(self.system.mounts.rotation_damping, now, before, strict=True):
-            turn = (new - old) @ (0.5 * (new + old)).T
-            angle = 0.5 * np.array(
-                [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-            )
-            total += float(c @ angle**2) / h
-        return total
+        turn = np.einsum("eab,ecb->eac", now - before, 0.5 * (now + before))
+        twice = [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0]]
+        twice.append(turn[:, 1, 0] - turn[:, 0, 1])
+        angles = 0.5 * np.transpose(twice)
+        return np.sum(self.system.mounts.rotation_damping * angles**2) / h
 
     def stored(self, state):
         """Energy that sticking pads and series springs hold for a while [J]."""

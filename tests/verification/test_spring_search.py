@@ -177,7 +177,8 @@ def test_a_wider_space_never_gives_a_heavier_nest():
 
 
 def test_no_nest_names_the_limits_in_the_way():
-    cramped = load_spring("turasas_axlebox", [*QUICK, "search.outer_diameter_max=0.2"])
+    changes = ["search.outer_diameter_max=0.2", "search.candidates=128"]
+    cramped = load_spring("turasas_axlebox", [*QUICK, *changes])
     with pytest.raises(InputError) as error:
         search(cramped)
     assert 1 <= len(error.value.faults) <= 3

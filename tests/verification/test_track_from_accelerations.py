@@ -477,11 +477,11 @@ def test_wrong_input(short, coach):
             irregularity(measurement.moved(shift), coach, curve)
 
 
-def test_command(short, coach, tmp_path, capsys, monkeypatch):
+def test_command(short, coach, tmp_path, capsys, monkeypatch, undrawn):
     _, _, measurement, _ = short
     monkeypatch.chdir(tmp_path)
     names = list(measurement.channels)[:4]
-    table = np.column_stack([measurement.time, *(measurement[n] for n in names)])[:9000]
+    table = np.column_stack([measurement.time, *(measurement[n] for n in names)])[:7000]
     np.savetxt("run.csv", table, delimiter=",", header=",".join(["t", *names]), comments="")
     lines = [f'{n} = {{ quantity = "{measurement.quantities[n]}" }}' for n in names]
     head = ['format = "railsim-measurement/1"', 'name = "run"', 'file = "run.csv"', "speed = 50.0"]
@@ -490,7 +490,8 @@ def test_command(short, coach, tmp_path, capsys, monkeypatch):
     assert main(["irregularity", "run.toml", "--out", "found"]) == 2
     assert "--vehicle" in capsys.readouterr().err
     arguments = ["irregularity", "run.toml", "--vehicle", COACH, "--out", "found", "--quiet"]
-    assert main([*arguments, "--simulations", "0"]) == 0
+    with undrawn():
+        assert main([*arguments, "--simulations", "0"]) == 0
     assert "cross level" in capsys.readouterr().out
     assert {p.name for p in (tmp_path / "found").iterdir()} == {
         "irregularity.json", "irregularity.png", "recording.csv", "track.toml", "estimates.csv",
