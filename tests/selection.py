@@ -144,6 +144,7 @@ LONG = frozenset(
         "test_what_lateral_compliance_of_the_rails_costs[coach_flexicoil-7.1-1.5]",
         "verification/test_linear_contact.py::"
         "test_a_run_from_the_modes_own_shape_decays_with_its_damping[6.0-coach_manchester]",
+        "verification/test_rail_sections.py::test_wing_and_nose_share_the_load_as_in_contact",
         "verification/test_hollow_wheels.py::"
         "test_coach_on_hollow_wheels_runs_the_same_with_half_the_step[0.0025-0.025-ballasted-250.0-20.0]",
         "verification/test_rail_wear.py::test_rails_wear_over_the_tonnage_of_a_mix",

@@ -20,7 +20,7 @@ def patch(ratio):
 
 
 @law
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_force_never_exceeds_friction(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)
@@ -38,7 +38,7 @@ def test_no_force_without_load_or_friction(law, missing):
 
 
 @law
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_reversed_creepages_reverse_the_force(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)
@@ -48,7 +48,7 @@ def test_reversed_creepages_reverse_the_force(law, ratio, xi_x, xi_y, phi):
 
 
 @law
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_lateral_mirror_image(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)
@@ -58,7 +58,7 @@ def test_lateral_mirror_image(law, ratio, xi_x, xi_y, phi):
 
 
 @law
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(
     ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins, scale=st.floats(0.1, 10.0),
     stress=st.floats(0.1, 10.0),
@@ -79,7 +79,7 @@ def test_force_and_length_scaling(law, ratio, xi_x, xi_y, phi, scale, stress):
 
 # Polach's law lacks the spin moment: its power is not that of the contact
 @pytest.mark.parametrize("law", sorted(set(LAWS) - {"polach"}))
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_creep_forces_dissipate(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from selection import points
 
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.definition import Mechanism
@@ -145,7 +146,7 @@ def test_friction_takes_as_much_on_either_way(ground, crank, coupler, rocker):
     assert back - plain == pytest.approx(1.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("lift", [1, 2, 3, 4, 5])
+@points("lift", [1, 2, 3, 4, 5], always=(1, 4))
 @settings(max_examples=5, deadline=None)
 @given(turn=ANGLE)
 def test_a33_lift_frame_turned_by_any_angle_changes_nothing_but_ground_reactions(lift, turn):

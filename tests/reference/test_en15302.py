@@ -3,7 +3,7 @@
 import csv
 
 import numpy as np
-import pytest
+from selection import points
 
 from railsim.contact import equivalent_conicity
 
@@ -17,7 +17,7 @@ def columns(path):
     }
 
 
-@pytest.mark.parametrize("case", range(1, 10))
+@points("case", range(1, 10), always=(0, 4, 8))
 def test_annex_e_case_is_within_the_standards_tolerance(reference_dir, case):
     folder = reference_dir / "contact" / "en15302_annexE"
     function = columns(folder / f"delta_r_E{case}.csv")

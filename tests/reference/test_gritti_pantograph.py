@@ -505,7 +505,7 @@ def turned(angle):
     ]
 
 
-@pytest.mark.parametrize("angle", [0.4, -1.3, 2.9])
+@points("angle", [0.4, -1.3, 2.9], always=(1,))
 def test_a33_turning_the_lift_frame_changes_ground_reactions_only(lifts, angle):
     plain, other = lifts["atr95_lift_5"], None
     other = analyse(load_mechanism("atr95_lift_5", [*turned(angle), "sampling.points=401"]))

@@ -161,7 +161,7 @@ def chosen_step(vehicle, law, speed):
 
 
 @pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
-@pytest.mark.parametrize("speed", [20.0, 45.0])
+@points("speed", [20.0, 45.0], always=(1,))
 def test_table_needs_no_shorter_step_than_fastsim(vehicle, speed):
     assert chosen_step(vehicle, "table", speed) == chosen_step(vehicle, "fastsim", speed)
 

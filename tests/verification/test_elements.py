@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rig import Rig
 from scipy.optimize import brentq
+from selection import points
 
 X, Y, Z = range(3)
 
@@ -139,7 +140,7 @@ def pulled(rig, direction, way=0.02, steps=400, held=(0.0,) * 6):
     return rig.path(time, lambda t: held + way * t * direction, lambda t: way * direction)
 
 
-@pytest.mark.parametrize("angle", np.radians([0.0, 30.0, 45.0, 120.0, 250.0]))
+@points("angle", np.radians([0.0, 30.0, 45.0, 120.0, 250.0]), always=(1, 4))
 @pytest.mark.parametrize("kind", ["friction", "side_bearer", "centre_plate"])
 def test_static_capacity_is_mu_N_in_every_direction(kind, angle):
     """A limit for each axis gives up to sqrt(2) mu N; Coulomb's law does not know the axes."""

@@ -57,9 +57,10 @@ def rolling(vehicle, speed, profiles=None):
     return equilibrium(model, speed)
 
 
-@pytest.mark.parametrize(("along", "across"), [
+@points(("along", "across"), [
     (STOP, STOP), (STIFF_STOP, STOP), (PUSHER, STOP), (CLAMPED, PUSHER), (CLAMPED, STIFF_STOP),
-], ids=["stops", "stiff stops", "pushers", "clamped axles", "clamped axles and stops"])  # fmt: skip
+], always=(0, 3),
+   ids=["stops", "stiff stops", "pushers", "clamped axles", "clamped axles and stops"])  # fmt: skip
 def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
     for payload, speed in itertools.product((0.0, 25e3, 50e3), (5.0, 20.0, 33.0)):
         found = rolling(wagon(payload, along, across), speed)

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import optimize, stats
+from selection import points
 
 import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
@@ -116,8 +117,11 @@ def vector(ready, z, place=True, spread=None):
     return np.concatenate([*found, [] if spread is None else [-z[1] / spread]])
 
 
-@pytest.mark.parametrize(("place", "spread", "noise"), [(True, None, 1.0), (True, 0.02, 2.0),
-                                                        (False, None, 1.0)])  # fmt: skip
+@points(
+    ("place", "spread", "noise"),
+    [(True, None, 1.0), (True, 0.02, 2.0), (False, None, 1.0)],
+    always=(1, 2),
+)
 def test_solution_and_covariance_are_those_of_least_squares(place, spread, noise):
     """Above the noise that is stated, what is left is noise too: a factor on the covariance."""
     ready = runs(np.random.default_rng(7), noise)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from selection import points
 
 from railsim.definitions.loading import load_mechanism
 from railsim.errors import InputError
@@ -218,7 +219,7 @@ piston = ["ground.o", "slide.pin"]
     assert result.output["ratio"] == pytest.approx(1.0)  # was 0: along y
 
 
-@pytest.mark.parametrize("name", ["atr95_lift_5", "tilting_one_spring"])
+@points("name", ["atr95_lift_5", "tilting_one_spring"], always=(0,))
 def test_speeds_of_links_and_actuators_are_the_slopes_of_their_angles_and_lengths(name):
     timed = analyse(load_mechanism(name, ["motion.points=2001", "sampling.points=51"])).timed
     for courses in (links(timed.motion), actuators(timed.motion)):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mechanism_closed_forms import LENGTHS, upper
+from selection import points
 
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism.parts import Slot
@@ -74,7 +75,7 @@ def test_a17_derivatives_by_the_driver_are_those_of_differences(models, motions,
         assert np.abs(differences - exact)[same].max() < 1e-6 * scale
 
 
-@pytest.mark.parametrize("name", ALL[:7])
+@points("name", ALL[:7], always=(0, 4, 6))
 def test_a17_gradients_by_parameters_are_those_of_differences(name):
     mechanism = load_mechanism(name)
     values = parameter_values(mechanism)

@@ -150,8 +150,10 @@ def lateral_force(table, y, roll, load):
     return sum(patch.N_y for patch in right) - sum(patch.N_y for patch in left)
 
 
-@pytest.mark.parametrize(
-    ("wheel_name", "rail_name", "inclination"), sorted({case[:3] for case in LATERAL_STIFFNESS})
+@points(
+    ("wheel_name", "rail_name", "inclination"),
+    sorted({case[:3] for case in LATERAL_STIFFNESS}),
+    always=(1, 3),
 )
 def test_lateral_stiffness_is_that_of_the_boundary_elements(wheel_name, rail_name, inclination):
     wheel = load_profile("S1002") if wheel_name == "S1002" else worn(0)
@@ -172,7 +174,7 @@ def test_lateral_stiffness_is_that_of_the_boundary_elements(wheel_name, rail_nam
         assert np.max(np.maximum(ratio, 1.0 / ratio)) < 1.2
 
 
-@pytest.mark.parametrize("cone", [0.05, 0.025])
+@points("cone", [0.05, 0.025], always=(0,))
 @pytest.mark.parametrize("load", [10e3, 54.5e3, 100e3])
 def test_lateral_stiffness_of_cones_is_the_closed_form(cone, load):
     # W gamma/(b0 - r0 gamma) on rails that touch at one point of their crown

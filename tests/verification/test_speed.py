@@ -128,7 +128,7 @@ def test_start_anywhere(start):
     assert np.max(np.abs(result.Q / result.Q[0] - 1.0)) < 0.02
 
 
-@pytest.mark.parametrize("start", [330.0, 355.0, 425.0])
+@points("start", [330.0, 355.0, 425.0], always=(0, 2))
 def test_start_on_a_transition_is_the_state_on_the_way(start):
     """In the transitions of R 250 m the vehicle stands on the twist that it came over.
 
@@ -276,7 +276,7 @@ def test_continued_run_gives_the_same_bytes(case, name, straight, tmp_path):
 # outputs in distance ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", ["fast", "rk4"])
+@points("scheme", ["fast", "rk4"], always=(0,))
 @pytest.mark.parametrize(
     "settings",
     [

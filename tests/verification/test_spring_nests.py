@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from selection import points
 
 from railsim.definitions.loading import load_spring
 from railsim.errors import InputError
@@ -169,7 +170,7 @@ def test_candidates_use_the_space_and_keep_to_it(suspension):
     assert set(np.unique(x.d)) == set(task.wires)
 
 
-@pytest.mark.parametrize(
+@points(
     ("changes", "cause"),
     [
         ([], "solid height of the outer"),
@@ -178,6 +179,7 @@ def test_candidates_use_the_space_and_keep_to_it(suspension):
         (["outer.free_height=0.75", "inner.active_coils=4"], "buckles the outer"),
         (["outer.free_height=0.75", "inner.free_height=0.5"], "buckles the inner"),
     ],
+    always=(0, 4),
 )  # fmt: skip
 def test_of_two_ends_the_one_that_is_met_first_is_named_with_its_load(changes, cause):
     own = load_spring("turasas_axlebox", changes)
