@@ -67,7 +67,7 @@ class Expression(str):
     def __new__(cls, text: str) -> "Expression":
         """Parse a text; raises ValueError: it is no arithmetic."""
         made = super().__new__(cls, text)
-        made.tree, made.code, made.names = _understood(text)
+        made.tree, made.code, made.names = _parsed(text)
         return made
 
     def __reduce__(self) -> tuple[type["Expression"], tuple[str]]:
@@ -76,13 +76,7 @@ class Expression(str):
 
 
 @lru_cache(4096)  # a file is read again and again, with other values
-def _understood(text: str) -> tuple[ast.expr, CodeType, frozenset[str]]:
-    tree = _parsed(text)
-    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    return tree, _compiled(tree), frozenset(names - FUNCTIONS.keys() - CONSTANTS.keys())
-
-
-def _parsed(text: str) -> ast.expr:
+def _parsed(text: str) -> tuple[ast.expr, CodeType, frozenset[str]]:
     if len(text) > LONGEST:
         raise ValueError(f"an expression of {len(text)} characters; at most {LONGEST}")
     try:
@@ -90,7 +84,8 @@ def _parsed(text: str) -> ast.expr:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError(f"no arithmetic expression; allowed: {GRAMMAR}") from None
     _check(tree)
-    return tree
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return tree, _compiled(tree), frozenset(names - FUNCTIONS.keys() - CONSTANTS.keys())
 
 
 def _check(node: ast.expr) -> None:

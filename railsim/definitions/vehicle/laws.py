@@ -206,10 +206,7 @@ def with_sources(tables: dict[str, Any]) -> list[Fault]:
 def _used(node: Any, at: str = "") -> Iterator[tuple[str, str]]:
     """Yield key and name of every law that is used in plain tables."""
     for key, value in node.items() if isinstance(node, dict) else enumerate(node):
-        if isinstance(value, int | float):
-            continue  # most of a long table
-        place = f"{at}.{key}" if at else str(key)
         if key == "law" and isinstance(value, str):
-            yield place, value
-        elif isinstance(value, dict | list) and place != "laws":
-            yield from _used(value, place)
+            yield f"{at}law", value
+        elif isinstance(value, dict | list) and f"{at}{key}" != "laws":
+            yield from _used(value, f"{at}{key}.")
