@@ -11,13 +11,12 @@ import json
 import platform
 import time
 
-import numba
 import numpy as np
 
 from railsim import load_settings, load_track, load_vehicle
 from railsim.contact.creep import LAWS, creep_law, creep_scratch
 from railsim.contact.kalker import kalker_coefficients
-from railsim.kernels import fastsim_simd
+from railsim.kernels import compiled, fastsim_simd
 from railsim.kernels.creep import creep_forces
 from railsim.kernels.patches import Patches
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
@@ -30,7 +29,7 @@ CURVE = ("coach_manchester", "curve_r250", 20.0, 396.0)  # vehicle, track, m/s, 
 STEPS = 50
 
 
-@numba.njit
+@compiled
 def repeated(times, n, law, inputs, scratch):
     for _ in range(times):
         creep_forces(n, law, inputs, scratch)

@@ -1,6 +1,7 @@
 """Irregular rails, elastic and rigid: speed, error against RK4, and how often the loop evaluates.
 
     python benchmarks/irregular.py [--repeats 3] [--until 300] [--out irregular.json] [--counts]
+        [--runs 1]
 
 Counts do not depend on the machine: `--counts` leaves out times and errors.  Those of the first
 150 m are kept in `benchmarks/results/irregular.json` (`--counts --until 150 --out ...`) and
@@ -61,14 +62,16 @@ def main() -> None:
     parser.add_argument("--until", type=float)
     parser.add_argument("--counts", action="store_true")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--runs", type=int, help="number of runs, the first of them")
     asked = parser.parse_args()
     repeats = 1 if asked.counts else asked.repeats
-    runs: dict[str, list[Result]] = {name: [] for name in cases()}
+    chosen = dict([*cases(asked.until).items()][: asked.runs])
+    runs: dict[str, list[Result]] = {name: [] for name in chosen}
     for _ in range(repeats):  # in turn: what disturbs the machine disturbs all
-        for name, scenario in cases(asked.until).items():
+        for name, scenario in chosen.items():
             runs[name].append(scenario.run())
     found: dict[str, Any] = {}
-    for name, scenario in cases(asked.until).items():
+    for name, scenario in chosen.items():
         first = runs[name][0]
         fact: dict[str, Any] = {"step": first.attributes["step"], **counts(first)}
         if not asked.counts:
