@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from selection import points
 
 import railsim
 from railsim.cli import main
@@ -266,7 +267,7 @@ class _Shaken:
         return self.run.series(*names, **labels)
 
 
-@pytest.mark.parametrize(("frequency", "gain"), [(10.0, 0.998), (40.0, 0.0624)])
+@points(("frequency", "gain"), [(10.0, 0.998), (40.0, 0.0624)], always=(1,))
 def test_forces_are_those_behind_the_low_pass_of_20_Hz(pieces, judged, frequency, gain):
     """Butterworth of order 4: 1/sqrt(1 + (f/20 Hz)^8)."""
     case = pieces[0][0].case

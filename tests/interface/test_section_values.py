@@ -11,6 +11,7 @@ import pytest
 from example_result import BODIES, OFFSETS
 from made_record import FINE, Q0, curve, made, track
 from scipy import signal
+from selection import points
 
 from railsim.assessment.criteria import CRITERIA, steering
 from railsim.assessment.en14363 import section_values
@@ -184,9 +185,10 @@ class Expected:
         return found
 
 
-@pytest.mark.parametrize(
+@points(
     ("turn", "zone", "speed", "begin", "length"),
     [(1, "4", 23.0, 265.0, 70.0), (-1, "4", 23.0, 265.0, 70.0), (0, "1", 23.0, 270.0, 160.0)],
+    always=(1, 2),
 )
 def test_every_value_of_a_section_is_that_of_its_filtered_tones(turn, zone, speed, begin, length):
     radius = 300.0 * turn if turn else np.inf

@@ -75,8 +75,8 @@ def test_seeds_are_no_axis(speeds, tmp_path, monkeypatch):
     assert not any("seed" in words for words in labels)
 
 
-@pytest.mark.parametrize(
-    ("chosen", "across"), [(["vehicle", None], "vehicle"), ([None, "vehicle"], "seed")]
+@points(
+    ("chosen", "across"), [(["vehicle", None], "vehicle"), ([None, "vehicle"], "seed")], always=(1,)
 )
 def test_words_and_seeds_are_axes_if_asked_for(chosen, across, tmp_path, monkeypatch):
     """Though they have no order: no ranking of the runs takes the place of what was asked for."""
@@ -116,7 +116,7 @@ def test_medians_over_a_full_curve_are_called_as_in_the_summary(folder):
         assert drawn == pytest.approx(sorted(medians), rel=1e-5)
 
 
-@pytest.mark.parametrize("kind", ["curves", "map", "ranking"])
+@points("kind", ["curves", "map", "ranking"], always=(0,))
 def test_runs_that_ended_early_are_counted_above_the_picture(folder, kind):
     index = json.loads((folder / "study.json").read_text())
     assert _study_figure(str(folder), (), None, None, kind).get_suptitle().count("early") == 0

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_record import FINE, Q0, curve, made, track
+from selection import points
 
 import railsim
 from railsim.assessment import assess
@@ -156,7 +157,7 @@ def test_ride_alone_fails_uic_518_but_not_en_14363(tmp_path, capsys):
 # very large radii ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("hand", [1.0, -1.0])
+@points("hand", [1.0, -1.0], always=(1,))
 def test_very_large_radii_of_zone_1_are_pooled_with_straight_track(hand):
     """R 4000 m, 36.7 m/s, cant 20 mm: 31 mm deficiency; the sections are those of zone 1."""
     plan = [{"type": "STR", "length": 900.0}, *curve(hand * 4000.0, 600.0)[1:4], STRAIGHT]
