@@ -34,6 +34,7 @@ def points(names, values, always, **options):
 LONG = frozenset(
     {
         "interface/test_imports.py::test_commands_import_nothing_that_they_do_not_use[result]",
+        "interface/test_examples.py::test_measured_run_is_that_of_today_but_for_its_noise",
         "reliability/test_other_systems.py::test_command_works_without_what_posix_has[study]",
         "verification/test_twin_tracks.py::"
         "test_cross_level_is_a_wave_of_the_cant[0.0033333333333333335-0.1-10.0-0.002]",

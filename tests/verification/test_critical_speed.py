@@ -434,6 +434,7 @@ def test_without_a_critical_speed_on_rigid_rails_a_remark_says_so(monkeypatch, a
     assert found.remarks == [f"on rigid rails: {words} m/s"]
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_without_friction_nothing_hunts_and_that_is_said():
     """Its longitudinal modes have no damping but by creep: growth by rounding was called loss."""
     law, free = railsim.Settings(creep_law="polach"), RIGID.replace(friction=0.0)

@@ -20,6 +20,7 @@ FRICTIONLESS = {"friction": (0.0, 0.0)}
 FREE = Settings(contact_damping=0.0, drive={"mode": "free"})
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize("name", SPEEDS)
 def test_vehicle_stands_still_on_straight_track(name):
     result = simulate(test_vehicle(name), load_track("straight"), speed=SPEEDS[name], duration=2.0)
