@@ -75,9 +75,6 @@ LONG = frozenset(
         "verification/test_creep_law_runs.py::"
         "test_sum_of_lateral_forces_in_a_curve_does_not_depend_on_the_law[fastrip]",
         "reliability/test_kills.py::test_killed_runs_and_studies",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[springs.py]",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[optimise.py]",
-        "interface/test_benchmarks.py::test_script_runs_in_its_small_form[whole.py]",
         "verification/test_track_from_accelerations.py::"
         "test_filters_of_the_amplifier_do_not_move_the_track[filters0]",
         "interface/test_study.py::test_first_run_compiles_alone[compiled before]",
