@@ -50,10 +50,10 @@ class Version:
             return ROOT
         folder = FOLDER / self.name
         if not folder.exists():
-            folder.mkdir(parents=True)
             pack = subprocess.run(
                 ["git", "archive", self.name], cwd=ROOT, check=True, stdout=subprocess.PIPE
             )
+            folder.mkdir(parents=True)
             subprocess.run(["tar", "-x"], cwd=folder, input=pack.stdout, check=True)
         return folder
 
@@ -90,8 +90,10 @@ class Case:
 
     @property
     def left_out(self) -> tuple[Version, ...]:
-        """Versions that it says nothing about: tracks with irregularities of their own came with
-        elastic rails, and the coach that hunts had no goal before them."""
+        """Versions that it is not compared with: those without supports of the track.
+
+        They lack the zones of EN 14363, and of the coach that hunts elastic rails are asked.
+        """
         return (RIGID,) if self.track.startswith("en14363") or self == HUNTS else ()
 
 
@@ -177,7 +179,7 @@ def loops(versions: Sequence[Version], cases: Sequence[Case], rounds: int) -> di
     return found
 
 
-def times(versions: Sequence[Version], repeats: int, *, job: bool) -> dict[str, dict[str, Any]]:
+def command_times(versions: Sequence[Version], repeats: int, *, job: bool) -> dict[str, Any]:
     """Wall and CPU times [s] of `railsim run`, or of the main job from empty caches, by version."""
     found: dict[str, dict[str, Any]] = {
         name: {version.name: [] for version in versions} for name in ("wall", "cpu")
@@ -193,9 +195,8 @@ def times(versions: Sequence[Version], repeats: int, *, job: bool) -> dict[str, 
             raise RuntimeError(f"{version.name}: exit status {done['status']}")
         for name in found:
             found[name][version.name].append(done[name])
-    name, what = (
-        ("main job", "wall") if job else ("railsim run", "cpu")
-    )  # workers' CPU is not counted
+    # the CPU time of workers is not the command's
+    name, what = ("main job", "wall") if job else ("railsim run", "cpu")
     print(f"{name}: {what} time, {summary(found[what])}", flush=True)
     return found
 
@@ -230,9 +231,9 @@ def main() -> None:
     cases = [replace(CASES[0], until=20.0)] if asked.small else CASES
     found: dict[str, Any] = {"loops": loops(versions, cases, asked.rounds)}
     if asked.commands:
-        found["run"] = times(versions, asked.commands, job=False)
+        found["run"] = command_times(versions, asked.commands, job=False)
     if asked.jobs:
-        found["job"] = times(versions, asked.jobs, job=True)
+        found["job"] = command_times(versions, asked.jobs, job=True)
     if asked.out:
         asked.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 

@@ -253,4 +253,4 @@ LONG = frozenset(
         "unit/test_kernels_without_compiler.py::test_a_run_is_the_same_without_compilation",
     }
 )
-"""Long tests beside others of the same thing or of its parts; marked `further`."""
+"""Long tests, most of them beside others of the same thing; marked `further`."""

@@ -129,7 +129,8 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Float
                 found.setdefault(position, []).append((float(row[of[0]]), float(row[of[1]])))
         except (IndexError, ValueError):
             shown = ", ".join(row)
-            raise _wrong(path, "", f"row '{shortened(shown)}'", f"numbers {key}, y, z") from None
+            allowed = f"{key}, file" if listed else f"numbers {key}, y, z"
+            raise _wrong(path, "", f"row '{shortened(shown)}'", allowed) from None
     if listed:
         return list(files), [_section(path, name) for name in files.values()]
     return list(found), [_checked(path, np.array(points).T) for points in found.values()]

@@ -7,6 +7,7 @@ Kaiser 2012).
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -125,15 +126,13 @@ def below(
     that is found a ramp goes on: yields its slowest motion, and the amplitude on it.
     """
     while (speed := BELOW * speed) > low:
-        try:
+        with suppress(LeftRange):  # every disturbance derails, or what it becomes
             seen = excited(motion, speed, excitation)
             if seen.amplitude > THRESHOLD and sustained(motion, seen.state, speed):
                 lowest, branch = ramp(motion, low, speed, excitations=(excitation,))
                 if lowest is not None:
                     yield lowest, branch
                     speed = lowest.speed
-        except LeftRange:  # every disturbance derails, or what it becomes
-            continue
 
 
 def _brake(

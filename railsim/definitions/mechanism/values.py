@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 def members(kind: type[T], node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, T]]:
-    """Yield everything of a kind, such as expressions, in a definition with its dotted key."""
+    """Yield all of a kind, such as expressions, but plain numbers, with its dotted key."""
     if isinstance(node, kind):
         yield ".".join(path), node
     inner: Any = ()
@@ -30,7 +30,7 @@ def members(kind: type[T], node: Any, path: tuple[str, ...] = ()) -> Iterator[tu
     elif isinstance(node, list | tuple):
         inner = enumerate(node)
     for key, value in inner:
-        if value is not None and type(value) is not float:  # most are
+        if value is not None and type(value) is not float:  # as most are
             yield from members(kind, value, (*path, str(key)))
 
 
