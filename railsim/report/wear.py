@@ -37,8 +37,8 @@ def wear_tables(of: Worn, rows: Rows) -> list[Table]:
     """Return the table of each profile, one row for each step."""
     columns = [
         Column("distance", of.amount, of.unit, "g"),
-        Column("area", "worn area", "mm2", ".2f"),
-        Column("deepest", "", "mm", ".3f"),
+        Column("area", "worn area", "mm2", ".4f"),
+        Column("deepest", "", "mm", ".4f"),
         Column("deepest_y", "at y", "mm", ".1f"),
         Column("equivalent_conicity", "conicity at 3 mm", "", ".3f"),
         Column("flange_thickness", "flange thickness", "mm", ".2f"),
@@ -47,7 +47,6 @@ def wear_tables(of: Worn, rows: Rows) -> list[Table]:
     ]
     tables = []
     for side, of_side in rows.items():
-        shown = [row if row["area"] else row | {"deepest_y": None} for row in of_side]
-        known = [column for column in columns if column.name in shown[0]]
-        tables.append(Table(known, shown, "" if side == "rows" else f"{side} rail"))
+        known = [column for column in columns if column.name in of_side[0]]
+        tables.append(Table(known, of_side, "" if side == "rows" else f"{side} rail"))
     return tables

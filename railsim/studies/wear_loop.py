@@ -276,13 +276,13 @@ def since_new(found: Sequence[WearStep], name: str) -> list[tuple[float, Profile
 
 
 def row(distance: float, worn: Profile, lost: Floats) -> dict[str, float | None]:
-    """Worn area, largest depth and where it is."""
+    """Worn area, largest depth and where it is, None where nothing is worn."""
     at = int(np.argmax(lost))
     return {
         "distance": distance,
         "area": float(np.trapezoid(lost, worn.y)),
         "deepest": float(lost[at]),
-        "deepest_y": float(worn.y[at]),
+        "deepest_y": float(worn.y[at]) if lost[at] else None,
     }
 
 

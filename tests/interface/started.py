@@ -5,16 +5,21 @@ import sys
 
 
 def started(arguments):
-    """Start railsim; Ctrl-C and hang-ups count even where a shell started the tests without."""
+    """Start railsim; Ctrl-C and hang-ups count even where a shell started the tests without.
+
+    It is there when this returns, however long Python takes to begin.
+    """
     call = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
         "signal.signal(signal.SIGHUP, signal.SIG_DFL);"
-        "from railsim.cli import main; sys.exit(main())"
+        "from railsim.cli import main; print('begun', flush=True); sys.exit(main())"
     )
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-c", call, *map(str, arguments)],
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
+    assert process.stdout.readline() == "begun\n"
+    return process

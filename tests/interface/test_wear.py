@@ -56,7 +56,7 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(
     assert new["area"] == 0.0 < once["area"] < twice["area"]
     assert [row["distance"] for row in record["rows"]] == [0.0, 1e5, 2e5]
     (line,) = [line for line in told.splitlines() if line.split()[:1] == ["200"]]
-    assert f"{1e6 * twice['area']:.2f}" in line
+    assert f"{1e6 * twice['area']:.4f}" in line
     assert (folder / "wear.png").stat().st_size > 10_000
     # the last profile can stand in a vehicle file; it has lost what the table says.  A profile
     # that is read has z = 0 on the worn nominal rolling circle: the flange shows by how much
@@ -68,7 +68,7 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(
     page = tmp_path / "page.html"
     assert main(["report", str(folder), "--out", str(page)]) == 0
     told = page.read_text()
-    assert f"<td>{1e6 * twice['area']:.2f}</td>" in told.replace('<td class="number">', "<td>")
+    assert f"<td>{1e6 * twice['area']:.4f}</td>" in told.replace('<td class="number">', "<td>")
     assert "Computed to 200 km." in told
     assert "data:image/png;base64," in told
     (folder / "wear.json").write_text('{"vehicle": "", "routes": []}')

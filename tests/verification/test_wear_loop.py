@@ -119,6 +119,7 @@ def test_rows_hold_area_depth_place_and_the_conicity_at_3_mm(worn):
     lost = steps[0].profile.z - steps[-1].worn.z
     assert (last["deepest"], last["deepest_y"]) == (lost.max(), steps[0].profile.y[lost.argmax()])
     assert last["deepest_y"] == pytest.approx(0.0, abs=1e-3)
+    assert (new["area"], new["deepest"], new["deepest_y"]) == (0.0, 0.0, None)  # nowhere
     rail = load_profile("60E1")
     for row, wheel in ((new, steps[0].profile), (last, steps[-1].worn)):
         geometry = contact_geometry(wheel, (rail, rail), 0.46, 1.435, 0.025, 1.36)
