@@ -175,8 +175,12 @@ with contextlib.suppress(ImportError, AttributeError):
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Leave long tests to `tests/check --all`."""
-    for item in items:
-        if item.nodeid.removeprefix("tests/") in LONG:
-            item.add_marker(pytest.mark.further)
+def pytest_collection_modifyitems(config, items):
+    """Leave long tests to `tests/check --all`; one that is named but not there is an error."""
+    names = {item.nodeid.removeprefix("tests/"): item for item in items}
+    for name in LONG & names.keys():
+        names[name].add_marker(pytest.mark.further)
+    files = {name.partition("::")[0] for name in names}
+    missing = [name for name in LONG - names.keys() if name.partition("::")[0] in files]
+    if missing and not any("::" in argument for argument in config.args):
+        raise pytest.UsageError(f"tests/selection.py names what is no test: {missing}")

@@ -82,7 +82,7 @@ LONG = frozenset(
         "interface/test_stationary.py::"
         "test_guiding_takes_the_worse_of_both_hands[vehicle1-friction1]",
         "verification/test_track_from_accelerations.py::"
-        "test_a_curve_without_simulated_runs_is_said",
+        "test_a_curve_without_simulated_runs_is_said_and_spoils_nothing_elsewhere",
         "verification/test_mechanism_search.py::"
         "test_an_optimum_keeps_its_limits_between_the_positions_too[2]",
         "verification/test_out_of_round.py::test_measured_flat_as_contact_finds_it",
@@ -186,8 +186,6 @@ LONG = frozenset(
         "verification/test_identification.py::test_what_nothing_depends_on_keeps_its_value",
         "verification/test_identification.py::test_a_bound_that_keeps_the_value_out_is_said[0.99]",
         "verification/test_identification.py::test_misfit_is_that_in_the_band",
-        "verification/test_track_from_accelerations.py::"
-        "test_a_curve_without_simulated_runs_is_said_and_spoils_nothing_elsewhere",
         "verification/test_creep_table.py::test_shipped_nodes_are_what_the_generator_makes[7-0]",
         "interface/test_plot.py::"
         "test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum",
