@@ -139,6 +139,21 @@ def test_a_surrogate_goes_through_what_is_known():
     assert Surrogate(designs, values)(designs) == pytest.approx(values, abs=1e-9)
 
 
+def test_leave_one_out_errors_are_those_of_fits_without_a_design_each():
+    designs = np.random.default_rng(3).random((24, 3))
+    values = np.column_stack([np.sin(4.0 * designs.sum(axis=1)), 1e6 + designs[:, 0] ** 2])
+    rows = np.arange(len(designs))
+    missed = [Surrogate(designs[rows != i], values[rows != i])(designs[i : i + 1])[0] for i in rows]
+    errors = np.sqrt(np.mean((np.array(missed) - values) ** 2, axis=0)) / values.std(axis=0)
+    assert Surrogate(designs, values).errors() == pytest.approx(errors, rel=1e-6)
+
+
+def test_many_designs_have_errors_at_once():
+    """A fit for each of 800 would take most of a minute."""
+    designs = np.random.default_rng(4).random((800, 2))
+    assert Surrogate(designs, designs[:, :1] ** 2).errors() < 1e-2
+
+
 def test_the_knee_does_not_depend_on_units():
     front = np.array([[0.0, 1.0], [0.1, 0.4], [0.5, 0.2], [1.0, 0.0]])
     assert knee(front) == knee(front * [1.0, 1e6]) == 1
