@@ -256,6 +256,15 @@ def beside(value: float, limit: float, digits: int = 0, kind: str = "f") -> str:
     return text
 
 
+def beside_ends(value: float, ends: Sequence[float], digits: int = 0) -> str:
+    """A value beside the nearer end of what is allowed.
+
+    >>> beside_ends(299.6, (300.0, 400.0)), beside_ends(400.0, (300.0, 400.0))
+    ('299.6', '400')
+    """
+    return beside(value, min(ends, key=lambda end: abs(end - value)), digits)
+
+
 def _fitted(
     cells: Sequence[Sequence[str]], numbers: Sequence[bool], width: int
 ) -> tuple[int, list[int]]:

@@ -26,6 +26,7 @@ from railsim.definitions.limits import (
 )
 from railsim.definitions.vehicle.tables import Service
 from railsim.result import Result
+from railsim.table import beside, beside_ends
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"
 SHARE = 90.0  # per cent of the sections, of the track's quality
@@ -157,7 +158,7 @@ def zone_conditions(
         found.append(Condition(*about, source, checked))
     if (ends := wanted.mean_radius) is not None:
         met, wide = ends[0] <= report.radius <= ends[1], f"{ends[0]:.0f} to {ends[1]:.0f} m"
-        about = "mean radius", place, _stated(met), f"{report.radius:.0f} m", wide
+        about = "mean radius", place, _stated(met), f"{beside_ends(report.radius, ends)} m", wide
         found.append(Condition(*about, source, checked))
     if wanted.radius is not None:
         right = sum(value.section.turn > 0 for value in report.values)
@@ -193,16 +194,18 @@ def _quality(
     worse = sum(row.quality == "worse than QN2" for row in rows)
     both = np.percentile([(row.alignment, row.level) for row in rows], SHARE, axis=0)
     alignment, level = both.tolist()
+    speed = min(max(row.section.speed for row in rows), service.admissible_speed)
+    ends = target.ends(speed) if target else [math.nan] * 4
+    low_a, high_a, low_l, high_l = (1e3 * end for end in ends)
     found = (
-        f"{SHARE:.0f} % of the sections below {1e3 * alignment:.2f} mm alignment and "
-        f"{1e3 * level:.2f} mm level; {100.0 * worse / len(rows):.0f} % worse than QN2"
+        f"{SHARE:.0f} % of the sections below "
+        f"{beside_ends(1e3 * alignment, (low_a, high_a), 2)} mm alignment and "
+        f"{beside_ends(1e3 * level, (low_l, high_l), 2)} mm level; "
+        f"{100.0 * worse / len(rows):.0f} % worse than QN2"
     )
     if target is None:
         return Condition("track quality", place, NOT_CHECKED, found, "no target in the limits file")
-    speed = min(max(row.section.speed for row in rows), service.admissible_speed)
-    ends = target.ends(speed)
     met = ends[0] <= alignment <= ends[1] and ends[2] <= level <= ends[3]
-    low_a, high_a, low_l, high_l = (1e3 * end for end in ends)
     required = f"{low_a:.2f} to {high_a:.2f} mm and {low_l:.2f} to {high_l:.2f} mm"
     about = "track quality", place, _stated(met), found, required
     return Condition(*about, target.source, target.checked)
@@ -224,7 +227,8 @@ def vehicle_conditions(
     frictions = [run.track().friction_at(run["distance"]) for run in runs]
     lowest, highest = min(map(np.min, frictions)), max(map(np.max, frictions))
     least = limits.friction
-    words = " to ".join(dict.fromkeys(f"{mu:.3g}" for mu in (lowest, highest)))
+    both = (beside(mu, least.value if least else math.nan, 3, "g") for mu in (lowest, highest))
+    words = " to ".join(dict.fromkeys(both))
     required = f"{least.value:g} at least" if least else ""
     met = bool(least and lowest >= least.value)
     found.append(_compared("friction", words, least, required, met=met))
@@ -259,7 +263,7 @@ def _conicity(
         return [Condition(name, "", NOT_CHECKED, "not known", why) for name in names]
     speed = service.admissible_speed
     high = up_to(classes.high, speed, classes.high_above)
-    found = f"{known.min():.2f} to {known.max():.2f}"
+    found = f"{beside(known.min(), classes.low, 2)} to {beside(known.max(), high, 2)}"
     required = (
         f"{classes.low:.2f} at most in some sections",
         f"{high:.2f} at least in some sections",

@@ -19,6 +19,10 @@ from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.section import Section
 from railsim.definitions.vehicle.tables import Service
 from railsim.notation import SIDES
+from railsim.table import beside, beside_ends
+
+ROUNDING = 1e-6
+"""Of speeds [m/s] and cant deficiencies [m]: what was asked for is met."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,8 @@ def track_sections(
         whole = math.floor((end - begin) / length + 1e-9)
         if not whole:
             shape = "straight" if math.isinf(radius) else f"curve of {abs(radius):.6g} m"
-            reason = f"{end - begin:.0f} m of a {shape}, a section needs {length:.0f} m"
+            found_length = beside(end - begin, length)
+            reason = f"{found_length} m of a {shape}, a section needs {length:.0f} m"
             found.append(TestSection(zone, begin, end, radius, deficiency, speed, reason))
         for number in range(whole):
             first = begin + number * length
@@ -145,7 +150,9 @@ def own_sections(
         own = zone_of(radius, deficiency, limits)
         name = (one.zone or own) if begin < one.end and one.begin < end else ""
         zone = limits.zones.get(name)
-        if not begin - 1e-6 <= one.begin < one.end <= end + 1e-6:
+        if zone and zone.radius and math.isinf(radius):  # neither wheel is the outer one
+            zone, why = None, [f"given as of zone {name}, but straight"]
+        elif not begin - 1e-6 <= one.begin < one.end <= end + 1e-6:
             why = [f"not within {begin:.0f} to {end:.0f} m of constant curvature and cant"]
         elif zone is None:
             why = [f"no zone has the radius {abs(radius):.6g} m"]
@@ -205,7 +212,8 @@ def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
         zone = limits.zones[name]
         if zone.radius is not None and zone.radius[0] <= abs(radius) <= zone.radius[1]:
             most = limits.zones[straight].cant_deficiency[1] if straight else -math.inf
-            return straight if zone.speed is not None and abs(deficiency) <= most else name
+            small = abs(deficiency) <= most + ROUNDING
+            return straight if zone.speed is not None and small else name
     return ""
 
 
@@ -216,16 +224,17 @@ def section_length(zone: Zone, speed: float) -> float:
 
 def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service: Service) -> str:
     """Reason why a section is outside the conditions of its zone; empty if it is not."""
-    low, high = zone.cant_deficiency
     unit = 1.0 if zone.radius is None else service.cant_deficiency
+    low, high = ends = [1e3 * share * unit for share in zone.cant_deficiency]  # mm
     reasons = []
-    if not low * unit - 1e-6 <= deficiency <= high * unit + 1e-6:
-        required = f"{1e3 * low * unit:.0f} to {1e3 * high * unit:.0f} mm"
-        reasons.append(f"cant deficiency {1e3 * deficiency:.0f} mm, required {required}")
+    if not low - 1e3 * ROUNDING <= 1e3 * deficiency <= high + 1e3 * ROUNDING:
+        words = f"{beside_ends(1e3 * deficiency, ends)} mm, required {low:.4g} to {high:.4g} mm"
+        reasons.append(f"cant deficiency {words}")
     if zone.speed is not None:
-        slow, fast = (share * service.admissible_speed for share in zone.speed)
-        if not slow - 1e-6 <= speed <= fast + 1e-6:
-            reasons.append(f"speed {speed:.1f} m/s, required {slow:.1f} to {fast:.1f} m/s")
+        slow, fast = ends = [share * service.admissible_speed for share in zone.speed]
+        if not slow - ROUNDING <= speed <= fast + ROUNDING:
+            words = f"{beside_ends(speed, ends, 1)} m/s, required {slow:.4g} to {fast:.4g} m/s"
+            reasons.append(f"speed {words}")
     return "; ".join(reasons)
 
 

@@ -291,6 +291,15 @@ def test_what_is_wrong_in_sections_of_csv_is_told_with_its_key(tmp_path):
     assert "sections.1.: unknown key; allowed: begin, end, track, zone" in str(told.value)
 
 
+def test_a_straight_given_as_of_a_curves_zone_has_no_outer_wheel_and_never_counts(tmp_path):
+    """The straight ends at 120 m: beside one value outwards it would have two."""
+    rows = "{begin = 95, end = 110, zone = '4'}", "{begin = 310, end = 380}"
+    (found,) = assess(linear(), sections=own_sections(tmp_path, *rows), all_sections=True)
+    assert [(s.section.begin, s.counts) for s in found.sections] == [(95.0, False), (310.0, True)]
+    assert found.sections[0].section.reason == "given as of zone 4, but straight"
+    assert rows_of(found, "4", "sum_Y")["wheelset 1"].estimate.N == 1
+
+
 def test_own_sections_of_other_lengths_and_places_are_told(tmp_path):
     """Zone 4 has 70 m; the curve is from 200 to 1000 m, its kinks are rounded over 10 m."""
     rows = ("{begin = 310, end = 410}", "{begin = 959, end = 1029}", "{begin = 600, end = 670, "

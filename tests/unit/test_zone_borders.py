@@ -8,6 +8,7 @@ import pytest
 from railsim.assessment.sections import section_length, track_sections, zone_of
 from railsim.assessment.statistics import one_dimensional
 from railsim.assessment.zones import _larger
+from railsim.cant import curve_speed
 from railsim.definitions.loading import load_running_limits
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.tables import Service
@@ -68,6 +69,35 @@ def test_sections_end_before_the_cant_changes():
     (short,) = track_sections(track, limits, service, (0.0, 60.0), lambda _: 20.0)
     assert (short.begin, short.end) == (10.0, 60.0)
     assert short.reason == "50 m of a curve of 500 m, a section needs 100 m"
+
+
+def of_curve(radius, cant, speed, length=1000.0):
+    """Sections of a circle at a speed."""
+    limits = load_running_limits("en14363")
+    service = Service(admissible_speed=50.0, cant_deficiency=0.15)
+    plan = [{"type": "CIR", "length": length, "radius": radius}]
+    table = [{"type": "CST", "length": length, "cant": cant}]
+    track = Track(format="railsim-track/1", name="t", plan=plan, cant=table, rounding=0.1)
+    return track_sections(track, limits, service, (0.0, length), lambda _: speed)
+
+
+@pytest.mark.parametrize("radius", [3000.0, 3500.0, 4300.0, 5700.0, 7900.0])
+def test_a_cant_deficiency_asked_for_at_the_end_of_zone_1_belongs_to_it(radius):
+    """V^2 = g R (h + 40 mm)/1.5 m: rounding puts it on either side of the end."""
+    for cant in (0.01, 0.02, 0.03, 0.06):
+        speed = curve_speed(radius, cant + 0.04)
+        assert {s.zone for s in of_curve(radius, cant, speed)} == {"1"}
+        assert {s.zone for s in of_curve(radius, cant, speed + 0.01)} == {"2"}
+
+
+def test_what_misses_a_condition_by_little_does_not_read_like_the_condition():
+    """Zone 4: 0.75 x 150 mm at least; zone 2: 50 m/s at least, sections of 250 m."""
+    slow = of_curve(300.0, 0.1, curve_speed(300.0, 0.1 + 0.11246))
+    assert slow[0].reason == "cant deficiency 112.46 mm, required 112.5 to 165 mm"
+    late = of_curve(1500.0, 0.1, 49.97)
+    assert "speed 49.97 m/s, required 50 to 55 m/s" in late[0].reason
+    (short,) = of_curve(1500.0, 0.1, 50.0, length=249.8)
+    assert short.reason == "249.7 m of a curve of 1500 m, a section needs 250 m"
 
 
 def test_of_the_two_signs_of_one_section_the_larger_is_shown_whatever_the_hand():
