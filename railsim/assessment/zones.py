@@ -25,6 +25,9 @@ WELL_SPREAD = 0.1
 """Range of the cant deficiency, as a share of the admissible one, from which the two-dimensional
 method is used."""
 
+ROUNDING = 1e-9
+"""Share of a limit by which the rounding of a regression may miss it: on the limit is met."""
+
 METHODS = {"one": "one-dimensional", "two": "two-dimensional", "largest": "largest value",
            "smallest": "smallest value"}  # fmt: skip
 
@@ -46,6 +49,11 @@ class Assessed:
     def share(self) -> float:
         """Estimate over limit [1]."""
         return self.estimate.value / self.limit
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether it is above its limit."""
+        return self.share > 1.0 + ROUNDING
 
     @property
     def rank(self) -> float:
@@ -114,7 +122,7 @@ class ZoneReport:
     @property
     def exceeded(self) -> tuple[Assessed, ...]:
         """Rows above their limits."""
-        return tuple(row for row in self.rows if row.share > 1.0)
+        return tuple(row for row in self.rows if row.exceeded)
 
     @property
     def radius(self) -> float:
@@ -213,7 +221,7 @@ class _Pooled:
         limit = law.at(self._situation(place))
         row = Assessed(criterion, place, estimate, limit, law.source, law.checked)
         corrected = None
-        if criterion.name == "Y_qst" and row.share > 1.0:
+        if criterion.name == "Y_qst" and row.exceeded:
             corrected = self._less_high_friction(place, signs[0])
         if corrected is None:
             return row

@@ -304,7 +304,7 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
             own = [found.get(rule) for found in worst.values()]
             first = next(pair for pair in own if pair)[1]
             limits = dict.fromkeys(_limit(pair[1]) for pair in own if pair)
-            if any(pair and pair[1].share > 1.0 for pair in own):
+            if any(pair and pair[1].exceeded for pair in own):
                 failed.append(len(rows))
             words = first.criterion.words, first.criterion.meaning
             rows.append([words, *map(_cell, own), _joined(limits)])

@@ -5,6 +5,7 @@ sections, the upper bound of a regression at the admissible one, but in zone 1.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -162,6 +163,25 @@ def test_rows_of_a_zone(zone, count, spread, signs, category, km_h, high, method
         else:
             best = min if row.criterion.kind == "smallest" else max
             assert row.estimate.value == best(one.estimate.value for one in rivals)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_quantity_exactly_at_its_limit_is_not_above_it(seed):
+    """0.8 in all sections: the regression gives 0.8 to the last digits, above it or below."""
+    values = made("4", 30 + seed, 0.03)
+    deficiencies = np.random.default_rng(seed).uniform(0.12, 0.165, len(values))
+    values = [
+        SectionValues(
+            replace(value.section, cant_deficiency=one), {("Y_over_Q", "wheelset 1 outer"): [0.8]}
+        )
+        for value, one in zip(values, deficiencies, strict=True)
+    ]
+    service = Service(admissible_speed=40.0, cant_deficiency=0.15, category="passenger")
+    about = Population("", VEHICLE, Q0), values, [v.section for v in values], service, LIMITS
+    (report,) = zone_reports(*about, "normal")
+    assert report.rows[0].estimate.method == "two"
+    assert report.rows[0].share == pytest.approx(1.0, abs=1e-12)
+    assert not report.exceeded
 
 
 def test_regression_over_several_influences_is_that_of_the_normal_equations():
