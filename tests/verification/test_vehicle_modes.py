@@ -1,8 +1,10 @@
-"""Modes of the benchmark coach with wheelsets held, against two independent calculations."""
+"""Modes with wheelsets held: of the benchmark coach and of all vehicles without friction."""
 
 import numpy as np
 import pytest
 from dynamics import Settings, changed, load_track, load_vehicle, undamped
+from selection import points
+from suspension import Suspension
 
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
@@ -10,6 +12,22 @@ from railsim.linear.modes import Mode, modes
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.work import level_track
+
+SPRUNG = [  # without friction elements
+    "locomotive_coco_a",
+    "coach_25t",
+    "coach_crh380a",
+    "coach_flexicoil",
+    "coach_manchester",
+    "coach_zhai_high_speed",
+    "coach_zhai_ordinary",
+    "coach_zhai_raised_speed",
+    "cooperrider_vehicle",
+    "locomotive_coco_b",
+    "metro_b_motor",
+    "metro_b_trailer",
+    "power_car_china_star",
+]
 
 
 def held_modes(vehicle, *, loaded):
@@ -101,6 +119,46 @@ def test_frequencies_and_damping_with_weight_and_dampers(coach):
     oscillations = modes.taken(np.flatnonzero(modes.frequencies > 1e-3))
     assert oscillations.natural_frequencies[:8] == pytest.approx(expected[:, 0], rel=2e-3)
     assert oscillations.damping_ratios[:8] == pytest.approx(expected[:, 1], rel=2e-3)
+
+
+def on_air(vehicle):
+    """The vehicle with air springs in the place of its secondary coils."""
+    air = {
+        "kind": "airspring",
+        "bellows_stiffness": 400e3,
+        "reservoir_stiffness": 300e3,
+        "area_stiffness": 50e3,
+        "orifice_damping": 20e3,
+        "horizontal_stiffness": [130e3, 150e3],
+        "horizontal_damping": [5e3, 4e3],
+        "torsional_stiffness": 8e3,
+    }
+
+    def change(_kind, name, table):
+        if name == "secondary_spring":
+            kept = {key: table[key] for key in ("bodies", "sides", "points")}
+            table.clear()
+            table.update(kept, **air)
+
+    return changed(vehicle, change)
+
+
+@points(
+    ("name", "change"),
+    [("coach_flexicoil", on_air), ("coach_manchester", on_air), *((name, None) for name in SPRUNG)],
+    always=(0, 2),
+)
+def test_all_modes_are_those_of_the_energies_of_the_elements(name, change):
+    """Trailing arms, three-axle bogies, air springs: every eigenvalue that oscillates, 1e-6."""
+    vehicle = load_vehicle(name)
+    vehicle = change(vehicle) if change else vehicle
+    found = held_modes(vehicle, loaded=True)[0].eigenvalues
+    expected = np.linalg.eigvals(Suspension(vehicle.model_dump(exclude_none=True)).matrix())
+    found, expected = (values[values.imag > 1e-2] for values in (found, expected))
+    assert len(found) == len(expected)
+    apart = np.abs(found[:, None] - expected) / np.abs(expected)
+    assert np.max(np.min(apart, axis=0)) < 1e-6
+    assert np.max(np.min(apart, axis=1)) < 1e-6
 
 
 def test_held_reference_would_pitch_otherwise(coach):
