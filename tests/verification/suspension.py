@@ -1,7 +1,8 @@
 """A vehicle file's suspension, written anew from `docs/theory/elements.md`: its modes at rest.
 
 Parts are placed and mirrored from the file itself; elements are their energies, differentiated by
-complex steps.  Wheelsets are held, so that of an axlebox its pitch is left.
+complex steps.  Wheelsets are held, so that of an axlebox its pitch is left; or, without axleboxes,
+they roll along the track and follow the level of the rails.
 """
 
 import numpy as np
@@ -134,18 +135,30 @@ class Element:
 class Suspension:
     """All bodies and elements of a file; `matrix` is that of its state."""
 
-    def __init__(self, file):
+    def __init__(self, file, *, rolling=False):
         parts = list(placed(file))
         bodies = {name: (kind, table) for kind, name, table, _ in parts if kind != "elements"}
         self.free, self.mass, weight, upright = [], [], [], []
-        entries = {"bodies": COMPONENTS, "axleboxes": ("pitch",), "wheelsets": ()}
+        entries = {
+            "bodies": COMPONENTS,
+            "axleboxes": ("pitch",),
+            "wheelsets": ("x", "z") if rolling else (),
+        }
         for name, (kind, t) in bodies.items():
             for c in entries[kind]:
                 self.free.append((name, c))
-                inertia = t["inertia"] if kind == "bodies" else (0.0, t["pitch_inertia"], 0.0)
-                self.mass.append((*[t.get("mass")] * 3, *inertia)[COMPONENTS.index(c)])
+                inertia = t.get("inertia", [0.0, t.get("pitch_inertia"), 0.0])
+                mass = (*[t.get("mass")] * 3, *inertia)[COMPONENTS.index(c)]
+                if kind == "wheelsets" and c == "x":  # it turns as it rolls
+                    mass += inertia[1] / t["radius"][0] ** 2
+                self.mass.append(mass)
                 weight.append(GRAVITY * t["mass"] if c == "z" else 0.0)
-                upright.append(c in ("z", "roll", "pitch"))
+                upright.append(c in ("z", "roll", "pitch") and kind != "wheelsets")
+        self.at = {name: table["at"][0] for name, (_, table) in bodies.items()}
+        self.wheelsets = sorted(
+            (name for name, (kind, _) in bodies.items() if kind == "wheelsets"),
+            key=lambda name: -self.at[name][0],
+        )
         self.elements = []
         for kind, name, table, scopes in parts:
             if kind == "elements" and table["kind"] != "bump_stop":  # within their clearances
@@ -202,3 +215,26 @@ class Suspension:
             A[n : 2 * n, k] = -force / mass[:, 0]
             A[k, :n], A[k, n : 2 * n], A[k, k] = of_position, of_rate, decay
         return A
+
+    def over_level(self, wave_number, speed):
+        """Coordinates and changes of Q over the level's wave, exp(i k x), under the origin.
+
+        All wheelsets carry the same load, whose part along the inclined rails moves them.
+        """
+        n, omega = len(self.free), wave_number * speed
+        A, mass = self.matrix(), np.array(self.mass)
+        inner = np.linalg.solve(
+            1j * omega * np.eye(len(A) - 2 * n) - A[2 * n :, 2 * n :],
+            A[2 * n :, :n] + 1j * omega * A[2 * n :, n : 2 * n],
+        )
+        rates = A[n : 2 * n, :n] + 1j * omega * A[n : 2 * n, n : 2 * n]
+        D = -mass[:, None] * (rates + A[n : 2 * n, 2 * n :] @ inner) - np.diag(omega**2 * mass)
+        z = np.array([self.free.index((name, "z")) for name in self.wheelsets])
+        x = np.array([self.free.index((name, "x")) for name in self.wheelsets])
+        load = GRAVITY * sum(m for m, (_, c) in zip(mass, self.free, strict=True) if c == "z")
+        q, force = np.zeros(n, complex), np.zeros(n, complex)
+        q[z] = np.exp(1j * wave_number * np.array([self.at[w][0] for w in self.wheelsets]))
+        force[x] = load / len(x) * 1j * wave_number * q[z]
+        rest = np.setdiff1d(np.arange(n), z)
+        q[rest] = np.linalg.solve(D[np.ix_(rest, rest)], force[rest] - D[np.ix_(rest, z)] @ q[z])
+        return dict(zip(self.free, q, strict=True)), -0.5 * (D @ q)[z]

@@ -1,13 +1,16 @@
-"""Linear analysis against runs, and against itself in the mirror, on circles and at small sizes."""
+"""Linear analysis against runs, against springs and dampers, in the mirror and on circles."""
 
 import numpy as np
 import pytest
 from dynamics import Settings, load_any_track, load_vehicle
+from selection import points
+from suspension import Suspension
 
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.track_response import QUANTITIES, track_response
 from railsim.linear.vehicle import LinearVehicle, smooth_law
+from railsim.result.sensors import all_sensors
 from railsim.simulation import simulate
 
 SPEED, WAVE = 25.0, 8.0
@@ -37,6 +40,31 @@ def test_response_to_waves_is_that_of_a_run_on_them(channel):
         expected = [x for o, x in zip(found.outputs, response, strict=True) if o.startswith(name)]
         # the waves are the imaginary part of exp(i phase)
         np.testing.assert_allclose(sine + 1j * cosine, expected, atol=0.03 * np.abs(expected).max())
+
+
+@points("speed", [15.0, 50.0], always=(1,))
+def test_response_to_the_level_is_that_of_springs_and_dampers(speed):
+    """Wheel loads and floor of the benchmark coach, 0.3 to 4 Hz, 0.3 %.
+
+    Against its file written anew, with wheelsets that follow rigid rails.
+    """
+    coach = load_vehicle("benchmark_vehicle1")
+    own = Suspension(coach.model_dump(exclude_none=True), rolling=True)
+    rails = load_any_track("straight").replace(support={"preset": "rigid"})
+    places = {name: s for name, s in all_sensors(coach).items() if name.startswith("floor")}
+    found = track_response(LinearVehicle(coach, rails), places, speed)
+    waves = 2.0 * np.pi * np.array([0.3, 0.7, 1.0, 1.3, 2.0, 4.0]) / speed
+    for k, of_level in zip(waves, found.over(waves)[:, :, QUANTITIES.index("level")], strict=True):
+        moved, loads = own.over_level(k, speed)
+        expected = {
+            f"Q.{n}.{side}": Q for n, Q in enumerate(loads, 1) for side in ("left", "right")
+        }
+        for name, sensor in places.items():
+            lift = moved["carbody", "z"] - sensor.arm[0] * moved["carbody", "pitch"]
+            expected[f"{name}.z"] = -((k * speed) ** 2) * lift
+        values = dict(zip(found.outputs, of_level, strict=True))
+        for name, value in expected.items():
+            assert abs(values[name] - value) < 3e-3 * abs(value)
 
 
 def eigenvalues(**how):
