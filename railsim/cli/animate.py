@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import Fault, Faults, input_error
+from railsim.errors import input_error
 from railsim.files.access import TABLE_BYTES, read_text
 
 if TYPE_CHECKING:
@@ -52,11 +52,8 @@ def _scene(
     if file.suffix.lower() != ".json":
         from railsim.result import open_run
 
-        Faults(
-            Fault(option, "", "belongs to a mode", "give the JSON of railsim modes")
-            for option, value in (("--vehicle", vehicle), ("--mode", mode))
-            if value
-        ).check()
+        allowed = "give the JSON of railsim modes"
+        cli.refused("belongs to a mode", allowed, "vehicle", "mode").check()
         frames = frames or (FILM_FRAMES if film else FRAMES)
         return result_scene(open_run(file), frames=frames, between=between)
     from railsim.definitions.loading import load_vehicle

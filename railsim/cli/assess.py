@@ -56,7 +56,7 @@ def command(
     from railsim.assessment.record import RUNNING
     from railsim.assessment.running import OF_LIMITS, by_vehicle
     from railsim.assessment.tables import assessment_lines
-    from railsim.cli.gathered import opened
+    from railsim.studies.gathered import opened
 
     results = opened(_paths(files))
     output.reserve(*FILES)

@@ -64,15 +64,25 @@ def flag(name: str, words: str, **more: Any) -> Callable[[F], F]:
     return click.option(*name.split(), is_flag=True, help=words, **more)
 
 
-def goes_with(partner: str, met: object, *names: str) -> None:
-    """Refuse parameters that the command line gives without their partner: they do nothing."""
+def _given(names: Sequence[str]) -> list[str]:
+    """Return those of some parameters that the command line gives, as it calls them."""
     context = click.get_current_context()
-    given = [
-        one.opts[0]
+    return [
+        one.opts[0] if isinstance(one, click.Option) else str(one.metavar).strip("[]")
         for one in context.command.params
         if one.name in names
         and context.get_parameter_source(one.name) is ParameterSource.COMMANDLINE
     ]
+
+
+def refused(found: str, allowed: str, *names: str) -> Faults:
+    """Return a fault for each of some parameters that the command line gives."""
+    return Faults(Fault(option, "", found, allowed) for option in _given(names))
+
+
+def goes_with(partner: str, met: object, *names: str) -> None:
+    """Refuse parameters that the command line gives without their partner: they do nothing."""
+    given = _given(names)
     if given and not met:
         verb = "goes" if len(given) == 1 else "go"
         raise click.UsageError(f"{' and '.join(given)} {verb} with {partner}")

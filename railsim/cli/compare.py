@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
-from railsim.cli.gathered import gather, opened
 from railsim.errors import InputError, input_error
 
 if TYPE_CHECKING:
@@ -111,6 +110,8 @@ def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
 
     Raises InputError: what cannot be compared, with the reason.
     """
+    from railsim.studies.gathered import opened
+
     folders = [file for file in files if os.path.isdir(file)]
     if not folders:
         results = opened([Path(file) for file in files])
@@ -130,6 +131,8 @@ def _groups(files: tuple[str, ...], output: cli.Output) -> dict[str, Group]:
 
 def _of_one(folder: str) -> dict[str, Group]:
     """Return the runs of a folder that differ in nothing but the vehicle."""
+    from railsim.studies.gathered import gather
+
     found = gather([folder])
     alike: dict[str, dict[str, Path]] = {}
     for record in found.records:
@@ -147,6 +150,8 @@ def _of_one(folder: str) -> dict[str, Group]:
 
 def _of_several(folders: list[str], output: cli.Output) -> dict[str, Group]:
     """Return the runs of the same name in several folders."""
+    from railsim.studies.gathered import gather
+
     runs = {folder: gather([folder]).paths for folder in folders}
     common = [name for name in runs[folders[0]] if all(name in paths for paths in runs.values())]
     if not common:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli import common as cli
-from railsim.cli.gathered import STUDY_FILES, described_runs
-from railsim.files.access import PICTURES, RESULTS, check_file
+from railsim.files.access import PICTURES, RESULTS, STUDY_FILES, check_file
 from railsim.plottable import Plottable
 
 if TYPE_CHECKING:
@@ -54,6 +53,8 @@ def command(
     )
     remarks: list[Remark] = []
     if runs:
+        from railsim.studies.gathered import described_runs
+
         found = described_runs(file)
     elif result:
         from railsim.description import describe

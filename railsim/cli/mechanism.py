@@ -14,8 +14,6 @@ from railsim.files.access import relative
 if TYPE_CHECKING:
     from railsim.definitions.mechanism.definition import Mechanism
     from railsim.mechanisms.analysis import Analysis
-    from railsim.mechanisms.optimum import Optimum
-    from railsim.table import Table
 
 REPORT, OPTIMISED = "report.html", "optimised.toml"
 
@@ -60,6 +58,8 @@ def command(
     from railsim.mechanisms.analysis import analyse
     from railsim.mechanisms.optimisation import optimise
     from railsim.mechanisms.remarks import remarks
+    from railsim.mechanisms.summary import data_of
+    from railsim.mechanisms.tables import parts_of
     from railsim.processes import available_cores
 
     mechanisms = [load_mechanism(file, assignments) for file in files]
@@ -95,8 +95,8 @@ def command(
             content[OPTIMISED] = optimised_text(base, optimum, assignments, case).encode()
         output.write_all(content)
     output.answer(
-        _data(results, cases, at_values, optimum),
-        [] if output.as_json else _parts(results, at_values, optimum),
+        data_of(results, cases, at_values, optimum),
+        [] if output.as_json else parts_of(results, at_values, optimum),
         dict.fromkeys(r for result in results for r in remarks(result)),
     )
 
@@ -131,64 +131,3 @@ def _values_at(result: "Analysis", wanted: Sequence[Wanted]) -> list[dict[str, A
         for words, name, value in wanted
         for one in result.everywhere(name, value)
     ]
-
-
-def _data(
-    results: Sequence["Analysis"],
-    cases: dict[str, "Analysis"],
-    found: Sequence[list[dict[str, Any]]],
-    optimum: "Optimum | None",
-) -> dict[str, Any]:
-    from railsim.mechanisms.comparison import compare
-    from railsim.mechanisms.summary import analysis_data, optimum_data
-
-    data = [optimum_data(optimum)] if optimum else [analysis_data(result) for result in results]
-    for one, values in zip(data, found, strict=True):
-        if values:
-            one["at"] = values
-    if len(data) > 1:
-        return {"mechanisms": data, "comparison": compare(results)}
-    data[0]["cases"] = {
-        name: analysis_data(result, courses=False)
-        for name, result in cases.items()
-        if name != "base"
-    }
-    return data[0]
-
-
-def _parts(
-    results: Sequence["Analysis"], at: Sequence[list[dict[str, Any]]], optimum: "Optimum | None"
-) -> "list[str | Table]":
-    from railsim.mechanisms import tables
-
-    parts: list[str | Table] = []
-    if optimum is not None:
-        parts += [*tables.optimum_sentences(optimum), ""]
-        for table in tables.optimum_tables(optimum):
-            parts += [table, ""]
-    for number, (result, values) in enumerate(zip(results, at, strict=True)):
-        parts += [*[""] * (number > 0), *_result_parts(result, values)]
-    return [*parts, "", tables.comparison_table(results)] if len(results) > 1 else parts
-
-
-def _result_parts(result: "Analysis", at: Sequence[dict[str, Any]]) -> "list[str | Table]":
-    from railsim.design_checks import check_table
-    from railsim.mechanisms import tables
-    from railsim.mechanisms.checks import checks
-    from railsim.mechanisms.selection import selection
-    from railsim.mechanisms.tolerance import scatter
-
-    definition = result.definition
-    case = f", case {result.case}" if result.case else ""
-    parts: list[Any] = [f"{definition.name}{case}", "", tables.position_table(result), ""]
-    if at:
-        parts += [tables.value_table(result, [(values["where"], values) for values in at]), ""]
-    parts += tables.sentences(result)
-    found = (
-        tables.reaction_table(result),
-        tables.published_table(result),
-        check_table(checks(result)),
-        tables.selection_table(selection(result)),
-        tables.scatter_table(scatter(definition) if definition.tolerances else []),
-    )
-    return parts + [part for table in found if len(table) for part in ("", table)]

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
-from railsim.cli.gathered import folder_of, gather
 from railsim.errors import Fault, Faults, input_error, nearest
-from railsim.files.access import PICTURES, RESULTS
+from railsim.files.access import PICTURES, RESULTS, folder_of
 from railsim.text import unformatted
 
 if TYPE_CHECKING:
@@ -19,10 +18,8 @@ if TYPE_CHECKING:
 
     from railsim.plot.study import Column
 
-# default quantities of the picture of a study
 Text = str | None
 RECORDING = "recording"  # instead of a quantity, of a track
-DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 
 
 @click.command()
@@ -79,12 +76,11 @@ def command(
         default = Path(folder.name)
     recording = selections == (RECORDING,) and not (result or of_study)
     path = output.file(default, PICTURES, suffix=f"_{RECORDING}.png" if recording else ".png")
-    options = {"--against": against, "--family": family, "--kind": kind}
-    if of_study:
-        figure = _study_figure(str(folder), selections, *options.values())
-    elif wrong := [option for option, value in options.items() if value]:
+    if not of_study:
         found = f"'{file}' is no study's folder"
-        raise input_error(wrong[0], found, "a folder of results")
+        cli.refused(found, "a folder of results", "against", "family", "kind").check()
+    if of_study:
+        figure = _study_figure(str(folder), selections, against, family, kind)
     elif result:
         from railsim.plot.histories import histories
         from railsim.result import open_run
@@ -101,7 +97,8 @@ def _study_figure(
     from railsim.cli.report import used_inputs
     from railsim.plot.study import curves_figure, map_figure, ranking_figure, say_above
     from railsim.report.inputs import inputs_of, units_of
-    from railsim.report.spread import columns, parameters
+    from railsim.report.spread import RANKED, columns, parameters
+    from railsim.studies.gathered import gather
 
     ended = ("complete", "derailed", "stopped")
     gathered = gather([file])
@@ -112,7 +109,7 @@ def _study_figure(
     of_summary = {re.sub("_abs$", "_peak", name): name for name in known}  # its names there
     of_summary |= {re.sub(r"_mid(?:1$|(\d+)$)", r"_median\1", name): name for name in known}
     given = [of_summary.get(name, name) for name in selections]
-    names = given or [name for name in DEFAULT if name in known] or list(known)[:4]
+    names = given or [name for name in RANKED if name in known] or list(known)[:4]
     faults = Faults(
         Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
         for name in names

@@ -9,7 +9,7 @@ import click
 
 from railsim.cli import common as cli
 from railsim.errors import RailsimError, listed
-from railsim.files.access import write_text
+from railsim.files.access import folder_of, write_text
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment
@@ -54,10 +54,10 @@ def write_report(
 
     `assessments` are those of a scenario.
     """
-    from railsim.cli.gathered import folder_of, gather
     from railsim.report.measured import as_section, is_measured, measured_page, read_part
     from railsim.report.runs import page
     from railsim.report.spread import worst_runs
+    from railsim.studies.gathered import gather
 
     parts = [read_part(file) for file in files if is_measured(file)]
     files = [file for file in files if not is_measured(file)]

@@ -12,8 +12,6 @@ from railsim.files.access import PICTURES, RESULTS, check_file
 from railsim.threads import keep_freed_memory
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from railsim.result import Result
     from railsim.studies.case import Case
     from railsim.studies.spec import RunSpec
@@ -60,7 +58,7 @@ def command(
     from railsim.studies.run import run_case
 
     keep_freed_memory()
-    resume = _opened(before, {"--speed": speed, "--start": extent["start"]}) if before else None
+    resume = _opened(before) if before else None
     if resume:
         *_, start, speed = map(float, resume.groups["state"]["end"])
         extent["start"] = start
@@ -98,15 +96,11 @@ def command(
     return cli.DONE if result.status == "complete" else cli.ENDED_EARLY
 
 
-def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
+def _opened(before: str) -> "Result":
     """Open a result to go on from, which gives speed and position itself."""
     from railsim.result import open_run
 
-    faults = Faults(
-        Fault(option, "", "given together with --continue", "one of the two")
-        for option, value in given.items()
-        if value is not None
-    )
+    faults = cli.refused("given together with --continue", "one of the two", "speed", "start")
     with faults.caught():
         result = open_run(before)
         if "end" not in result.groups.get("state", {}):

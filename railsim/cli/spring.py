@@ -3,22 +3,18 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import wraps
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from railsim.cli import common as cli
 from railsim.cli.terminal import echo
-from railsim.errors import RailsimError, input_error, nearest
-from railsim.files.access import TABLES, is_file, relative, write_text
-from railsim.files.key_paths import key_path
-from railsim.files.sources import find_file, read_source
+from railsim.errors import input_error, nearest
+from railsim.files.access import TABLES, write_text
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
     from railsim.springs.search import SearchResult
-    from railsim.springs.verification import Case
 
 REPORT = "report.html"
 Answer = tuple[Any, list[Any], "SearchResult | None"]  # data, what is printed, what was searched
@@ -190,7 +186,7 @@ def vehicle(
       railsim run my_coach.toml curve_r250 --speed 20 --overwrite
     """
     from railsim.definitions.loading import load_spring
-    from railsim.springs.vehicle_table import vehicle_part, vehicle_text
+    from railsim.springs.vehicle_table import base_of, load_remarks, vehicle_part, vehicle_text
 
     suspension = load_spring(file, assignments)
     out = output.file(output.out, TABLES) if output.out else None
@@ -199,66 +195,14 @@ def vehicle(
             valid = nearest(load, suspension.loads)
             raise input_error("--load", f"no load '{load}' in [loads]", valid)
         part = vehicle_part(suspension, load)
-        base, removed, beside = _base(suspension, extends, out)
+        base, removed, beside = base_of(suspension, extends, out.parent if out else "")
         text = vehicle_text(suspension, part, base, removed)
         if out:
             write_text(out, text)
             output.written.append(out)
-    for remark in (*part.remarks, *beside, *_load_remarks(suspension, part.case, extends)):
+    for remark in (*part.remarks, *beside, *load_remarks(suspension, part.case, extends)):
         if not output.quiet:
             echo(remark, err=True)
     record = {"file": output.out, "assembly": part.assembly, "axleboxes": part.axleboxes}
     record |= {"elements": part.elements, "load": part.case.name}
     output.answer(record, [] if out else [text.rstrip("\n")])
-
-
-def _load_remarks(
-    suspension: "TrailingArmSuspension", case: "Case", extends: str | None
-) -> list[str]:
-    """Remark on springs that are taken at a load unlike that which the vehicle puts on them."""
-    from railsim.definitions.loading import load_vehicle
-    from railsim.definitions.vehicle.flatten import flatten
-    from railsim.springs.vehicle_table import LIKELY, axlebox_load
-
-    name = extends or (suspension.vehicle.extends if suspension.vehicle else None)
-    if name is None:
-        return []
-    try:
-        load = axlebox_load(flatten(load_vehicle(name)))
-    except RailsimError as error:
-        return [f"the load of the axleboxes is not known: {error}"]
-    low, high = LIKELY
-    if low <= load / case.load <= high:
-        return []
-    return [
-        f"'{name}' puts {load / 1e3:.1f} kN on an axlebox at rest, the springs are taken at "
-        f"{case.load / 1e3:.1f} kN ({case.name}): do springs and vehicle belong together?"
-    ]
-
-
-def _base(
-    suspension: "TrailingArmSuspension", extends: str | None, out: Path | None
-) -> tuple[str | None, list[str] | None, list[str]]:
-    """The vehicle to extend as the written file must name it, what to remove there, remarks."""
-    table = suspension.vehicle
-    if extends is None or table is None:
-        return None, None, []
-    base = find_file(extends, "vehicle")
-    data = read_source(base, "vehicle").data
-    removed = [key for key in table.remove if _holds(data, key_path(key))]
-    beside = []
-    if not removed and not _holds(data, key_path(f"{table.assembly}.elements.coil_nest")):
-        keys = ", ".join(table.remove) or "nothing to remove"
-        beside.append(
-            f"'{extends}' has nothing of vehicle.remove ({keys}): its own primary suspension stays "
-            "beside this one unless vehicle.remove names its parts."
-        )
-    if is_file(extends):
-        extends = relative(base, out.parent if out else "")
-    return extends, removed, beside
-
-
-def _holds(data: Any, path: Sequence[str]) -> bool:
-    for part in path:
-        data = data.get(part) if isinstance(data, dict) else None
-    return data is not None

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 MANY = ("--vehicles", "--tracks", "--speeds", "--grid")
 OF_FILE = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
+STORED = ("keep", "compress", "single")
+OF_SCENARIO = ("file", *OF_FILE[1:], "quantities", "plots", *STORED)
 
 
 class ManyValues(click.Command):
@@ -109,15 +111,12 @@ def command(
       railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """
-    kept = {name: how.pop(name) for name in ("keep", "compress", "single")}
+    kept = {name: how.pop(name) for name in STORED}
     asked = {name: how.pop(name) for name in OF_FILE if name != "settings"}
-    taken = {**asked, **kept, "keep": kept["keep"] != "all", "settings": given.settings}
-    taken |= {"STUDY": file, "quantities": quantities, "plots": how["plots"], "vehicles": None}
     if how.pop("together"):
         output.remark("--together has no effect since 2026-11-28: it was no faster")
-    named = [name for name, value in taken.items() if value]
     where = {name: how[name] for name in ("workers", "scheduler")}
-    campaign: Callable[..., int] = partial(_campaign, taken=named, report=report, **where)
+    campaign: Callable[..., int] = partial(_campaign, report=report, **where)
     if scenario is not None:
         overrides = given.overrides
         return campaign(scenario, asked["vehicles"], output, assignments=overrides, resume=resume)
@@ -187,27 +186,19 @@ def _grid(texts: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _campaign(
-    scenario: str,
-    vehicles: Sequence[str],
-    output: cli.Output,
-    *,
-    taken: Sequence[str],
-    report: bool,
-    **how: Any,
+    scenario: str, vehicles: Sequence[str], output: cli.Output, *, report: bool, **how: Any
 ) -> int:
     """Run a scenario for vehicles, print and write its assessment; return the exit status.
 
-    `taken`: options and arguments that are given although the scenario, which knows its tracks and
-    speeds, holds them; `report`: write the page too; `how`: assignments, workers, scheduler, resume
-    of `railsim.studies.campaign`.
+    `report`: write the page too; `how`: assignments, workers, scheduler, resume of
+    `railsim.studies.campaign`.
     """
     from railsim.assessment.tables import assessment_lines
     from railsim.cli.assess import FILES, write_assessments
     from railsim.studies.campaign import campaign
 
-    options = [name if name.isupper() else f"--{name}" for name in taken]
     found, allowed = "given together with --scenario", "the scenario's file holds it"
-    faults = Faults(Fault(name, "", found, allowed) for name in options)
+    faults = cli.refused(found, allowed, *OF_SCENARIO)
     if not vehicles:
         faults.append(Fault("--vehicles", "", "not given", "give one vehicle at least"))
     faults.check()
@@ -244,15 +235,13 @@ def _spec(
     from railsim.studies.spec import StudySpec, checked
     from railsim.studies.user_function import full_name
 
-    given = {name: inputs[name] for name in OF_FILE if inputs[name]}
     if file is None:
-        missing = [name for name in OF_FILE[:3] if name not in given]
+        missing = [name for name in OF_FILE[:3] if not inputs[name]]
         words = "not given", "give one value at least"
         Faults(Fault(f"--{name}", "", *words) for name in missing).check()
         named = {"quantities": full_name(quantities)}
         return checked(StudySpec, {**kept, **inputs, **named}, "study")
-    words = "given together with a study file", "the file holds it"
-    Faults(Fault(f"--{name}", "", *words) for name in given).check()
+    cli.refused("given together with a study file", "the file holds it", *OF_FILE).check()
     study = load_study(file)
     if study.optimise is not None:
         output.remark("the table 'optimise' is not used here; `railsim optimise` varies its keys")

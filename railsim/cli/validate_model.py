@@ -78,7 +78,7 @@ def _results(
     if all(path.is_file() for path in paths):
         return [open_run(path) for path in paths]
     from railsim.assessment.model_validation import matching
-    from railsim.cli.gathered import gather
+    from railsim.studies.gathered import gather
 
     gathered = gather(files)
     return matching(runs, gathered.results(list(gathered.paths)))

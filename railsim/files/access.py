@@ -27,6 +27,7 @@ from railsim.text import LONGEST_FILE, shortened
 RESULTS = (".h5", ".hdf5")
 PICTURES = (".png", ".svg", ".pdf", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 TABLES = (".toml",)
+STUDY_FILES = ("study.json", "summary.csv")  # in the folder of a study
 DEFINITION_BYTES = 4_000_000  # largest vehicle, track, settings or study file
 TABLE_BYTES = 20_000_000  # largest file of points: profiles, recordings
 _SYSTEM = (Path("/proc"), Path("/sys"), Path("/dev"))
@@ -161,6 +162,12 @@ def is_file(path: str | Path) -> bool:
         return Path(path).is_file()
     except (OSError, ValueError):
         return False
+
+
+def folder_of(file: str) -> Path:
+    """Return the folder of a study, given as such or by a file with its table; or the file."""
+    path = Path(file)
+    return path.parent if path.name in STUDY_FILES and path.is_file() else path
 
 
 def relative(path: str | Path, folder: str | Path) -> str:

@@ -3,7 +3,7 @@
 The keys are part of the interface and documented in docs/user/mechanisms.md.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
+from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.contact import Contact
 from railsim.mechanisms.dynamics import TimedMotion
 from railsim.mechanisms.links import Course, actuators, links
@@ -160,6 +161,27 @@ def optimum_data(optimum: "Optimum") -> Data:
         "breaches": dict(optimum.breaches), "active": [asdict(active) for active in optimum.active],
         "starts": starts, "seed": optimum.seed,
     }  # fmt: skip
+
+
+def data_of(
+    results: Sequence[Analysis],
+    cases: Mapping[str, Analysis],
+    at: Sequence[list[Data]],
+    optimum: "Optimum | None" = None,
+) -> Data:
+    """Some mechanisms with their comparison, or one with its cases, or its optimum.
+
+    `at`: For each mechanism its results where one of them has a value.
+    """
+    data = [optimum_data(optimum)] if optimum else [analysis_data(result) for result in results]
+    for one, values in zip(data, at, strict=True):
+        if values:
+            one["at"] = values
+    if len(data) > 1:
+        return {"mechanisms": data, "comparison": compare(results)}
+    others = {name: case for name, case in cases.items() if name != "base"}
+    data[0]["cases"] = {name: analysis_data(r, courses=False) for name, r in others.items()}
+    return data[0]
 
 
 def _list(array: Any) -> list[float]:

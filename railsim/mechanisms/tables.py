@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from railsim.definitions.mechanism.faults import bounds_of, bounds_remarks
-from railsim.design_checks import NEAR_BOUND, shown, shown_unit
+from railsim.design_checks import NEAR_BOUND, check_table, shown, shown_unit
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.contact import Contact, moved
 from railsim.mechanisms.dynamics import NEAR, driving
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import force_unit, force_units, quantity
-from railsim.mechanisms.selection import Choice
+from railsim.mechanisms.selection import Choice, selection
 from railsim.mechanisms.summary import parameter_data, published_data
-from railsim.mechanisms.tolerance import Scatter
+from railsim.mechanisms.tolerance import Scatter, scatter
 from railsim.table import Amount, Column, Table
 
 if TYPE_CHECKING:
@@ -259,6 +260,41 @@ def optimum_tables(optimum: "Optimum") -> list[Table]:
     active = Table(limits, [list(vars(a).values()) for a in optimum.active])
     found = [Table(["parameter", *before_after], changed), active, Table(columns, starts)]
     return [table for table in found if len(table)]
+
+
+def parts_of(
+    results: Sequence[Analysis],
+    at: Sequence[Sequence[Mapping[str, Any]]],
+    optimum: "Optimum | None" = None,
+) -> list[str | Table]:
+    """Return sentences and tables on some mechanisms, or on the optimum of one.
+
+    `at`: For each mechanism its results where one of them has a value, ``where`` in words.
+    """
+    parts: list[str | Table] = []
+    if optimum is not None:
+        parts += [*optimum_sentences(optimum), ""]
+        parts += [part for table in optimum_tables(optimum) for part in (table, "")]
+    for number, (result, values) in enumerate(zip(results, at, strict=True)):
+        parts += [*[""] * (number > 0), *_result_parts(result, values)]
+    return [*parts, "", comparison_table(results)] if len(results) > 1 else parts
+
+
+def _result_parts(result: Analysis, at: Sequence[Mapping[str, Any]]) -> list[str | Table]:
+    definition = result.definition
+    case = f", case {result.case}" if result.case else ""
+    parts: list[str | Table] = [f"{definition.name}{case}", "", position_table(result), ""]
+    if at:
+        parts += [value_table(result, [(values["where"], values) for values in at]), ""]
+    parts += sentences(result)
+    found = (
+        reaction_table(result),
+        published_table(result),
+        check_table(checks(result)),
+        selection_table(selection(result)),
+        scatter_table(scatter(definition) if definition.tolerances else []),
+    )
+    return parts + [part for table in found if len(table) for part in ("", table)]
 
 
 def scatter_table(found: Sequence[Scatter]) -> Table:

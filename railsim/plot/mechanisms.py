@@ -35,7 +35,7 @@ DASHES: tuple[Any, ...] = (
     "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (11, 3)),
     (0, (1, 3)), (0, (9, 2, 3, 2)),
 )  # fmt: skip
-MAIN, SECOND, FAINT = style.DISTINCT[0], style.DISTINCT[1], "0.75"
+MAIN, SECOND = style.DISTINCT[:2]
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
 WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8}
 WIDTHS |= {"actuator": 3.2, "spring": 1.0, "damper": 1.6}

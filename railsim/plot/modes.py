@@ -21,7 +21,6 @@ PHASES = {
     DISTINCT[1]: "in opposite phase", DISTINCT[5]: "a quarter behind",
     "0.6": "spin, which has no displacement",
 }  # fmt: skip
-DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
 
 
 @styled()

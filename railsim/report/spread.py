@@ -17,7 +17,7 @@ WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 LEAST = 3  # runs, for a spread
 SHORTEST = 4  # letters of a parameter's short name: `stiffness.x` and not `x`
 WORST = 5  # runs of each quantity
-RANKED = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")  # for the worst runs
+RANKED = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")  # worst runs, pictures
 
 
 def parameters(

@@ -19,9 +19,13 @@ import numpy as np
 import tomli_w
 
 from railsim.constants import GRAVITY
+from railsim.definitions.loading import load_vehicle
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
-from railsim.definitions.vehicle.flatten import FlatVehicle
-from railsim.errors import input_error
+from railsim.definitions.vehicle.flatten import FlatVehicle, flatten
+from railsim.errors import RailsimError, input_error
+from railsim.files.access import is_file, relative
+from railsim.files.key_paths import key_path
+from railsim.files.sources import find_file, read_source
 from railsim.springs.verification import Case, load_cases
 
 LIKELY = (0.75, 1.25)
@@ -110,6 +114,54 @@ def vehicle_text(
     notes = "".join(f"# {remark}\n" for remark in part.remarks)
     text: str = tomli_w.dumps(head) + "\n" + tomli_w.dumps(tables)
     return heading + notes + _INNERMOST_ARRAY.sub(_on_one_line, text)
+
+
+def base_of(
+    suspension: TrailingArmSuspension, extends: str | None, folder: str | Path
+) -> tuple[str | None, list[str] | None, list[str]]:
+    """Return another vehicle to extend and what to remove there, for `vehicle_text`, and remarks.
+
+    `extends`: file or name of a shipped one, None for that of the table `[vehicle]`; `folder`: of
+    the file that is written, from which its path counts.
+    """
+    table = suspension.vehicle
+    if extends is None or table is None:
+        return None, None, []
+    data = read_source(find_file(extends, "vehicle"), "vehicle").data
+    removed = [key for key in table.remove if _holds(data, key)]
+    beside = []
+    if not removed and not _holds(data, f"{table.assembly}.elements.coil_nest"):
+        keys = ", ".join(table.remove) or "nothing to remove"
+        beside.append(
+            f"'{extends}' has nothing of vehicle.remove ({keys}): its own primary suspension stays "
+            "beside this one unless vehicle.remove names its parts."
+        )
+    return relative(extends, folder) if is_file(extends) else extends, removed, beside
+
+
+def _holds(data: Any, key: str) -> bool:
+    for part in key_path(key):
+        data = data.get(part) if isinstance(data, dict) else None
+    return data is not None
+
+
+def load_remarks(
+    suspension: TrailingArmSuspension, case: Case, extends: str | None = None
+) -> list[str]:
+    """Remark on springs that are taken at a load unlike that which the vehicle puts on them."""
+    name = extends or (suspension.vehicle and suspension.vehicle.extends)
+    if not name:
+        return []
+    try:
+        load = axlebox_load(flatten(load_vehicle(name)))
+    except RailsimError as error:
+        return [f"the load of the axleboxes is not known: {error}"]
+    if LIKELY[0] <= load / case.load <= LIKELY[1]:
+        return []
+    return [
+        f"'{name}' puts {load / 1e3:.1f} kN on an axlebox at rest, the springs are taken at "
+        f"{case.load / 1e3:.1f} kN ({case.name}): do springs and vehicle belong together?"
+    ]
 
 
 def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) -> dict[str, Any]:

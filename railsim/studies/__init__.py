@@ -14,6 +14,7 @@
 `study.py`           `study`: from inputs, files or definitions, to a plan, which is carried out
 `carry_out.py`       `carry_out`: which runs are done; computes the missing ones, with the journal
 `outcome.py`         `Outcome`: summary and results of a folder
+`gathered.py`        runs from result files and from folders of studies
 `analyses.py`        analyses at a point besides a run: curving, critical speed, modes
 `optimise.py`        `optimise`: objectives, constraints, the design that is chosen
 `designs.py`         designs evaluated by a study

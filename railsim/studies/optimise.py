@@ -6,6 +6,7 @@ the journal.  Begin reading in `optimise`; `search.py` proposes designs.
 """
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -47,6 +48,7 @@ from railsim.table import Column, Table
 from railsim.text import plain
 
 INPUT_BYTES = 1_000_000
+MOST_ROWS = 15  # of the front, in words
 BESIDE = ("optimise.json", "designs.csv", "front.png")
 
 
@@ -98,6 +100,29 @@ class Optimisation:
             known = [design.number, *design.variables.values(), *of_design, int(design.feasible)]
             rows.append([*known, int(design.number in on_front), design.reason])
         return Table([*columns, "feasible", "front", "reason"], rows)
+
+    def parts(self) -> list[str | Table]:
+        """Return sentences and tables: the front, the chosen design, what depends on what."""
+        if self.chosen is None:
+            reasons = {design.reason for design in self.designs if design.reason}
+            why = f": {sorted(reasons)[0]}" if reasons else ""
+            return [f"none of {len(self.designs)} designs keeps all constraints{why}"]
+        shown = [*self.front[:: max(1, math.ceil(len(self.front) / MOST_ROWS))]]
+        if self.chosen not in shown:
+            shown.append(self.chosen)
+        designs, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
+        rows = [
+            ["chosen" if design is self.chosen else "", *designs.rows[design.number - 1][:-ends]]
+            for design in shown
+        ]
+        table = Table(["", *designs.columns[:-ends]], rows)
+        parts: list[str | Table] = [
+            f"front of {len(self.front)} in {len(self.designs)} designs", "", table, ""
+        ]  # fmt: skip
+        parts += [f"remark: {self.chosen.remark}"] * bool(self.chosen.remark)
+        parts += [f"active (within {NEAR_BOUND:.0%}): {words}" for words in self.active]
+        parts += [one.sentence() for one in self.sensitivities]
+        return [*parts, *map(str, self.vehicles), str(self.folder / "front.png")]
 
     def record(self) -> dict[str, Any]:
         """Return everything as plain data [SI]."""

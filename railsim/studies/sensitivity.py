@@ -34,6 +34,15 @@ class Sensitivity:
         """Return the sensitivity as plain data."""
         return dict(self.__dict__)
 
+    def sentence(self) -> str:
+        """Return the variables by their shares of the variance, the largest first."""
+        shares = sorted(self.total.items(), key=lambda item: -item[1])
+        words = ", ".join(f"{p.removeprefix('vehicle.')} {100.0 * s:.0f} %" for p, s in shares)
+        words += f" (surrogate's error {100.0 * self.error:.0f} %)"
+        if not any(self.total.values()):
+            words = "none of the variables; it is the same in all designs"
+        return f"{self.quantity} depends on: {words}"
+
 
 def sensitivities(
     designs: Floats, values: Floats, chosen: Floats, variables: list[str], quantities: list[str]

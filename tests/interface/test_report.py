@@ -23,7 +23,6 @@ from test_study import simulated as simulated
 import railsim
 from railsim.assessment.criteria import CRITERIA
 from railsim.cli import main
-from railsim.cli.gathered import gather
 from railsim.compare import differing, flat_keys
 from railsim.definitions import Settings
 from railsim.definitions.units_of_keys import unit_of_input, unit_of_key
@@ -39,6 +38,7 @@ from railsim.report.spread import columns, command, parameters, spread_rows, wor
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.export import selected
 from railsim.result.extremes import run_facts
+from railsim.studies.gathered import gather
 from railsim.text import in_words
 
 BROWSER = next(

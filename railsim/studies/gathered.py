@@ -5,16 +5,19 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from railsim.description import Description
+from railsim.description.values import short
 from railsim.errors import Fault, Faults
-
-if TYPE_CHECKING:
-    from railsim.description import Description
-    from railsim.result import Result
+from railsim.files.access import folder_of
+from railsim.result import Result, open_run
+from railsim.result.extremes import run_facts
+from railsim.studies.journal import JOURNAL, Journal, Records
+from railsim.studies.summary import read_index
+from railsim.table import Table
 
 Record = dict[str, Any]
-STUDY_FILES = ("study.json", "summary.csv")
 
 
 @dataclass
@@ -26,21 +29,17 @@ class Gathered:
     remarks: list[str] = field(default_factory=list)  # what was not found as the records say
     inputs: dict[str, Any] = field(default_factory=dict)  # of the study, if they are of one
 
-    def results(self, names: Sequence[str]) -> "dict[str, Result]":
+    def results(self, names: Sequence[str]) -> dict[str, Result]:
         """Open the results of some runs; runs without a file are left out."""
-        from railsim.result import open_run
-
         return {name: open_run(self.paths[name]) for name in names if name in self.paths}
 
 
-def opened(paths: Sequence[Path]) -> "dict[str, Result]":
+def opened(paths: Sequence[Path]) -> dict[str, Result]:
     """Open results under the shortest names that tell them apart.
 
     Raises InputError: everything that cannot be read, or is given twice.
     """
-    from railsim.result import open_run
-
-    faults, results = Faults(), dict[str, Any]()
+    faults, results = Faults(), dict[str, Result]()
     stems, places = [path.stem for path in paths], set[Path]()
     for path in paths:
         label = path.stem if stems.count(path.stem) == 1 else str(path)
@@ -88,18 +87,8 @@ def gather(files: Sequence[str]) -> Gathered:
     return found
 
 
-def folder_of(file: str) -> Path:
-    """Return the folder of a study, given as such or by a file with its table; or the file."""
-    path = Path(file)
-    return path.parent if path.name in STUDY_FILES and path.is_file() else path
-
-
-def described_runs(file: str) -> "Description":
+def described_runs(file: str) -> Description:
     """Return the runs of a study or of a folder: how they ended, and what tells them apart."""
-    from railsim.description import Description
-    from railsim.description.values import short
-    from railsim.table import Table
-
     found = gather([file])
     statuses = Counter(str(record["status"]) for record in found.records)
     ended = ", ".join(f"{number} {status}" for status, number in statuses.items())
@@ -138,9 +127,6 @@ def _add(
 
 def _of_folder(folder: Path) -> tuple[list[Record], dict[str, Any]]:
     """Records of the runs of a folder, and the inputs of their study."""
-    from railsim.studies.journal import JOURNAL, Journal, Records
-    from railsim.studies.summary import read_index
-
     if (folder / "study.json").is_file():
         index = read_index(folder / "study.json")
         return [{"labels": {}, **run.model_dump()} for run in index.runs], index.inputs.model_dump()
@@ -151,9 +137,6 @@ def _of_folder(folder: Path) -> tuple[list[Record], dict[str, Any]]:
 
 
 def _of_file(path: Path) -> Record:
-    from railsim.result import open_run
-    from railsim.result.extremes import run_facts
-
     result = open_run(path)
     labels = {"vehicle": result.vehicle().name, "track": result.track().name, "speed": result.speed}
     return {"name": path.stem, "file": path.name, "labels": labels, **run_facts(result)}
