@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli import common as cli
-from railsim.errors import Fault, Faults, InputError
+from railsim.errors import Fault, Faults, changed_faults
 
 if TYPE_CHECKING:
     from railsim.assessment import Assessment
@@ -90,20 +90,18 @@ def _service(results: "dict[str, Result]", options: dict[str, Any]) -> "Service 
     changes = {name: value for name, value in options.items() if value is not None}
     if not changes:
         return None
-    from pydantic import ValidationError
-
     from railsim.assessment.running import common_service
     from railsim.definitions.vehicle.tables import Service
+    from railsim.studies.spec import checked
+
+    def of_option(fault: Fault) -> Fault:
+        found = f"found {changes.get(fault.key, 'nothing')}"
+        option = f"--{fault.key.replace('_', '-')}"
+        return Fault(option, "", found, f"{fault.allowed}, in SI units")
 
     service = common_service(results, changes)
-    try:
-        return Service.model_validate({**(service.model_dump() if service else {}), **changes})
-    except ValidationError as error:
-        wrong = {str(e["loc"][0]): f"{e['msg'].lower()}, in SI units" for e in error.errors()}
-        raise InputError(
-            Fault(f"--{key.replace('_', '-')}", "", f"found {changes.get(key, 'nothing')}", words)
-            for key, words in wrong.items()
-        ) from None
+    with changed_faults(of_option):
+        return checked(Service, {**(service.model_dump() if service else {}), **changes}, "")
 
 
 def write_assessments(output: cli.Output, assessments: "Sequence[Assessment]") -> None:

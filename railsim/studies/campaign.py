@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from railsim.assessment import Assessment, assess
 from railsim.assessment.conditions import SHARE
@@ -41,7 +40,7 @@ from railsim.studies.carry_out import carry_out_cases
 from railsim.studies.case import Case, Loader, load_case, short_name
 from railsim.studies.plan import ROUGH_DURATION, check_number, faults_of_file
 from railsim.studies.rows import in_a_name
-from railsim.studies.spec import RunSpec, StudySpec
+from railsim.studies.spec import RunSpec, StudySpec, checked
 from railsim.track.curves import curves
 
 _LOG = logging.getLogger(__name__)
@@ -298,12 +297,7 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
             raise input_error(f"conditions.{name}", key, allowed, key="remove")
         del table[last]
     data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
-    try:
-        return Vehicle.model_validate(data)
-    except ValidationError as error:
-        faults = [Fault(f"conditions.{name}", ".".join(map(str, e["loc"])), e["msg"], "")
-                  for e in error.errors()]  # fmt: skip
-        raise InputError(faults) from None
+    return checked(Vehicle, data, f"conditions.{name}")
 
 
 def _exchange(node: Any, wheels: dict[str, str]) -> bool:

@@ -847,7 +847,7 @@ def test_results_are_counted_once_and_told_apart_by_their_folders(tmp_path, caps
 def test_a_report_opens_each_result_once_beside_its_facts(folder, tmp_path, monkeypatch):
     opened, open_run = [], railsim.result.open_run
     monkeypatch.setattr(
-        railsim.result, "open_run", lambda path: opened.append(path.name) or open_run(path)
+        "railsim.studies.gathered.open_run", lambda path: opened.append(path.name) or open_run(path)
     )
     gather([str(folder)])
     facts = sorted(opened)
