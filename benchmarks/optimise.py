@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pymoo.indicators.hv import HV
 
 from railsim.definitions.loading import load_study
 from railsim.studies.optimise import optimise
-from railsim.studies.search import METHODS, Task, hypervolume, non_dominated
+from railsim.studies.search import METHODS, Task, non_dominated
 
 
 @dataclass
@@ -54,13 +55,15 @@ def main() -> None:
     signs = np.array([1.0 if o.goal == "minimise" else -1.0 for o in grid.definition.objectives])
     values = np.array([d.objectives for d in grid.designs if d.feasible])
     reference = (signs * values).max(axis=0)
-    whole = hypervolume((signs * values)[non_dominated(signs * values)], reference)
+    volume_of = HV(ref_point=reference)
+    whole = volume_of((signs * values)[non_dominated(signs * values)])
     shares = {}
     for seed in asked.seeds:
         begin = time.process_time()
         found = optimise(definition, out=asked.out / f"{asked.method}_{seed}", seed=seed,
                          method=asked.method, evaluations=asked.side**2 // 5, **how)  # fmt: skip
-        volume = found.hypervolume(signs * reference) / whole
+        front = np.array([design.objectives for design in found.front])
+        volume = volume_of(signs * front) / whole
         shares[seed] = volume
         print(f"seed {seed}: {len(found.designs)} designs, front of {len(found.front)}, "
               f"{100.0 * volume:.2f} % of the grid's volume, "

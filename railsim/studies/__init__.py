@@ -18,7 +18,7 @@
 `analyses.py`        analyses at a point besides a run: curving, critical speed, modes
 `optimise.py`        `optimise`: objectives, constraints, the design that is chosen
 `designs.py`         designs evaluated by a study
-`search.py`          search methods; Pareto fronts and their volume
+`search.py`          search methods; Pareto fronts
 `sensitivity.py`     sensitivity of objectives and constraints to the variables
 `campaign.py`        a scenario for vehicles: all its runs, and their assessment
 `assess_track.py`    a recorded track judged by vehicles

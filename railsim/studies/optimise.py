@@ -40,7 +40,7 @@ from railsim.studies.designs import (
     with_unit,
 )
 from railsim.studies.plan import ROUGH_DURATION, check_number, check_study, faults_of_file
-from railsim.studies.search import Task, hypervolume, knee, non_dominated, search
+from railsim.studies.search import Task, knee, non_dominated, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 from railsim.studies.spec import Execution, checked
 from railsim.studies.summary import unit_of
@@ -77,12 +77,6 @@ class Optimisation:
     sensitivities: tuple[Sensitivity, ...]
     vehicles: tuple[Path, ...]
     computed: int
-
-    def hypervolume(self, reference: Sequence[float]) -> float:
-        """Return the volume between the front and a reference point, in SI of all objectives."""
-        signs = signs_of(self.definition)
-        front = np.array([design.objectives for design in self.front]).reshape(-1, len(signs))
-        return hypervolume(signs * front, signs * np.array(reference))
 
     def table(self) -> Table:
         """Return all designs with variables, objectives and constraints [SI]."""

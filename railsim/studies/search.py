@@ -290,30 +290,6 @@ def non_dominated(values: Floats) -> Flags:
     return found
 
 
-def hypervolume(values: Floats, reference: Floats) -> float:
-    """Return the volume between a front and a reference point (Zitzler and Thiele 1999).
-
-    The part of the objective space that at least one row dominates and that dominates the
-    reference point.  Computed in slices along the last objective; the time grows with the number of
-    rows to the power of the number of objectives.
-
-    >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
-    3.0
-    """
-    inside = values[(values < reference).all(axis=1)]
-    if not len(inside):
-        return 0.0
-    if inside.shape[1] == 1:
-        return float(reference[0] - inside.min())
-    rows = inside[np.argsort(inside[:, -1], kind="stable")]
-    ends = np.append(rows[1:, -1], reference[-1])
-    return sum(
-        float(end - row[-1]) * hypervolume(rows[: number + 1, :-1], reference[:-1])
-        for number, (row, end) in enumerate(zip(rows, ends, strict=True))
-        if end > row[-1]
-    )
-
-
 def knee(front: Floats) -> int:
     """Return the row nearest to the best value of each objective, scaled by its range.
 
