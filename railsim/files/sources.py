@@ -238,6 +238,8 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
             found = f"broken TOML at column {located.group(2)}: {message}"
             if _DECIMAL_COMMA.search(text.split("\n")[int(located.group(1)) - 1]):
                 found += "; numbers have a decimal point, not a comma"
+            elif message == "Cannot overwrite a value":
+                found += "; the key has a value already"
         else:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"
@@ -364,6 +366,8 @@ def _other_kind(old: dict[str, Any], new: dict[str, Any]) -> bool:
 def _remove(base: Source, key: str, file: str) -> list[Fault]:
     try:
         parent, last = descend(base.data, key_path(key))
+        if isinstance(parent, dict) and last not in parent:
+            raise KeyError(nearest(last, parent))
         del parent[last]
     except KeyError as missing:
         return [Fault(file, "remove", f"no key {key!r} in {base.file}", str(missing.args[0]))]

@@ -18,6 +18,7 @@ from railsim.definitions.elements.base import Element, FreeLength
 from railsim.definitions.elements.friction import SideBearer
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
 from railsim.definitions.vehicle.flatten import FlatElement, FlatVehicle, flatten
+from railsim.definitions.vehicle.tables import Service
 from railsim.errors import ModelError, listed
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ LAG = 1.0
 """Damping over series stiffness of a damper [s]: 0.3 s at most, of yaw dampers."""
 SPRING_LOAD = (0.6, 1.5)
 """Static load of a spring over the load at which its length was measured."""
+FASTEST = 125.0
+"""Admissible speed [m/s]: trains reach 100 m/s in service."""
 SPRING_TRAVEL = 0.7
 """Static compression of a spring over its free length, coils on each other."""
 
@@ -84,12 +87,19 @@ def _without_supports(vehicle: Vehicle) -> list[Remark]:
     if service is not None:
         points |= {f"service.points.{name}": at.position for name, at in service.points.items()}
         points["service.floor_height"] = (0.0, 0.0, -service.floor_height)
-    found = [*_bodies(flat, points), *_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
+    found = [*_admissible_speed(service), *_bodies(flat, points)]
+    found += [*_by_text(_far_from_axles(flat)), *_vertical_modes(flat)]
     found += [*_by_text(_pulling(flat)), *_by_text(_coefficients(flat))]
     for name in vehicle.loads:
         of_load = _bodies(flatten(vehicle.model_copy(update={"load": name})), points)
         found += [Remark(f"loads.{name}: {r.key}", r.text) for r in of_load if r not in found]
     return found
+
+
+def _admissible_speed(service: Service | None) -> Iterator[Remark]:
+    if service is not None and (speed := service.admissible_speed) > FASTEST:
+        text = f"{speed:g} m/s are {3.6 * speed:.0f} km/h: is the speed in m/s?"
+        yield Remark("service.admissible_speed", text)
 
 
 def _bodies(flat: FlatVehicle, points: Mapping[str, Sequence[float]]) -> list[Remark]:

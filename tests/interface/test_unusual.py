@@ -68,6 +68,16 @@ def vehicle(body=(), spring=(), axle=(), **others):
     )
 
 
+def test_admissible_speed_in_kilometres_per_hour_is_remarked():
+    service = {"admissible_speed": 160.0, "cant_deficiency": 0.13}
+    wrong = vehicle().replace(service=service)
+    assert "service.admissible_speed: 160 m/s are 576 km/h" in "\n".join(
+        str(remark) for remark in vehicle_remarks(wrong)
+    )
+    right = vehicle().replace(service=service | {"admissible_speed": 160.0 / 3.6})
+    assert not any("m/s" in str(remark) for remark in vehicle_remarks(right))
+
+
 @pytest.mark.parametrize(
     ("unusual", "names", "words"),
     [

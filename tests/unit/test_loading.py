@@ -215,6 +215,7 @@ def test_file_that_extends_itself_is_refused(write):
         ("x = 1\ny = = 2\n", "line 2", "broken TOML"),
         ('x = "open', "line 1", "broken TOML"),
         ("[a]\n[a]\n", "line 2", "broken TOML"),
+        ("x = 1\nx = 2\n", "line 2", "the key has a value already"),
         ("x = 1\nmass = 26000,5\n", "line 2", "a decimal point, not a comma"),
     ],
 )
@@ -252,6 +253,19 @@ def test_file_that_is_no_text_is_refused(tmp_path):
 def test_wrong_extends_or_remove_is_refused(write, line, key):
     (fault,) = faults(load_vehicle, write("mine.toml", HEAD + line + "\n"))
     assert fault.key == key
+
+
+def test_what_remove_could_have_meant_is_told(write):
+    (fault,) = faults(load_vehicle, write("mine.toml", COACH + 'remove = ["bodies.carbdy"]\n'))
+    assert fault.allowed == "did you mean 'carbody'?"
+
+
+def test_placements_of_one_name_are_one_fault(write):
+    placements = 'placements = [{ name = "front" }, { name = "front", position = [9.0, 0.0, 0.0] }]'
+    text = COACH + f"[assemblies.bogie]\n{placements}\n"
+    (fault,) = faults(load_vehicle, write("mine.toml", text))
+    assert fault.key == "assemblies.bogie.placements"
+    assert fault.found == "the names front, front"
 
 
 def test_file_or_name_of_another_kind_is_told_so(write):

@@ -70,7 +70,7 @@ def groups(
 
 
 def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
-    """Return a fault where assemblies stand so often, or so deeply, that nobody can mean it.
+    """Return a fault where placements share a name, or are more, or deeper, than anybody can mean.
 
     Counts without placing anything: ten nested assemblies of ten placements each are 1e10.
     """
@@ -89,9 +89,12 @@ def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
                     found = f"more than {MOST_PARTS} bodies and elements with all placements"
                 return [Fault("", key, found, "fewer placements or parts")]
             for name, assembly in _members(group, "assemblies").items():
-                placed = len(placement_names(assembly))
-                total += placed  # also an empty one takes time
-                inner.append((assembly, (*path, "assemblies", name), copies * placed))
+                names, inner_path = placement_names(assembly), (*path, "assemblies", name)
+                if len(set(names)) < len(names):
+                    key = ".".join((*inner_path, "placements"))
+                    return [Fault("", key, f"the names {', '.join(names)}", "different names")]
+                total += len(names)  # also an empty one takes time
+                inner.append((assembly, inner_path, copies * len(names)))
         level = inner
     if wheelsets > MOST_WHEELSETS:
         time = duration_in_words(SECONDS_PER_SQUARE * wheelsets**2)
