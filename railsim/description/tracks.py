@@ -22,6 +22,7 @@ _COPIED = (
 )  # fmt: skip
 
 ENDS = ("begin", "end")
+ROWS = ("number", "first", "last", "column", "largest_at_rows", "largest_between_rows")
 
 
 def _checked(speed: float | str) -> float:
@@ -59,10 +60,7 @@ def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
             continue
         rows = [[r["type"], r["begin"], r["end"], _range(r["values"], 1e3)] for r in data[name]]
         parts += ["", Table([Column(name), *ends, Column("values", words, format=">")], rows)]
-    irregular = [
-        [str(part["type"]), ", ".join(f"{k} {short(v)}" for k, v in part.items() if k != "type")]
-        for part in data["irregularities"]
-    ]
+    irregular = [[str(part["type"]), _values(part)] for part in data["irregularities"]]
     if irregular:
         parts += ["", Table(["irregularity", "values"], irregular)]
     return Description(data, parts)
@@ -74,6 +72,7 @@ def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
         track.name,
         f"  {track.length:g} m, gauge {1e3 * track.gauge:g} mm, rail {either(track.rail)} "
         f"{slope}, friction {track.friction_words}, rounded over {track.rounding:g} m",
+        f"  rails {track.support.words}",
     ]
     if track.speed is not None:
         lines.append(f"  permitted speed {track.speed:g} m/s ({3.6 * track.speed:.0f} km/h)")
@@ -106,6 +105,18 @@ def _irregularity(part: Irregularity) -> dict[str, Any]:
             "largest_between_rows": found.between,
         }
     return data
+
+
+def _values(part: dict[str, Any]) -> str:
+    """Return an irregularity in words; rows that were read with their range in mm."""
+    plain = {key: short(value) for key, value in part.items() if key not in ("type", *ROWS)}
+    words = [f"{key} {value}" for key, value in plain.items()]
+    if "number" in part:
+        first, last, column = (part[key] for key in ("first", "last", "column"))
+        largest = [1e3 * part[key] for key in ("largest_at_rows", "largest_between_rows")]
+        words.append(f"{part['number']} rows from s = {first:g} to {last:g} m")
+        words.append("{} up to {:.2f} mm, {:.2f} mm between the rows".format(column, *largest))
+    return ", ".join(words)
 
 
 def _row(section: Section) -> dict[str, Any]:

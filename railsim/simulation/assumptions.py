@@ -32,19 +32,10 @@ def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float
         f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
         f"  track     transitions rounded over {track.rounding:g} m, cant about the "
         f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
-        f"  support   rails {_support(track)}",
+        f"  support   rails {track.support.words}",
         *_irregularity_lines(track),
         f"  time      scheme {settings.scheme}, step {step}, output {output_words(settings)}",
     ]
-
-
-def _support(track: Track) -> str:
-    """Say what carries the rails."""
-    preset = track.support.preset
-    if preset == "rigid":
-        return "rigid"
-    changed = track.support.model_dump(exclude={"preset"}, exclude_none=True)
-    return f"elastic, {preset}{' with own values' if changed else ''}"
 
 
 def _irregularity_lines(track: Track) -> list[str]:

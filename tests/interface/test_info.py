@@ -133,9 +133,10 @@ def test_what_a_track_file_gives_is_told_in_the_units_of_the_trade(capsys, tmp_p
     measured = f'irregularities = [{{type = "measured", rows = {rows}, shift = 5.0}}]'
     path.write_text("\n".join([*given, measured]))
     lines = lines_of(capsys, str(path))
-    assert lines[:8] == [
+    assert lines[:9] == [
         "t",
         "  250 m, gauge 1435 mm, rail 60E1 1:40, friction 0.3 / 0.4, rounded over 8 m",
+        "  rails elastic, ballasted",
         "  permitted speed 25 m/s (90 km/h)",
         "  mileage from km 12.300 to km 12.050",
         "  friction with slip down to 0.4 of it, 0.6 s/m",
@@ -149,6 +150,7 @@ def test_what_a_track_file_gives_is_told_in_the_units_of_the_trade(capsys, tmp_p
     (part,) = data["irregularities"]
     assert (part["number"], part["first"], part["last"]) == (4, 25.0, 55.0)
     assert "rows" not in part
+    assert "4 rows from s = 25 to 55 m, z_left up to 1.00 mm, 1.00 mm between" in "\n".join(lines)
     rising = describe_track(track.replace(falling_mileage=False), [0.5])  # m/s
     assert "  mileage from km 12.300 to km 12.550" in rising.parts
     # what is not given is not told

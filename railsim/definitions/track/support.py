@@ -141,6 +141,14 @@ class Support(Definition):
             raise ValueError("without masses every spring needs a damping above 0")
 
     @property
+    def words(self) -> str:
+        """What carries the rails, for tables."""
+        if self.preset == "rigid":
+            return "rigid"
+        own = self.model_dump(exclude={"preset"}, exclude_none=True)
+        return f"elastic, {self.preset}{' with own values' if own else ''}"
+
+    @property
     def values(self) -> SupportValues | None:
         """Values of the preset, replaced by those given; None for rigid rails."""
         base = PRESETS[self.preset]
