@@ -77,7 +77,8 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
         axes.grid(visible=False)
         shown = wear[:, :, m]
         picture = axes.pcolormesh(columns, rows, shown.T, shading="nearest", vmin=0.0, vmax=largest)
-        axes.set_xticks(columns, [signed(value) for value in radius], fontsize=7.5, rotation=45)
+        turned = 45.0 if number * len(columns) > 12 else 0.0
+        axes.set_xticks(columns, [signed(r) for r in radius], fontsize=7.5, rotation=turned)
         axes.set_yticks(rows, [f"{value:g}" for value in deficiency])
         if shown.size <= NUMBERS:
             _numbers(axes, shown, largest)

@@ -139,4 +139,4 @@ def _shape(axes: Axes, mode: Mode) -> None:
     axes.set(ylim=(max(len(names), LEAST_BARS) - 0.5, -0.5), xlim=(0.0, None))
     axes.grid(visible=False, axis="y")
     damping = f"damping {100.0 * mode.damping_ratio:.2f} %".replace("-", "\N{MINUS SIGN}")
-    axes.set_title(f"{mode.name}: f₀ {mode.natural_frequency:.3g} Hz, {damping}", fontsize=8.5)
+    axes.set_title(f"{mode.name}: f₀ {mode.natural_frequency:#.3g} Hz, {damping}", fontsize=8.5)

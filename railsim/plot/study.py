@@ -4,6 +4,7 @@ Families of curves, heat maps and rankings of the runs of a study; the Pareto fr
 optimisation and what its values depend on; a wheel that wears; limits over a track.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -47,9 +48,12 @@ class Column:
         return sorted(there, key=lambda value: (isinstance(value, str), value))
 
     def text(self, value: float, digits: int) -> str:
-        """Return a number with so many digits, none beyond those of tables: 1570, not 7e-12."""
-        rounded = value if self.decimals is None else round(value, self.decimals) + 0.0
-        return f"{float(f'{rounded:.{digits}g}'):g}"
+        """Return a number with so many digits, none beyond those of tables: 1570, 38.0, 0.00."""
+        if self.decimals is None:
+            return f"{float(f'{value:.{digits}g}'):g}"
+        rounded = round(value, self.decimals) + 0.0
+        size = math.floor(math.log10(max(abs(rounded), 0.1**self.decimals)))
+        return f"{rounded:.{max(0, min(self.decimals, digits - 1 - size))}f}"
 
 
 @styled()

@@ -8,6 +8,7 @@ from statistics import median
 from typing import Any
 
 from railsim.definitions.study.analyses import unit_of_number
+from railsim.files.key_paths import AXES
 from railsim.notation import DECIMALS, QUANTITIES, Quantity
 from railsim.text import printable
 from railsim.units import number_with_unit
@@ -15,7 +16,6 @@ from railsim.units import number_with_unit
 Record = Mapping[str, Any]
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 LEAST = 3  # runs, for a spread
-SHORTEST = 4  # letters of a parameter's short name: `stiffness.x` and not `x`
 WORST = 5  # runs of each quantity
 RANKED = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")  # worst runs, pictures
 
@@ -53,10 +53,11 @@ def _numbers(values: Sequence[Any]) -> list[Any]:
 
 def _short(name: str, names: Sequence[str]) -> str:
     parts = name.split(".")
-    for number in range(1, len(parts)):
+    # of a vehicle also the part that has the value: `guide.stiffness.x`, `carbody.mass`
+    least = 1 + (parts[0] == "vehicle") + (parts[-1] in AXES or parts[-1].isdecimal())
+    for number in range(least, len(parts)):
         end = ".".join(parts[-number:])
-        alone = sum(f".{other}".endswith(f".{end}") for other in names) == 1
-        if alone and len(end) >= SHORTEST:
+        if sum(f".{other}".endswith(f".{end}") for other in names) == 1:
             return end
     return name
 
