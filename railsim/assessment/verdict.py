@@ -59,9 +59,11 @@ def all_verdicts(
     for name in VERDICTS:
         exceeded = [why for report in reports for why in _exceeded(report, name)]
         rows = [(r.title, row) for r in reports for row in r.rows if row.criterion.group == name]
-        empty = [(title, row) for title, row in rows if math.isnan(row.share)]
-        few = [f"{title}: {row.criterion.words}, {row.place}" for title, row in empty]
-        unknown = [f"{where}: too few values for an estimate" for where in few]
+        few: dict[str, dict[str, None]] = {}  # quantities by zone, whatever the wheels
+        for title, row in rows:
+            if math.isnan(row.share):
+                few.setdefault(title, {})[row.criterion.words] = None
+        unknown = [f"{t}: too few values for an estimate: {'; '.join(q)}" for t, q in few.items()]
         # such as ride without accelerations, track loading of the simplified method
         nothing = (
             [] if rows or not reports else [f"{WORDS[name]}: none of its quantities has values"]
