@@ -104,7 +104,7 @@ def _comfort(run: str, points: Sequence[PointComfort]) -> Table:
 def _wear(run: str, wheels: Sequence[WheelWear]) -> Table:
     columns = [
         Column("place", run), Column("T_gamma", unit="N", format=".1f"),
-        Column("95", "95 %", format=".0f"), Column("99.85", "99.85 %", format=".0f"),
+        Column("95", "95 %", "N", ".0f"), Column("99.85", "99.85 %", "N", ".0f"),
         *(Column(law, f"{LAWS[law].name if law in LAWS else law} (mm2/1000 km)", format=".2f")
           for law in wheels[0].worn_area),
         Column("rail_damage", "WLRM (1e-6)", format=".2f"),
