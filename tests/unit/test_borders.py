@@ -11,7 +11,7 @@ from railsim.assessment.comfort_report import class_of
 from railsim.assessment.conditions import _conicity
 from railsim.assessment.model_comparison import QUANTITIES, Comparison, Pair
 from railsim.assessment.wear import Patches, archard, krause_poll, pearce_sherratt_1991, usfd
-from railsim.assessment.zones import ZoneReport
+from railsim.assessment.zones import Assessed
 from railsim.definitions.elements.actuator import Actuator
 from railsim.definitions.elements.friction import CentrePlate, Friction, SideBearer, Wedge
 from railsim.definitions.elements.springs import BumpStop, SpringDamper
@@ -380,7 +380,7 @@ def severe(speed):
 
 
 def exceeded(share):
-    return bool(ZoneReport.exceeded.fget(SimpleNamespace(rows=[SimpleNamespace(share=share)])))
+    return Assessed.exceeded.fget(SimpleNamespace(share=share))
 
 
 # a function, and its values at a border and beside it
@@ -390,7 +390,9 @@ AT_THE_BORDER = {
         [(below(1.5), "very comfortable"), (1.5, "comfortable"), (2.5, "medium"),
          (3.5, "uncomfortable"), (below(4.5), "uncomfortable"), (4.5, "very uncomfortable")],
     ),
-    "a value at its limit does not exceed it": (exceeded, [(1.0, False), (above(1.0), True)]),
+    "a value at its limit does not exceed it, but for rounding": (
+        exceeded, [(1.0, False), (1.0 + 0.9e-9, False), (1.0 + 1.1e-9, True)]
+    ),
     "nor in a stationary test": (
         lambda x: StationaryValue("", "", x, 1.0, "").exceeded, [(1.0, False), (above(1.0), True)]
     ),

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from dynamics import Settings, changed, load_track, load_vehicle, undamped
-from selection import points
 from suspension import Suspension
 
 from railsim.linear.coordinates import FreeVehicle
@@ -143,12 +142,11 @@ def on_air(vehicle):
     return changed(vehicle, change)
 
 
-@points(
+@pytest.mark.parametrize(
     ("name", "change"),
     [("coach_flexicoil", on_air), ("coach_manchester", on_air), *((name, None) for name in SPRUNG)],
-    always=(0, 2),
 )
-def test_all_modes_are_those_of_the_energies_of_the_elements(name, change):
+def test_all_modes_are_those_of_the_energies_of_the_elements(name, change, small_contact_tables):
     """Trailing arms, three-axle bogies, air springs: every eigenvalue that oscillates, 1e-6."""
     vehicle = load_vehicle(name)
     vehicle = change(vehicle) if change else vehicle
