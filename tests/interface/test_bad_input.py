@@ -197,7 +197,7 @@ def test_wrong_setting_is_told(tmp_path, capsys, monkeypatch, text, key, words):
     [
         ("", "empty"),
         ("s,z_lefft\n0,1\n", "did you mean 'z_left'?"),
-        ("s,z\n0,0\n1,x\n2,0\n3,0\n", "line 3: not a number"),
+        ("s,z\n0,0\n1,x\n2,0\n3,0\n", "line 3: not a number ('x')"),
         ("s,z\n0,0\n1,0\n1,0\n3,0\n", "line 4: s = 1 m does not increase"),
         ("s,z\n0,0\n1,0\n2,5\n3,0\n", "line 4: a displacement of 5 m"),
         ("s,z\n0,0\n1,0\n", "four rows at least"),

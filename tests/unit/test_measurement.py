@@ -338,7 +338,7 @@ def test_bad_input_is_one_clear_line(tmp_path, override, words):
 
 def test_text_among_numbers_names_its_line(tmp_path):
     path = written(tmp_path, cell=lambda row, name, text: "off" if row == 70 else text)
-    with pytest.raises(railsim.InputError, match="line 72: not a number"):
+    with pytest.raises(railsim.InputError, match=r"line 72: not a number \('off'\)"):
         railsim.load_measurement(path)
 
 

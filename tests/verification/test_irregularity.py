@@ -355,7 +355,7 @@ def test_absolute_gauge_and_another_encoding_are_read_when_the_file_says_so(tmp_
         ("z_left\n1", "no column s"),
         ("s,z,z_mm\n0,1,1", "a column occurs twice"),
         ("s,z\n0,0\n1,0\n2,nan\n3,0\n4,0", "line 4: not a finite number"),
-        ("s,z\n0,0\n1,x\n2,0\n3,0\n4,0", "line 3: not a number"),
+        ("s,z\n0,0\n1,x\n2,0\n3,0\n4,0", "line 3: not a number ('x')"),
         ("s,z\n0,0\n1\n2,0\n3,0\n4,0", "line 3: 1 values"),
         ("s,z\n0,0\n1,0", "four rows at least"),
         ("s,z\n0,0\n1,0\n1,0\n2,0\n3,0", "line 4: s = 1 m does not increase"),
@@ -594,7 +594,7 @@ def test_equal_faults_of_a_recording_are_one_line_with_their_number(tmp_path):
     with pytest.raises(InputError) as caught:
         recorded(tmp_path, f"s,z\n{rows}40,0,0\n")
     assert [str(fault).partition("rec.csv: ")[2] for fault in caught.value.faults] == [
-        "line 2: not a number, and 24 more like it up to line 26; numbers only",
+        "line 2: not a number ('x'), and 24 more like it up to line 26; numbers only",
         "line 27: 3 values; 2 values as in the header",
     ]
 

@@ -187,8 +187,9 @@ def _numbers(cells: Sequence[str], columns: Sequence[Column | None]) -> list[flo
         raise ValueError(f"{len(cells)} values", f"{len(columns)} values as in the header")
     try:
         values = [float(cell) for cell, column in zip(cells, columns, strict=True) if column]
-    except ValueError:
-        raise ValueError("not a number", "numbers only") from None
+    except ValueError as error:
+        found = f"not a number ({error})".replace("could not convert string to float: ", "")
+        raise ValueError(found, "numbers only") from None
     if not np.isfinite(values).all():
         raise ValueError("not a finite number", "finite numbers only; leave gaps out")
     return values
