@@ -317,7 +317,7 @@ class _Balance:
             names = self._alternating(state, change)
             both = f"alternating between two branches: {', '.join(names)}; " if names else ""
             left = self.model.index.largest_left(self._equations, rest, 5)
-            raise ModelError(f"no static equilibrium; {both}{left}")
+            raise ModelError(f"no static equilibrium of '{self.model.flat.name}'; {both}{left}")
         return state
 
     def _over_kinks(
@@ -363,7 +363,8 @@ class _Balance:
         derivatives = np.empty_like(rows)
         status, where, _ = right_hand_sides(self.system, self.work, rows, derivatives)
         if status != RUNNING:
-            raise ModelError(f"no static equilibrium: {self.model.index.sentence(status, where)}")
+            reason = self.model.index.sentence(status, where)
+            raise ModelError(f"no static equilibrium of '{self.model.flat.name}': {reason}")
         return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
 
     def _line_search(

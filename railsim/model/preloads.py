@@ -84,8 +84,8 @@ def _solved(model: Model) -> Model:
         if not unbalanced:
             return _with_pressing_wedges(filled)
     raise ModelError(
-        "no static equilibrium: the springs with preload cannot carry the vehicle in its "
-        "nominal position; unbalanced: " + "; ".join(unbalanced)
+        f"no static equilibrium of '{model.flat.name}': the springs with preload cannot carry the "
+        "vehicle in its nominal position; unbalanced: " + "; ".join(unbalanced)
     )
 
 

@@ -244,7 +244,7 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
         (["--set", "settings.fastsim_grid.1=100000"], "fastsim_grid.1: 100000; must be less than"),
         (["--set", "track.plan.0.length=1e300"], "plan.0.length: 1e+300; must be less than"),
         (["--set", "track.plan.0.length=1e7"], "1e+07 m of track with details of 2.5 m; a shorter"),
-        (["--set", "vehicle.bodies.carbody.mass=1e300"], "no static equilibrium"),
+        (["--set", "vehicle.bodies.carbody.mass=1e300"], "no static equilibrium of 'Passenger"),
     ],
 )
 def test_wrong_option_is_told(tmp_path, capsys, monkeypatch, options, words):

@@ -278,7 +278,7 @@ def test_a_vehicle_that_fails_fails_when_all_others_are_done(coach, tmp_path):
         {"assemblies.bogie.elements.secondary_spring.preload": [0.0, 0.0, 0.0]}
     )
     sinks = [Hdf5Sink(tmp_path / f"{number}.h5") for number in (1, 2, 3)]
-    with pytest.raises(ModelError, match="no static equilibrium") as caught:
+    with pytest.raises(ModelError, match=f"no static equilibrium of '{coach.name}'") as caught:
         railsim.simulate_together(
             [coach, floating, coach], railsim.load_track("straight"), speed=20.0, until=1.0,
             sinks=sinks,
