@@ -27,6 +27,8 @@ def validation_faults(
             continue
         path = _written_path(detail, source.data)
         found, allowed = _wording(_as_written(detail, path, source.data), model)
+        if detail["type"] == "union_tag_not_found":
+            allowed += _name_in_base(path, source)
         key = shortened(".".join(path), LONGEST_KEY)
         faults.append(located_fault(source.file_of(path), key, found, allowed))
     # a number that stands for both sides is objected to twice, the second time at its row
@@ -40,6 +42,15 @@ def validation_faults(
             for other in shown
         )
     ] + faults[MOST_FAULTS:]
+
+
+def _name_in_base(path: tuple[str, ...], source: Source) -> str:
+    """Return the near name of a member that another file of the chain has, as a question."""
+    siblings = {keys for keys in source.origin if keys[:-1] == path[:-1]}
+    own = source.file_of(path)
+    names = [keys[-1] for keys in siblings if source.file_of(keys) != own]
+    hint = nearest(path[-1], names)
+    return f"; {hint}" if names and not hint.startswith("allowed") else ""
 
 
 def _as_written(detail: Any, path: Sequence[str], data: Any) -> Any:

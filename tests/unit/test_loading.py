@@ -153,6 +153,20 @@ def test_fault_names_the_file_that_holds_the_key(write):
     assert files == {"bodies.carbody.mass": str(base), "bodies.carbody.inertia": str(mine)}
 
 
+def test_name_near_one_of_an_extended_file_is_told(write):
+    """Of the file's own elements none is meant: they are there already."""
+    table = PRIMARY.replace("primary", "primry")
+    own = f'[{PRIMARY.replace("primary", "primry2")}]\nkind = "bushing"\nbodies = ["a", "b"]\n'
+    (fault,) = faults(load_vehicle, write("a.toml", COACH + f"[{table}]\ndamping = 3.0\n"))
+    assert fault.key == table
+    assert fault.allowed == "it tells what the table describes; did you mean 'primary'?"
+    text = COACH + own + f"[{table}]\ndamping = 3.0\n"
+    found = {one.key: one.allowed for one in faults(load_vehicle, write("b.toml", text))}
+    assert found[table].endswith("did you mean 'primary'?")
+    far = write("c.toml", COACH + f"[{PRIMARY.replace('primary', 'zzzz')}]\ndamping = 3.0\n")
+    assert faults(load_vehicle, far)[0].allowed == "it tells what the table describes"
+
+
 def test_short_vector_says_how_many_numbers_are_needed(write):
     path = write("mine.toml", COACH + "[bodies.carbody]\nposition = [1.0]\ninertia = 5.0\n")
     position, inertia = sorted(faults(load_vehicle, path), key=lambda f: f.key, reverse=True)
