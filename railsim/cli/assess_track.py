@@ -59,5 +59,6 @@ def command(
     output.write("report.html", page)
     more = len(table) - SHOWN
     table.rows = table.rows[:SHOWN]
+    none = f"no vehicle exceeds {100.0 * found.share:g} % of a limit at any place"
     further = [f"and {more} further places in places.csv"] if more > 0 else []
-    output.answer(found.record(), [table, *further, "", *found.notes])
+    output.answer(found.record(), [table if len(table) else none, *further, "", *found.notes])

@@ -132,6 +132,15 @@ def test_command(judged, recording, capsys, monkeypatch):
     assert "missed" in data["flagged"]
 
 
+def test_a_track_without_places_is_said_in_words(judged, recording, capsys, monkeypatch):
+    monkeypatch.setattr(module, "PIECE", 500.0)
+    arguments = ["assess-track", str(recording), "--vehicles", "coach_manchester", "--speeds", "40"]
+    more = ["--share", "9", "--resume", "--quiet"]
+    assert main([*arguments, "--out", str(judged[2]), *more]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "no vehicle exceeds 900 % of a limit at any place"
+
+
 def test_the_strip_of_a_single_cell_is_as_long_as_the_cell():
     shares = {("coach", 40.0, "sum_Y"): np.array([0.5])}
     axes = heat_strip(np.array([100.0]), shares, CELL).axes[0]
