@@ -19,7 +19,7 @@ from railsim.assessment.wear_report import wear_report
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle.tables import Service
-from railsim.errors import argument_error
+from railsim.errors import argument_error, listed
 from railsim.result import Result
 
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
@@ -147,6 +147,10 @@ def _by_runs(
     driven = {name: (result.speed, *_rails(result)) for name, result in runs.items()}
     if standard == "wear":
         wear = {name: wear_report(record, law) for name, record in records.items()}
+        if bare := [name for name, wheels in wear.items() if wheels[0].fatigue_index is None]:
+            remedy = "run with settings.outputs.contact_patches=true"
+            words = "USFD and FI_surf have no values without contact patches"
+            remarks.append(f"{listed(bare)}: {words}; {remedy}")
         if (model := next(iter(wear.values()))[0].model) != WholeLifeRailModel():
             counted = f"threshold {model.threshold:g} N, counted: {model.counted}"
             remarks.append(f"Whole Life Rail Model of {law}: {counted}")

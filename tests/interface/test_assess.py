@@ -686,6 +686,8 @@ def test_wear_of_any_run_is_the_mean_over_the_distance_of_the_printed_laws(patch
     else:
         T, T_x, area = whole.T_gamma[..., None], whole.xi_x[..., None], 0.0
     (found,) = assess(whole, "wear")
+    missing = "run: USFD and FI_surf have no values without contact patches; run with"
+    assert any(remark.startswith(missing) for remark in found.remarks) is not patched
     counted = slice(3000, len(way) - 1)  # the last step of a run may be shorter
     ways = np.gradient(whole.distance)[counted, None, None, None]
     pearce, usfd, damage = by_hand(T, area + 0.0 * T, T_x < 0.0, 920.0)
