@@ -8,6 +8,7 @@ from railsim.definitions.vehicle.flatten import flatten
 from railsim.description.values import Description, Parts
 from railsim.laws import permitted_part
 from railsim.linear.modes import modes
+from railsim.linear.vehicle import STICKING
 from railsim.model.statics import SLOW, static_loads
 from railsim.profiles import Profile
 from railsim.table import Column, Table
@@ -43,7 +44,8 @@ def rest_frequencies(
     Each is that of the mode in which the motion has the largest share of the kinetic energy, of
     the vehicle linearised at rest: friction sticks. `profiles`, `track`: as of `railsim.modes`.
     """
-    found = modes(vehicle, track, speed=SLOW, profiles=profiles).oscillations
+    whole = modes(vehicle, track, speed=SLOW, profiles=profiles)
+    found = whole.oscillations
     motions = {"bounce": "z", "pitch": "pitch", "roll": "roll"}
     rows = []
     for body in flatten(vehicle).of_kind("body"):
@@ -55,4 +57,5 @@ def rest_frequencies(
                 row[name] = mode.natural_frequency
         rows.append(row)
     columns = [Column(name, unit="Hz", format=".2f") for name in motions]
-    return Table([Column("body"), *columns], rows, "Natural frequencies")
+    stuck = [remark for remark in whole.remarks if remark.endswith(STICKING)]
+    return Table([Column("body"), *columns], rows, "; ".join(["Natural frequencies", *stuck]))

@@ -31,6 +31,11 @@ WALKING_PACE = 1.0  # m/s
 AMPLITUDE = 3e-3  # m, of the wheelsets where the linearisation is harmonic (EN 14363 practice)
 LINEARISATIONS = ("tangent", "harmonic")
 CONICITIES = (0.005, 0.6)  # of straight cones with the flange of S1002
+# what a remark says of friction elements
+STICKING = (
+    "they are linearised with their elasticity in sticking, and what they damp in sliding is left "
+    "out"
+)
 CELLS = 100  # along and across a patch, from which on the slopes of the creep force have no steps
 
 
@@ -157,10 +162,7 @@ class LinearVehicle:
             )
         self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         if self.sticking:
-            self.remarks += (
-                f"{self.sticking} friction elements stick: they are linearised with their "
-                "elasticity in sticking, and what they damp in sliding is left out",
-            )
+            self.remarks += (f"{self.sticking} friction elements stick: {STICKING}",)
         _check_hold(self.model, hold)
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)

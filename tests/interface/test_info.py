@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import pytest
 from example_result import example_result
@@ -338,7 +339,9 @@ def test_a_vehicle_of_another_gauge_stands_on_the_rails_of_a_track(tmp_path, cap
     assert cli.main(asked) == 2
     assert "check gauge" in capsys.readouterr().err
     assert cli.main([*asked, "--track", str(track)]) == 0
-    assert "At rest, load 'design'" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "At rest, load 'design'" in shown
+    assert re.search(r"^Natural frequencies; \d+ friction elements stick: ", shown, re.MULTILINE)
 
 
 def test_one_wheelset_has_no_empty_tables_and_no_floor_to_assess(tmp_path, capsys):
