@@ -128,7 +128,8 @@ def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
             quantity = QUANTITIES[peak["quantity"]]
             # peaks by magnitude, so that mirrored curves give equal values
             value = abs(peak["value"]) if peak["kind"] == "abs" else peak["value"]
-            words = f"{quantity.long_name}, {WORDS[peak['kind']]}"
+            magnitude = " magnitude" * (peak["kind"] == "abs")
+            words = f"{quantity.long_name}, {WORDS[peak['kind']]}{magnitude}"
             rows.append((f"{quantity.name}_{peak['kind']}", words, quantity, value))
     for number, curve in enumerate(record.get("mid_curves", ()), start=1):
         # records of earlier versions have only the value at the middle of the curve
