@@ -32,7 +32,8 @@ def in_words(value: Any) -> str:
         return ", ".join(map(in_words, value)) or "none"
     if value is None or isinstance(value, bool):
         return {None: "none", True: "yes", False: "no"}[value]
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    # 16000000, not 1.6e+07
+    return f"{float(f'{value:.6g}'):.12g}" if isinstance(value, float) else str(value)
 
 
 def printable(text: str) -> str:

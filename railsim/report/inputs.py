@@ -18,9 +18,11 @@ from railsim.model.statics import static_loads
 from railsim.profiles import Profile
 from railsim.report.document import Drawing, Section, Table, of_values
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
+from railsim.report.spread import number
 from railsim.result import Result
 from railsim.simulation.assumptions import assumptions
 from railsim.text import in_words, printable
+from railsim.units import number_with_unit
 
 Record = Mapping[str, Any]
 MOST_SHOWN = 12  # values of an input of a study
@@ -151,11 +153,19 @@ def _inputs(inputs: Mapping[str, Any]) -> Table:
             values = [v for v in (part if isinstance(part, list) else [part]) if v is not None]
             if not values:
                 continue
-            words = ", ".join(in_words(v) for v in values[:MOST_SHOWN])
+            words = ", ".join(in_words(_number(v)) for v in values[:MOST_SHOWN])
             more = len(values) - MOST_SHOWN
             words += f" and {more} more" if more > 0 else ""
             rows.append([f"{key} {name}".strip(), words])
     return Table(["input", "value"], rows, "Inputs of the study", (0, 1))
+
+
+def _number(value: Any) -> Any:
+    """The number of a text such as ``16e6``; anything else, with a unit too, as it is."""
+    with suppress(ValueError):
+        if isinstance(value, str) and number_with_unit(value) is None:
+            return number(value)
+    return value
 
 
 def _rails(track: Track) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from railsim.definitions.study.analyses import unit_of_number
 from railsim.files.key_paths import AXES
 from railsim.notation import DECIMALS, QUANTITIES, Quantity
+from railsim.profiles.builtin import RAIL_HEADS
 from railsim.text import printable
 from railsim.units import number_with_unit
 
@@ -45,10 +46,21 @@ def parameters(
 
 def _numbers(values: Sequence[Any]) -> list[Any]:
     try:
-        in_si = [number_with_unit(str(value)) for value in values]  # None without a unit
-        return [float(v) if si is None else si for v, si in zip(values, in_si, strict=True)]
+        return [number(value) for value in values]
     except (TypeError, ValueError):
         return [printable(str(value)) for value in values]
+
+
+def number(value: Any) -> float:
+    """Return a label as a number in SI; raises TypeError, ValueError: it is none.
+
+    >>> number("16e6"), number("10 kN")
+    (16000000.0, 10000.0)
+    """
+    if value in RAIL_HEADS:  # 60E1 is no 600
+        raise ValueError(value)
+    in_si = number_with_unit(str(value))  # None without a unit
+    return float(value) if in_si is None else in_si
 
 
 def _short(name: str, names: Sequence[str]) -> str:

@@ -328,6 +328,12 @@ def test_study_without_results_tells_its_inputs_once_and_its_worst_runs(tmp_path
 def test_values_are_told_in_words():
     assert day("2026-11-03T15:04:20+00:00") == "3 November 2026, 15:04"
     assert in_words(((10, 10), None, True)) == "10, 10, none, yes"
+    grid = {"vehicle.primary.stiffness.x": ["16e6", "2e-5"], "track.rail": ["60E1", "54E1"]}
+    rows = what_was_run([], {}, {"grid": grid}).tables[0].rows
+    assert [words for _, words in rows] == ["16000000, 2e-05", "60E1, 54E1"]
+    assert in_words(16e6) == "16000000"
+    rails = parameters([{"labels": {"track.rail": rail}} for rail in ("60E1", "54E1")])
+    assert rails["track.rail"]["values"] == ["60E1", "54E1"]  # not 600 and 540
     rows = worst_rows([{**r, "labels": {"speed": 20.0 + i}} for i, r in enumerate(records(7))])
     values = [[float(value) for value, _ in row[1:]] for row in rows]
     assert all(row == sorted(row, reverse=True) and len(row) == 5 for row in values)
