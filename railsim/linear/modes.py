@@ -399,9 +399,12 @@ def _named(
 ) -> Modes:
     c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
     there = ~np.isnan(found.eigenvalues)
-    names = [mode_name(parts, found, k) if one else "" for k, one in enumerate(there)]
+    # oscillations are numbered before the modes that no table shows
+    order = np.argsort(found.frequencies <= SLOWEST, kind="stable")
+    names = numbered([mode_name(parts, found, k) if there[k] else "" for k in order])
+    name_of = dict(zip(order, names, strict=True))
     listed = []
-    for name, value, shape in zip(numbered(names), found.eigenvalues, found.shapes, strict=True):
+    for k, (value, shape) in enumerate(zip(found.eigenvalues, found.shapes, strict=True)):
         if np.isnan(value):
             listed.append(Mode("", complex(np.nan, np.nan), {}, {}))
             continue
@@ -409,7 +412,7 @@ def _named(
         largest = positions[int(np.argmax(np.abs(positions)))]
         shown = (positions / largest if largest else positions).tolist()
         shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
-        listed.append(Mode(name, complex(value), _participation(parts, shape), shapes))
+        listed.append(Mode(name_of[k], complex(value), _participation(parts, shape), shapes))
     remarks = (*prepared.remarks, *divergence(found))
     about = remarks, parameter, prepared.name, prepared.place
     return Modes(speed, prepared.contact, tuple(listed), *about)

@@ -11,7 +11,7 @@ from selection import points
 import railsim
 from railsim.cli import main
 from railsim.errors import InputError
-from railsim.linear.modes import Mode, Modes
+from railsim.linear.modes import Mode, Modes, numbered
 from railsim.linear.vehicle import Contact
 
 
@@ -30,6 +30,16 @@ def test_what_the_table_leaves_out_is_counted():
     found = Modes(20.0, Contact(), tuple(Mode("", value, {}, {}) for value in values))
     assert len(found.table().records()) == 1
     assert found.notes == ("2 oscillations above 50 Hz and 1 modes that do not oscillate: --json",)
+
+
+def test_oscillations_are_numbered_by_rising_frequency_before_what_does_not_oscillate():
+    """Of this coach some lateral modes of the bogies do not oscillate, and are slower."""
+    found = railsim.modes(railsim.load_vehicle("coach_flexicoil"), speed=44.4)
+    names = [mode.name for mode in found.oscillations]
+    assert names == numbered([re.sub(r" \d+$", "", name) for name in names])
+    still = {mode.name for mode in found if not mode.oscillates}
+    assert len(still) + len(names) == len(found.modes)
+    assert not still.intersection(names)
 
 
 def test_root_locus_in_json_and_folder(capsys, tmp_path):
