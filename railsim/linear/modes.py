@@ -1,6 +1,7 @@
 """`modes`: eigenfrequencies, damping and shapes of a vehicle, at one speed or over many."""
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -192,6 +193,7 @@ class RootLocus(Plottable):
         chosen = []
         for k in range(len(self.sets[0].modes)):
             borne = [modes.modes[k].name for modes in self.sets if modes.modes[k].exists]
+            borne = [re.sub(r" \d+$", "", name) for name in borne]  # as numbered at one value
             chosen.append(max(reversed(borne), key=borne.count) if borne else "")
         return tuple(numbered(chosen))
 

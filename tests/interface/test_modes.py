@@ -11,7 +11,7 @@ from selection import points
 import railsim
 from railsim.cli import main
 from railsim.errors import InputError
-from railsim.linear.modes import Mode, Modes, numbered
+from railsim.linear.modes import Mode, Modes, RootLocus, numbered
 from railsim.linear.vehicle import Contact
 
 
@@ -40,6 +40,21 @@ def test_oscillations_are_numbered_by_rising_frequency_before_what_does_not_osci
     still = {mode.name for mode in found if not mode.oscillates}
     assert len(still) + len(names) == len(found.modes)
     assert not still.intersection(names)
+
+
+def test_modes_of_a_locus_have_names_of_their_own():
+    """Numbers of one value say nothing about another: two modes are "lateral 2" at most values."""
+    borne = [
+        ("lateral", "lateral 2", "pitch"),
+        ("lateral", "lateral 2", "roll"),
+        ("lateral", "yaw", "lateral 2"),
+        ("lateral", "bounce", "lateral 2"),
+    ]
+    sets = [
+        Modes(20.0, Contact(), tuple(Mode(name, 1j, {}, {}) for name in names)) for names in borne
+    ]
+    found = RootLocus("speed", (10.0, 20.0, 30.0, 40.0), tuple(sets))
+    assert found.names == ("lateral", "lateral 2", "lateral 3")
 
 
 def test_root_locus_in_json_and_folder(capsys, tmp_path):
