@@ -37,6 +37,20 @@ def key_path(key: str) -> list[str]:
     return parts
 
 
+def telling_end(key: str, keys: Iterable[str], least: int = 1) -> str:
+    """Return the shortest end of a key, of `least` parts or more, that no other of `keys` has.
+
+    >>> telling_end("bodies.frame.mass", ["bodies.frame.mass", "bodies.carbody.mass"])
+    'frame.mass'
+    """
+    parts = key.split(".")
+    for number in range(least, len(parts)):
+        end = ".".join(parts[-number:])
+        if sum(f".{other}".endswith(f".{end}") for other in keys) == 1:
+            return end
+    return key
+
+
 def descend(
     data: Any, path: Sequence[str], create: bool = False, defaults: Any = None
 ) -> tuple[Any, Any]:

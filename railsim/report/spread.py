@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 from railsim.definitions.study.analyses import unit_of_number
-from railsim.files.key_paths import AXES
+from railsim.files.key_paths import AXES, telling_end
 from railsim.notation import DECIMALS, QUANTITIES, Quantity
 from railsim.profiles.builtin import RAIL_HEADS
 from railsim.text import printable
@@ -67,11 +67,7 @@ def _short(name: str, names: Sequence[str]) -> str:
     parts = name.split(".")
     # of a vehicle also the part that has the value: `guide.stiffness.x`, `carbody.mass`
     least = 1 + (parts[0] == "vehicle") + (parts[-1] in AXES or parts[-1].isdecimal())
-    for number in range(least, len(parts)):
-        end = ".".join(parts[-number:])
-        if sum(f".{other}".endswith(f".{end}") for other in names) == 1:
-            return end
-    return name
+    return telling_end(name, names, least)
 
 
 def command(record: Record, inputs: Mapping[str, Any]) -> str:

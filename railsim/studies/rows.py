@@ -8,6 +8,7 @@ from itertools import product
 
 from railsim.definitions.study.definition import Sample, Spread
 from railsim.errors import argument_error
+from railsim.files.key_paths import telling_end
 from railsim.units import speed_in_si
 
 Grid = Mapping[str, Sequence[str]]
@@ -105,11 +106,13 @@ def suffix(point: Mapping[str, str]) -> str:
 
     >>> suffix({"track.friction": "0.3", "settings.drive.speed_table.0.1": "12"})
     '_friction=0.3_speed_table.0.1=12'
+    >>> suffix({"vehicle.a.stiffness.x": "2e6", "vehicle.b.stiffness.x": "3e6"})
+    '_a.stiffness.x=2e6_b.stiffness.x=3e6'
     """
-    last = {key: re.sub(r"^.*\.(?=[^.]*[^.\d])", "", key) for key in point}
-    unique = len(set(last.values())) == len(last)
-    parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
-    return "".join("_" + in_a_name(part) for part in parts)
+    # parts of the key from the last that is no index
+    least = {key: len(re.split(r"\.(?=[^.]*[^.\d])", key)[-1].split(".")) for key in point}
+    ends = {key: telling_end(key, point, least[key]) for key in point}
+    return "".join("_" + in_a_name(f"{ends[key]}={value}") for key, value in point.items())
 
 
 def in_a_name(text: str) -> str:
