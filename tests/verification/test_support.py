@@ -87,6 +87,46 @@ def loaded_wheelset(contact_damping, **support):
     return balance.model, balance.state
 
 
+def test_rails_and_sleepers_accelerate_as_their_matrices_say():
+    """M u'' = F - C u' - K u, matrices of the single springs; pads at 0.75 m from the middle."""
+    masses = {"rail_mass": 55.0, "sleeper_mass": 1200.0, "sleeper_inertia": 380.0}
+    springs = {
+        "pad_lateral": (25e6, 120e3), "pad_vertical": (130e6, 90e3),
+        "ballast_lateral": (60e6, 300e3), "ballast_vertical": (110e6, 1200e3),
+    }  # fmt: skip
+    pads, ballast, base, half = 1.4, 0.7, 0.62, 0.75
+    # stretches by y and z of the left and the right rail, y, z and roll of the sleeper
+    stretches = {
+        "pad_lateral": [[1, 0, 0, 0, -1, 0, 0], [0, 0, 1, 0, -1, 0, 0]],
+        "pad_vertical": [[0, 1, 0, 0, 0, -1, half], [0, 0, 0, 1, 0, -1, -half]],
+        "ballast_lateral": [[0, 0, 0, 0, 1, 0, 0]],
+        "ballast_vertical": [[0, 0, 0, 0, 0, 1, -base], [0, 0, 0, 0, 0, 1, base]],
+    }
+    factor = {name: pads if name.startswith("pad") else ballast for name in springs}
+    K, C = (
+        sum(factor[n] * springs[n][i] * np.transpose(w) @ np.array(w) for n, w in stretches.items())
+        for i in (0, 1)
+    )
+    mass = np.array([55.0] * 4 + [1200.0] * 2 + [380.0])
+    support = {"preset": "co-running", "ballast_base": base, "variation": [[0.0, pads, ballast]]}
+    model, rest = loaded_wheelset(0.0, **support, **masses, **springs)
+    system, random = model.system, np.random.default_rng(3)
+    for _ in range(5):
+        state = rest.copy()
+        tracks = state[support_begin(system) : -N_SCALARS].reshape(-1, SUPPORT_SIZE)
+        u, rate = tracks[:, :DOF], tracks[:, RATE : RATE + DOF]
+        u += random.normal(0.0, 2e-5, u.shape)
+        rate += random.normal(0.0, 3e-3, u.shape)
+        work, derivative = evaluate(system, state)
+        change = derivative[support_begin(system) : -N_SCALARS].reshape(tracks.shape)
+        force = -u @ K - rate @ C
+        force[:, [0, 2]] += work.wheel[..., W_Y]
+        force[:, [1, 3]] += work.wheel[..., W_Q]
+        np.testing.assert_array_equal(change[:, :DOF], rate)
+        found = change[:, RATE : RATE + DOF]
+        np.testing.assert_allclose(found, force / mass, atol=1e-10 * np.abs(found).max())
+
+
 def with_rails(system, height, slope, start=-10.0, ds=0.05, length=20.0):
     """System on straight track whose rails both lie lower by `height` (s), linear in each cell."""
     s = start + ds * np.arange(round(length / ds))
