@@ -1,8 +1,8 @@
 """A vehicle file's suspension, written anew from `docs/theory/elements.md`: its modes at rest.
 
 Parts are placed and mirrored from the file itself; elements are their energies, differentiated by
-complex steps.  Wheelsets are held, so that of an axlebox its pitch is left; or, without axleboxes,
-they roll along the track and follow the level of the rails.
+complex steps; friction sticks on its springs.  Wheelsets are held, so that of an axlebox its pitch
+is left; or, without axleboxes, they roll along the track and follow the level of the rails.
 """
 
 import numpy as np
@@ -19,6 +19,11 @@ def placed(group, origin=(0.0, 0.0, 0.0), along=1.0, prefix="", scopes=()):
     for kind in ("bodies", "wheelsets", "axleboxes", "elements"):
         for name, table in group.get(kind, {}).items():
             both = table.get("sides") == "both"
+            if table.get("kind") == "centre_plate":
+                yield from placed(
+                    {"elements": pads(name, table)}, origin, along, prefix, scopes[1:]
+                )
+                continue
             for side, sign in ((".right", 1.0), (".left", -1.0)) if both else (("", 1.0),):
                 one = table.get("point", table.get("position", (0.0, 0.0, 0.0)))
                 points = np.array(table.get("points", [one])) * [along, sign, 1.0]
@@ -28,6 +33,22 @@ def placed(group, origin=(0.0, 0.0, 0.0), along=1.0, prefix="", scopes=()):
             moved = np.array(place["position"]) * [along, 1.0, 1.0] + origin
             turned = along * (-1.0 if place["mirror"] else 1.0)
             yield from placed(assembly, moved, turned, prefix + place["name"] + ".", scopes)
+
+
+def pads(name, plate):
+    """Pads of a centre plate: Gauss's rule of two radii with the weight r dr, four at each."""
+    inner, outer = plate.get("inner_radius", 0.0), plate["radius"]
+    m0, m1, m2, m3 = ((outer**k - inner**k) / k for k in (2, 3, 4, 5))
+    linear, constant = np.linalg.solve([[m1, m0], [m2, m1]], [-m2, -m3])
+    radii = np.roots([1.0, linear, constant])
+    shares = np.linalg.solve([[1.0, 1.0], radii], [m0, m1]) / m0 / 4.0
+    found = {}
+    for i, (radius, share) in enumerate(zip(radii, shares, strict=True)):
+        for j, angle in enumerate(0.25 * np.pi * (i + np.arange(0, 8, 2))):
+            place = radius * np.array([np.cos(angle), np.sin(angle), 0.0]) + plate["point"]
+            scaled = {k: share * plate[k] for k in ("stiffness", "damping", "stick_stiffness")}
+            found[f"{name}{i}{j}"] = {**plate, "kind": "side_bearer", "point": place, **scaled}
+    return found
 
 
 def slope(table):
@@ -50,7 +71,8 @@ class Element:
 
     def __init__(self, table, ends):
         self.table, self.kind, self.ends = table, table["kind"], ends
-        self.load = 0.0  # vertical preload [N]
+        given = table.get("preload")
+        self.load = given if isinstance(given, float) else 0.0  # vertical preload [N]
         points = table["at"]
         if self.kind == "shear_spring":
             points = np.mean(points, axis=0, keepdims=True)
@@ -84,10 +106,21 @@ class Element:
         about = t.get("rotational_stiffness", np.zeros(3))
         if self.kind == "shear_spring":
             about = [*t["bending_stiffness"], t["torsional_stiffness"]]
-        return np.atleast_1d(t["stiffness"]) + slope(t.get("spring_table")), np.asarray(about)
+        return self.spring() + self.sticking(), np.asarray(about)
+
+    def spring(self):
+        """Stiffness along the axes without friction."""
+        upright = [0.0, 0.0, 1.0] if self.kind == "side_bearer" else 1.0
+        along = np.atleast_1d(self.table["stiffness"]) * upright
+        return along + slope(self.table.get("spring_table"))
+
+    def sticking(self):
+        """Stiffness of its friction along the axes."""
+        k = self.table.get("stick_stiffness", 0.0)
+        return np.array({"side_bearer": [k, k, 0.0], "wedge": np.append(0.0, k)}.get(self.kind, k))
 
     def vertical_stiffness(self):
-        t, along = self.table, self.stiffnesses()[0][-1]
+        t, along = self.table, self.stiffnesses()[0][-1] - np.atleast_1d(self.sticking())[-1]
         if self.kind == "airspring":
             k1, k2 = t["bellows_stiffness"], t["reservoir_stiffness"]
             return along + k1 * k2 / (k1 + k2)
@@ -126,6 +159,8 @@ class Element:
         if self.kind == "airspring":
             return [(along[k], t["horizontal_damping"][k], 0.0) for k in (0, 1)]
         damping = np.atleast_1d(t["damping"]) + slope(t.get("damper_table"))
+        if self.kind == "side_bearer":
+            along = along[2:]
         series = np.atleast_1d(t.get("series_stiffness", 0.0))
         rows = list(zip(along, damping, np.broadcast_to(series, damping.shape), strict=True))
         turned = zip(about, t.get("rotational_damping", np.zeros(3)), strict=True)
@@ -180,7 +215,9 @@ class Suspension:
         return found
 
     def _carry(self, weight, upright):
-        """Preloads that balance the weights with the least sum of F^2/k."""
+        """Preloads that balance the weights with the least sum of F^2/k, beside those given."""
+        for e in self.elements:
+            weight = weight - e.load * (e.rates()[0][-1] @ self.spread(e)) * upright
         carrying = [e for e in self.elements if e.table.get("preload") == "auto"]
         carrying = [e for e in carrying if e.vertical_stiffness() > 0.0]
         lift = np.array([e.rates()[0][-1] @ self.spread(e) for e in carrying]).T[upright]
