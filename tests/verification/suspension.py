@@ -135,6 +135,16 @@ class Element:
         spread = 0.5 * np.sum(about) - about
         return total + np.sum(spread) - np.einsum("i,...ii", spread, R)
 
+    def pull(self, q):
+        """Its forces on the coordinates at rest in `q`, of stops too."""
+        varied = q + 1j * STEP * np.eye(12)
+        if self.kind != "bump_stop":
+            return -self.energy(varied).imag / STEP
+        d = self.deflections(varied)[0][0][:, "xyz".index(self.table["axis"])]
+        rows = np.array(self.table["table"])
+        force = np.sign(d[0].real) * np.interp(np.abs(d[0].real), *rows.T)
+        return -force * d.imag / STEP
+
     def hessian(self):
         q = np.zeros((2, 12, 12, 12), complex)
         steps = np.arange(12)
@@ -194,15 +204,17 @@ class Suspension:
             (name for name, (kind, _) in bodies.items() if kind == "wheelsets"),
             key=lambda name: -self.at[name][0],
         )
-        self.elements = []
+        self.elements, self.stops = [], []  # those that modes find within their clearances
         for kind, name, table, scopes in parts:
-            if kind == "elements" and table["kind"] != "bump_stop":  # within their clearances
+            if kind == "elements":
                 side = name[name.rfind(".") :]
                 ends = [
                     next(s + n + e for s in scopes for e in (side, "") if s + n + e in bodies)
                     for n in table["bodies"]
                 ]
-                self.elements.append(Element(table, [(n, bodies[n][1]) for n in ends]))
+                group = self.stops if table["kind"] == "bump_stop" else self.elements
+                group.append(Element(table, [(n, bodies[n][1]) for n in ends]))
+        self.bodies = {name: table for name, (_, table) in bodies.items()}
         self._carry(np.array(weight), np.array(upright))
 
     def spread(self, element):
