@@ -250,7 +250,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
     about = evaluation.folder, wanted, designs, tuple(front), chosen
     found = Optimisation(
         *about,
-        _active(wanted, chosen) if chosen else (),
+        _active(wanted, chosen, designs) if chosen else (),
         tuple(_sensitivities(evaluation, chosen)) if chosen else (),
         tuple(export_vehicles(evaluation, chosen)) if chosen else (),
         evaluation.computed,
@@ -270,8 +270,8 @@ def _sensitivities(evaluation: Evaluation, chosen: Design) -> Sequence[Sensitivi
     return sensitivities(shares, columns, middle, list(wanted.variables), list(values))
 
 
-def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
-    """Return the bounds and limits that a design reaches."""
+def _active(wanted: Optimise, chosen: Design, designs: Sequence[Design]) -> tuple[str, ...]:
+    """Return the bounds and limits that a design reaches, limits of 0 by the range of `designs`."""
     found = []
     for path, variable in wanted.variables.items():
         share = share_of(variable, chosen.variables[path])
@@ -281,9 +281,12 @@ def _active(wanted: Optimise, chosen: Design) -> tuple[str, ...]:
         ):
             if distance <= NEAR_BOUND:
                 found.append(f"{path} at its {words} bound, {bound:.12g}")
-    for one, value in zip(wanted.constraints, chosen.constraints, strict=True):
+    number = len(wanted.constraints)
+    known = np.array([one.constraints for one in designs if not math.isnan(sum(one.constraints))])
+    ranges = np.ptp(known, axis=0) if len(known) else np.zeros(number)
+    for one, value, span in zip(wanted.constraints, chosen.constraints, ranges, strict=True):
         for words, limit in (("lower", one.low), ("upper", one.high)):
-            if limit is not None and abs(value - limit) <= NEAR_BOUND * (abs(limit) or 1.0):
+            if limit is not None and abs(value - limit) <= NEAR_BOUND * (abs(limit) or span):
                 unit = unit_of(one.quantity)
                 found.append(f"{name_of(one)} at its {words} limit, {limit:.12g} {unit}".rstrip())
     return tuple(found)

@@ -1,7 +1,7 @@
 """Sensitivities: tornado values and Sobol indices of an optimisation, from its surrogate.
 
 The surrogate uses all computed designs; no others are computed.  Its accuracy is given by the
-leave-one-out error over the standard deviation.
+leave-one-out error over the standard deviation, both over the full range of all variables.
 """
 
 from dataclasses import dataclass

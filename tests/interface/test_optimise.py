@@ -347,7 +347,7 @@ def test_bounds_and_limits_are_told_with_all_their_digits():
         }
     )
     chosen = Design(1, {X: 31391234.0}, (1234567.0,), (1234567.0,), feasible=True)
-    assert _active(wanted, chosen) == (
+    assert _active(wanted, chosen, [chosen]) == (
         f"{X} at its lower bound, 31391234",
         "curve.T_gamma at its upper limit, 1234567.5 N",
     )
@@ -363,7 +363,23 @@ def test_bounds_count_as_reached_within_2_per_cent_of_the_range(share, reached, 
             "objectives": [{"quantity": "curve.T_gamma"}],
         }
     )
-    assert bool(_active(wanted, Design(1, {X: value}, (0.0,), (), feasible=True))) is reached
+    chosen = Design(1, {X: value}, (0.0,), (), feasible=True)
+    assert bool(_active(wanted, chosen, [chosen])) is reached
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e6])
+@pytest.mark.parametrize(("share", "reached"), [(0.015, True), (0.025, False), (-0.015, True)])
+def test_a_limit_of_0_counts_as_reached_within_2_per_cent_of_the_range_of_the_designs(
+    unit, share, reached
+):
+    """In whatever unit; a design without values has no part in the range."""
+    limit = {"quantity": "curve.y", "high": 0.0}
+    variables, objectives = {X: {"low": 0.0, "high": 1.0}}, [{"quantity": "curve.y"}]
+    known = {"variables": variables, "objectives": objectives, "constraints": [limit]}
+    values = np.array([-0.7, -share, 0.3, np.nan]) * unit
+    designs = [Design(1, {X: 0.5}, (value,), (value,), feasible=True) for value in values]
+    found = _active(Optimise.model_validate(known), designs[1], designs)
+    assert found == (("curve.y at its upper limit, 0",) if reached else ())
 
 
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
