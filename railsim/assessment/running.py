@@ -281,6 +281,7 @@ def _remarks(
         for s in run.sections
         if not s.zone
     ]
+    found += [remark for zone in zones for remark in zone.undecided]
     if not all(row.checked for zone in zones for row in zone.rows):
         found.append(f"limits of {limits.edition} not checked against the printed standard")
     return tuple(dict.fromkeys(found))

@@ -25,6 +25,9 @@ WELL_SPREAD = 0.1
 """Range of the cant deficiency, as a share of the admissible one, from which the two-dimensional
 method is used."""
 
+BESIDE = 0.8 * WELL_SPREAD, 1.25 * WELL_SPREAD
+"""Ranges between which it is said where the other method would lead to another verdict."""
+
 ROUNDING = 1e-9
 """Share of a limit by which the rounding of a regression may miss it: on the limit is met."""
 
@@ -44,6 +47,8 @@ class Assessed:
     checked: bool = False  # whether the limit has been compared with the printed standard
     # before the correction for high friction, where that was made
     uncorrected: Estimate | None = None
+    # by the other method, where the choice of it is close and decides whether the limit is exceeded
+    other: Estimate | None = None
 
     @property
     def share(self) -> float:
@@ -125,6 +130,18 @@ class ZoneReport:
         return tuple(row for row in self.rows if row.exceeded)
 
     @property
+    def undecided(self) -> tuple[str, ...]:
+        """Remarks on the limits that are exceeded by one of the two methods only."""
+        return tuple(
+            f"{self.title}: {row.criterion.words}, {row.place}: {_by_method(row, row.estimate)}, "
+            f"{_by_method(row, row.other)}, limit {row.criterion.text(row.limit)}: the verdict "
+            f"depends on the method, which changes where cant deficiencies span {WELL_SPREAD:.0%} "
+            "of the admissible one"
+            for row in self.rows
+            if row.other
+        )
+
+    @property
     def radius(self) -> float:
         """Mean radius of the sections that count [m]."""
         return _mean_radius(self.values)
@@ -152,6 +169,11 @@ class ZoneReport:
             "quantities": [row.record() for row in self.rows],
             "information": [row.record() for row in self.information],
         }  # fmt: skip
+
+
+def _by_method(row: Assessed, estimate: Estimate) -> str:
+    value, unit = row.criterion.text(estimate.value), row.criterion.unit
+    return f"{METHODS[estimate.method]} {value} {unit}"
 
 
 def zone_reports(
@@ -189,6 +211,9 @@ def _mean_radius(values: Sequence[SectionValues]) -> float:
     return float(np.mean(radii)) if radii else math.nan
 
 
+Pairs = Sequence[tuple[float, list[float]]]  # cant deficiency and values of each section
+
+
 @dataclass(frozen=True)
 class _Pooled:
     """Values of the sections of one zone of a population, and what their estimates need."""
@@ -208,13 +233,18 @@ class _Pooled:
                     pairs[place].append((value.section.cant_deficiency, numbers))
         return [self._row(criterion, place, own) for place, own in pairs.items()]
 
-    def _row(
-        self, criterion: Criterion, place: str, pairs: Sequence[tuple[float, list[float]]]
-    ) -> Assessed:
+    def _row(self, criterion: Criterion, place: str, pairs: Pairs) -> Assessed:
+        row = self._judged(criterion, place, pairs, WELL_SPREAD)
+        others = (self._judged(criterion, place, pairs, border) for border in BESIDE)
+        differing = (one.estimate for one in others if one.exceeded != row.exceeded)
+        return replace(row, other=next(differing, None))
+
+    def _judged(self, criterion: Criterion, place: str, pairs: Pairs, border: float) -> Assessed:
+        """Estimate and limit, two-dimensional where cant deficiencies span `border` or more."""
         influence = np.array([deficiency for deficiency, _ in pairs])
         # the two signs of a section are not independent: each sign is a sample of its own
         signs = np.array([numbers for _, numbers in pairs]).T
-        estimate = _larger([self._estimate(criterion, influence, x) for x in signs])
+        estimate = _larger([self._estimate(criterion, influence, x, border) for x in signs])
         law = self.limits.limits.get(criterion.name)
         if law is None:
             return Assessed(criterion, place, estimate)
@@ -225,7 +255,7 @@ class _Pooled:
             corrected = self._less_high_friction(place, signs[0])
         if corrected is None:
             return row
-        after = self._estimate(criterion, influence, corrected)
+        after = self._estimate(criterion, influence, corrected, border)
         return replace(row, estimate=after, uncorrected=estimate)
 
     def _situation(self, place: str) -> Situation:
@@ -236,12 +266,14 @@ class _Pooled:
         at = self.service, self.zone, _mean_radius(self.values), wheelset, static
         return Situation(self.population.vehicle, *at, self.limits.limits)
 
-    def _estimate(self, criterion: Criterion, influence: Floats, values: Floats) -> Estimate:
+    def _estimate(
+        self, criterion: Criterion, influence: Floats, values: Floats, border: float
+    ) -> Estimate:
         kind = criterion.kind
         if kind in ("largest", "smallest"):
             return extreme(values, kind)
         statistics, most = self.limits.statistics, self.service.cant_deficiency
-        wide = float(np.ptp(influence)) >= WELL_SPREAD * most
+        wide = float(np.ptp(influence)) >= border * most
         if self.zone != "1" and wide and len(values) > 4:
             return two_dimensional(influence, values, most, getattr(statistics.probability, kind))
         return one_dimensional(values, getattr(statistics.k, kind))

@@ -197,3 +197,33 @@ def test_regression_over_several_influences_is_that_of_the_normal_equations():
     assert found.error == pytest.approx(np.sqrt(rest @ rest / (9 - 3 - 1)))
     assert found.determination == pytest.approx(1.0 - rest @ rest / np.sum((y - y.mean()) ** 2))
     assert found.value == pytest.approx(b[0] + target @ b[1:])
+
+
+@pytest.mark.parametrize(
+    ("millimetres", "most", "two", "said"),
+    [(14.9, 146e3, False, True), (15.1, 146e3, True, True), (15.1, 144e3, True, False),
+     (11.9, 146e3, False, False), (12.1, 146e3, False, True), (18.7, 146e3, True, True),
+     (18.8, 146e3, True, False)],
+)  # fmt: skip
+def test_a_verdict_that_depends_on_the_method_is_said_to(millimetres, most, two, said):
+    """Quasi-static loads that grow by 4 kN to `most` at the admissible 150 mm, limit 145 kN.
+
+    One-dimensional their mean, 2 kN less; two-dimensional the line at 150 mm, `most`.  The method
+    changes at 15 mm; a remark is due from 0.8 to 1.25 times that.
+    """
+    sections = [value.section for value in made("4", 9, 1e-3 * millimetres)]
+    loads = np.linspace(most, most - 4e3, 9).tolist()
+    values = [
+        SectionValues(section, {("Q_qst", "wheelset 1 outer"): [load]})
+        for section, load in zip(sections, loads, strict=True)
+    ]
+    service = Service(admissible_speed=40.0, cant_deficiency=0.15, category="passenger")
+    about = Population("", VEHICLE, Q0), values, sections, service, LIMITS
+    (report,) = zone_reports(*about, "normal")
+    assert report.rows[0].estimate.value == pytest.approx(most if two else most - 2e3)
+    assert bool(report.exceeded) is (two and most > 145e3)
+    assert len(report.undecided) == said
+    if said:
+        assert "146.00" in report.undecided[0]
+        assert "144.00" in report.undecided[0]
+        assert "limit 145.00" in report.undecided[0]
