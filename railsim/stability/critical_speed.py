@@ -33,7 +33,7 @@ from railsim.profiles import Profile
 from railsim.simulation.auxiliary_track import DOING
 from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.continuation import followed_branches
-from railsim.stability.diagram import diagram
+from railsim.stability.diagram import diagram, speeds_about
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.ramp import EXCITATIONS, SMALL, Progress, below, ramp, tops_above
 from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
@@ -44,8 +44,6 @@ AMPLITUDE_LIMIT = 3e-3  # m
 POINTS = 16  # speeds of a diagram
 LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
-NEAR = (0.8, 1.25)  # times the speeds where rest is left: where most of a diagram's stand ...
-SHARE = 0.75  # ... this share of them
 # damping of friction that slides, at least: with stuck friction sways of shipped wagons have -0.022
 SLIDING = 0.03
 AGAIN = 1.25  # ratio of speeds at which is looked whether rest is stable again
@@ -385,19 +383,6 @@ def _far_above(speed: float) -> float:
     return max(speed + 2.0, 1.05 * speed)
 
 
-def _speeds(found: CriticalSpeed, unstable: Sequence[float], points: int) -> list[float]:
-    """Speeds of a diagram: most of them where branches begin and end, the others above."""
-    low, high = found.low, found.high
-    if not unstable:
-        return list(np.linspace(low, high, points).tolist())
-    least, most = max(low, NEAR[0] * min(unstable)), min(high, NEAR[1] * max(unstable))
-    if most >= high or points < 4:
-        return list(np.linspace(least, high, points).tolist())
-    near = round(SHARE * points)
-    above = np.linspace(most, high, points - near + 1)[1:]
-    return [*np.linspace(least, most, near).tolist(), *above.tolist()]
-
-
 def _by_diagram(
     found: CriticalSpeed,
     motion: VehicleMotion,
@@ -406,7 +391,7 @@ def _by_diagram(
     excitations: Sequence[float],
     progress: Progress,
 ) -> None:
-    speeds = _speeds(found, unstable, points)
+    speeds = speeds_about(unstable, found.low, found.high, points)
     branches = diagram(motion, speeds, progress, excitations, found.low)
     if not branches[0].points:
         raise LeftRange(f"the vehicle derails at {speeds[0]:.4g} m/s, the lowest speed")
@@ -453,20 +438,25 @@ def _conclude(
 ) -> None:
     """Find type and limits from all branches.
 
-    Where rest is unstable at the lower end already, or nothing was seen to hunt where it becomes
-    so, the type is not known.
+    Where rest is unstable at the lower end already, nothing was seen to hunt where it becomes so,
+    or hunting on other branches was not sought, the type is not known.
     """
     lowest, at = found.lowest, begins.parameter
     already = begins.already or found.divergence
     if not found.nonlinear:
         return  # every method failed, as the remarks say
+    if only_from_rest := found.nonlinear.keys() == {"continuation"}:
+        found.remarks.append(
+            "continuation: only what begins where rest loses its stability was followed; other "
+            "motions, as on the flange, may last to lower speeds (bifurcation, ramp)"
+        )
     if lowest is None:
         found.type = "" if already or at is not None else "none"
     elif already or (at is not None and lowest.speed > _far_above(at)):
         found.type = found.onset
     elif at is None or lowest.speed < at - RESOLUTION or found.onset == "subcritical":
         found.type = "subcritical"
-    else:
+    elif not only_from_rest:
         found.type = "supercritical"
     force = _unstable_force(vehicle, prepared.Q0)
     # a ramp passes the end of a branch late

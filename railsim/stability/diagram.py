@@ -33,6 +33,20 @@ THRESHOLDS = 4  # speeds between the ends of two branches at which the unstable 
 HALVINGS = 6  # of the disturbance there
 MOST_LINGERING = 20  # s of a run that decides for one of two motions
 ARRIVED = 0.9  # share of the way between the two at which it has
+AROUND = (0.8, 1.25)  # times the speeds where rest is left: where most of a diagram's stand ...
+SHARE = 0.75  # ... this share of them
+
+
+def speeds_about(unstable: Sequence[float], low: float, high: float, points: int) -> list[float]:
+    """Speeds of a diagram: most of them where branches begin and end, the others above."""
+    if not unstable:
+        return list(np.linspace(low, high, points).tolist())
+    least, most = max(low, AROUND[0] * min(unstable)), min(high, AROUND[1] * max(unstable))
+    if most >= high or points < 4:
+        return list(np.linspace(least, high, points).tolist())
+    near = round(SHARE * points)
+    above = np.linspace(most, high, points - near + 1)[1:]
+    return [*np.linspace(least, most, near).tolist(), *above.tolist()]
 
 
 def diagram(

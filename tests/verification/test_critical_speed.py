@@ -26,10 +26,9 @@ from railsim.stability.critical_speed import (
     _by_continuation,
     _by_ramp,
     _remark_range,
-    _speeds,
     critical_speed,
 )
-from railsim.stability.diagram import diagram
+from railsim.stability.diagram import diagram, speeds_about
 from railsim.stability.motion import LeftRange, Stretch
 from railsim.stability.ramp import ramp, sustained
 from railsim.stability.result import Conicity, CriticalSpeed, OverAmplitude
@@ -79,8 +78,8 @@ def test_three_quarters_of_a_diagrams_speeds_lie_near_the_linear_critical_speed(
 
     Where a sway is undamped at 40 m/s as long as friction sticks, from 0.8 times that.
     """
-    assert _speeds(SimpleNamespace(low=20.0, high=120.0), [40.0, 60.0], 16)[0] == 32.0
-    speeds = _speeds(SimpleNamespace(low=20.0, high=120.0), [60.0], 16)
+    assert speeds_about([40.0, 60.0], 20.0, 120.0, 16)[0] == 32.0
+    speeds = speeds_about([60.0], 20.0, 120.0, 16)
     assert speeds[:12] == pytest.approx(np.linspace(48.0, 75.0, 12))
     assert speeds[12:] == pytest.approx([86.25, 97.5, 108.75, 120.0])
 
@@ -250,6 +249,25 @@ def test_what_a_ramp_alone_finds_counts_for_the_limits():
     CRITICAL._conclude(found, load_vehicle("coach_manchester"), begins, begins)
     assert found.amplitude_limit.speed == 25.6
     assert found.instability_limit.speed == 54.3
+
+
+@pytest.mark.parametrize(
+    ("slowest", "ramp", "kind"),
+    [(40.06, None, ""), (39.2, None, "subcritical"), (40.06, 39.8, "subcritical"),
+     (40.06, 40.1, "supercritical")],
+)  # fmt: skip
+def test_motions_that_begin_at_rest_alone_do_not_tell_that_nothing_hunts_below(slowest, ramp, kind):
+    """`coach_manchester` loses its stability at 40.1 m/s, and hunts on the flange from 39.8 m/s."""
+    found = CriticalSpeed(Contact("tangent", 3e-3, None), low=5.0, high=120.0)
+    found.nonlinear = {"continuation": Point(slowest, 1e-4, 4.6)}
+    if ramp is not None:
+        found.nonlinear["ramp"] = Point(ramp, 8e-3, 4.0)
+    found.onset = "supercritical"
+    found.branches = [Branch("continuation", [Point(45.0, 1e-3, 4.7)])]
+    begins = SimpleNamespace(Q0=np.full((4, 2), 7e4), already=False, parameter=40.1)
+    CRITICAL._conclude(found, load_vehicle("coach_manchester"), begins, begins)
+    assert found.type == kind
+    assert any("may last to lower speeds" in said for said in found.remarks) is (ramp is None)
 
 
 def test_branches_stand_in_a_dataset_as_they_were_found(monkeypatch):
