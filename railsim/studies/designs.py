@@ -69,6 +69,7 @@ class Evaluation:
         self.computed = 0
         self.designs: tuple[Design, ...] = ()
         self._margins = np.zeros((0, len(wanted.constraints)))
+        self._scales = np.ones(len(wanted.constraints))
         self._spec = StudySpec.of_file(definition, keep="summary")
         self._progress = execution.progress or (lambda _: None)
         self._execution = replace(execution, resume=not execution.overwrite)
@@ -119,8 +120,11 @@ class Evaluation:
             limits = (math.nan,) * len(worst) if bad else tuple(value for value, _ in worst)
             designs.append(Design(number, values, objectives, limits, fine, reason))
             margins.append(excess)
+        if not self.designs:
+            columns = zip(self.wanted.constraints, zip(*margins, strict=True), strict=True)
+            self._scales = np.array([_scale(one, column) for one, column in columns])
         self.designs = tuple(designs)
-        self._margins = np.array(margins, dtype=float).reshape(len(designs), -1)
+        self._margins = np.array(margins, dtype=float).reshape(len(designs), -1) / self._scales
 
 
 def _written(variable: Variable, share: float) -> str:
@@ -177,18 +181,32 @@ def _objective(one: Objective, rows: Rows) -> float:
 
 
 def _constraint(one: Constraint, rows: Rows) -> tuple[float, float]:
-    """Return the worst value, and its relative excess over the limit, negative within it."""
+    """Return the worst value, and its relative excess over the limit, negative within it.
+
+    Over a limit of 0 that over the other limit; if there is none the excess itself, see `_scale`.
+    """
     found = (math.nan, math.nan)
+    other = abs(one.low or 0.0) + abs(one.high or 0.0) or 1.0
     for value in _values(one, rows):
         if math.isnan(value):
             return math.nan, math.nan
         for limit, sign in ((one.high, 1.0), (one.low, -1.0)):
             if limit is None:
                 continue
-            beyond = sign * (value - limit) / (abs(limit) or 1.0)
+            beyond = sign * (value - limit) / (abs(limit) or other)
             if not beyond <= found[1]:
                 found = value, beyond
     return found
+
+
+def _scale(one: Constraint, excess: Sequence[float]) -> float:
+    """Return what the excess over a limit of 0 counts by: the largest of the first designs.
+
+    A search adds up the excess of all constraints, whatever their units.
+    """
+    if one.low or one.high:
+        return 1.0
+    return max((abs(x) for x in excess if not math.isnan(x)), default=0.0) or 1.0
 
 
 def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:

@@ -3,6 +3,7 @@
 import csv
 import json
 from contextlib import nullcontext as nothing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ import railsim
 from railsim.cli import main
 from railsim.definitions.loading import load_study, load_vehicle
 from railsim.definitions.study.design import Optimise
-from railsim.studies.designs import Design
+from railsim.studies import designs as DESIGNS
+from railsim.studies.designs import Design, Evaluation
 from railsim.studies.optimise import _active
+from railsim.studies.spec import Execution
 
 STUDY = """format = "railsim-study/1"
 name = "Primary stiffness in a curve"
@@ -380,6 +383,31 @@ def test_a_limit_of_0_counts_as_reached_within_2_per_cent_of_the_range_of_the_de
     designs = [Design(1, {X: 0.5}, (value,), (value,), feasible=True) for value in values]
     found = _active(Optimise.model_validate(known), designs[1], designs)
     assert found == (("curve.y at its upper limit, 0",) if reached else ())
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_excess_over_a_limit_of_0_does_not_depend_on_the_unit(tmp_path, monkeypatch, unit):
+    """-1, 0, 1 in some unit in the first designs, then 3; over limits of 0 and 5 it is 3/5."""
+    limits = "low = -0.0\n[[optimise.constraints]]\nquantity = 'curve.z'\nlow = 0.0\nhigh = 5.0"
+    study = load_study(written(tmp_path, STUDY.replace("high = 0.9", limits)))
+
+    def computed(spec, *_):
+        values = dict(zip(spec.linked[0][X], [-1.0, 0.0, 1.0, 3.0], strict=False))
+        quantities = {"curve.T_gamma": 1.0, "curve.attack": 1.0}
+        records = [
+            {"labels": {X: text}, "status": "complete",
+             "own": {**quantities, "curve.Y_over_Q": unit * value, "curve.z": -value}}
+            for text, value in values.items()
+        ]  # fmt: skip
+        return SimpleNamespace(records=records, computed=len(records))
+
+    monkeypatch.setattr(DESIGNS, "run_study", computed)
+    monkeypatch.setattr(DESIGNS, "summary_row", lambda record: record["own"])
+    evaluation = Evaluation(study, study.optimise, tmp_path, Execution())
+    first = evaluation(np.array([[0.1], [0.2], [0.3]]))
+    assert first.constraints == pytest.approx(np.array([[1.0, -0.2], [0.0, 0.0], [-1.0, 0.2]]))
+    assert evaluation(np.array([[0.4]])).constraints[3] == pytest.approx([-3.0, 0.6])
+    assert [design.feasible for design in evaluation.designs] == [False, True, False, False]
 
 
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
