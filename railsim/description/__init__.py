@@ -55,7 +55,10 @@ def describe(item: "FileDefinition | Result", speeds: Sequence[float | str] = ()
     if item.KIND == "study":
         study = cast("Study", item)
         data = {"kind": "study", "runs": study.runs, **study.model_dump(exclude_none=True)}
-        return Description(data, [f"{study.name}: {study.runs} runs", "", study.to_toml().rstrip()])
+        words = f"{study.runs} run{'s' * (study.runs != 1)}"
+        if study.optimise:
+            words = f"up to {study.optimise.evaluations} designs, {words} each"
+        return Description(data, [f"{study.name}: {words}", "", study.to_toml().rstrip()])
     return Description(data, [item.to_toml().rstrip()])
 
 

@@ -41,8 +41,9 @@ def library_entries(kind: str) -> list[dict[str, Any]]:
     else:
         word = KINDS[kind]
         for name, path in library_files(word).items():
-            title, letters = _title(_text_and_data(path)[1]), trust(text_with_bases(path, word))
-            rows.append((name, title, letters, str(path)))
+            # limits explain letters of their own, beside the source of each value
+            letters = "" if word == "limits" else trust(text_with_bases(path, word))
+            rows.append((name, _title(_text_and_data(path)[1]), letters, str(path)))
     names = ("name", "title", "trust", "file")
     return [{"kind": kind, **dict(zip(names, row, strict=True))} for row in rows]
 

@@ -8,6 +8,7 @@ import pytest
 from example_result import example_result
 
 from railsim import cli
+from railsim.cli import main
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.description.tracks import describe_track
 from railsim.plot.vehicle import vehicle_figure
@@ -362,3 +363,18 @@ def test_one_wheelset_has_no_empty_tables_and_no_floor_to_assess(tmp_path, capsy
     assert cli.main(["run", path, "straight", *more]) == 0
     assert cli.main(["assess", run, "--standard", "comfort"]) == 2
     assert "wheelsets alone" in capsys.readouterr().err
+
+
+def test_a_study_is_said_to_have_its_runs_and_an_optimisation_its_designs(tmp_path, capsys):
+    text = """format = "railsim-study/1"
+name = "one"
+vehicles = ["coach_manchester"]
+tracks = ["curve_r250"]
+speeds = [20.0]
+"""
+    search = "[optimise.variables]\n'vehicle.primary.stiffness.x' = { low = 1e6, high = 2e6 }\n"
+    search += "[[optimise.objectives]]\nquantity = 'Q_peak'\n"
+    for more, words in (("", "one: 1 run\n"), (search, "one: up to 80 designs, 1 run each\n")):
+        (tmp_path / "study.toml").write_text(text + more, encoding="utf-8")
+        assert main(["info", str(tmp_path / "study.toml")]) == 0
+        assert capsys.readouterr().out.startswith(words)

@@ -40,6 +40,13 @@ def test_springs_are_graded_by_most_of_their_numbers(capsys):
     }
 
 
+def test_limits_have_letters_of_their_own(capsys):
+    """Their [R] says "from memory", where that of vehicles is public code that names its source."""
+    assert main(["list", "limits", "--json"]) == 0
+    entries = json.loads(capsys.readouterr().out)
+    assert {entry["trust"] for entry in entries} == {""}
+
+
 def test_what_is_offered_as_a_measurement_is_one():
     """Not the track beside it, which `railsim identify` then refuses."""
     for name in shipped_names("measurement"):
