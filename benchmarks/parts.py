@@ -6,6 +6,7 @@ from typing import Any
 
 import loops
 import numpy as np
+from loops import Part
 from numpy.typing import NDArray
 
 from railsim.definitions.loading import load_track, load_vehicle
@@ -24,19 +25,17 @@ REPETITIONS = 50
 CALLS = 1000  # evaluations in one repetition: taking a System apart for a call is 10 us
 PATCHES = 10
 
-# part, and the names of the loops that measure it
-PARTS: tuple[tuple[str, str], ...] = (
-    ("track frames", "many_frames"),
-    ("kinematics", "many_kinematics"),
-    ("links", "many_links"),
-    ("mounts", "many_mounts"),
-    ("normal contact with table look-up", "many_normal_contacts"),
-    ("creepages, Kalker's coefficients", "many_creepages"),
-    ("FASTSIM 10 x 10", "many_fastsims"),
-    ("creep forces on the wheelsets", "many_creep_forces"),
-    ("dynamics", "many_dynamics"),
-)
-_BY_PATCHES = ("many_creepages", "many_fastsims", "many_creep_forces")
+PARTS = {
+    "track frames": Part.FRAMES,
+    "kinematics": Part.KINEMATICS,
+    "links": Part.LINKS,
+    "mounts": Part.MOUNTS,
+    "normal contact with table look-up": Part.NORMAL_CONTACT,
+    "creepages, Kalker's coefficients": Part.CREEPAGES,
+    "FASTSIM 10 x 10": Part.FASTSIM,
+    "creep forces on the wheelsets": Part.CREEP_FORCES,
+    "dynamics": Part.DYNAMICS,
+}
 
 
 def least_time(call: Callable[[], Any], repetitions: int, evaluations: int) -> float:
@@ -93,32 +92,34 @@ def right_hand_side_parts(
     model = prepared.model
     system, work = model.system, work_arrays(model.system)
     derivative = np.zeros_like(state)
-    loops.many_right_hand_sides(system, work, state, derivative, 1)
-    patches = loops.many_normal_contacts(system, work, state, derivative, 1)
-    # FASTSIM needs creepages, the rest the forces that belong to them
-    loops.many_right_hand_sides(system, work, state, derivative, 1)
 
-    def measured(name: str) -> float:
-        loop = getattr(loops, name)
-        what = patches if name in _BY_PATCHES else derivative
-        found = least_time(lambda: loop(system, work, state, what, CALLS), repetitions, CALLS)
+    def repeated(part: Part, patches: int = 0, n: int = 1) -> int:
+        return int(loops.many(int(part), system, work, state, derivative, patches, n))
+
+    repeated(Part.RIGHT_HAND_SIDE)
+    patches = repeated(Part.NORMAL_CONTACT)
+    # FASTSIM needs creepages, the rest the forces that belong to them
+    repeated(Part.RIGHT_HAND_SIDE)
+
+    def measured(part: Part) -> float:
+        found = least_time(lambda: repeated(part, patches, CALLS), repetitions, CALLS)
         # forces add up and columns are overwritten: start again
-        loops.many_right_hand_sides(system, work, state, derivative, 1)
+        repeated(Part.RIGHT_HAND_SIDE)
         return found
 
-    parts = {part: measured(name) for part, name in PARTS}
-    evaluation = measured("many_mechanics")
+    parts = {name: measured(part) for name, part in PARTS.items()}
+    evaluation = measured(Part.MECHANICS)
     return {
         "vehicle": vehicle,
         "place": distance,
         "patches": patches,
-        "right_hand_side": measured("many_right_hand_sides"),
+        "right_hand_side": measured(Part.RIGHT_HAND_SIDE),
         "evaluation": evaluation,
-        "wheel_rail": measured("many_wheel_rail"),
+        "wheel_rail": measured(Part.WHEEL_RAIL),
         "parts": parts,
         "rest": evaluation - sum(parts.values()),
         "step": _step_time(prepared, state, repetitions),
-        "look_up": measured("many_look_ups"),
+        "look_up": measured(Part.LOOK_UP),
     }
 
 
