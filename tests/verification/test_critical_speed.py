@@ -475,7 +475,7 @@ def test_progress_names_each_method(monkeypatch, caplog):
         monkeypatch.setattr(CRITICAL, name, lambda *arguments: arguments[-1](1.0))
     monkeypatch.setattr(CRITICAL, "_conclude", lambda *_: None)
     caplog.set_level("INFO", "railsim.doing")
-    coach, law, told = load_vehicle("cooperrider_vehicle"), railsim.Settings(creep_law="polach"), []
+    coach, law, told = load_vehicle("coach_manchester"), railsim.Settings(creep_law="polach"), []
     how = {"settings": law, "over_amplitude": False, "progress": told.append}
     critical_speed(coach, RIGID, methods=CRITICAL.METHODS, **how)
     methods = ("ramp", "bifurcation", "continuation")
