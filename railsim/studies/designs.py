@@ -37,6 +37,7 @@ class Design:
     constraints: tuple[float, ...]  # worst value of the quantity of each [SI]
     feasible: bool  # all values exist and all constraints are met
     reason: str = ""  # why there are no values
+    excess: float = math.nan  # the largest over a limit, as a search counts it; NaN without values
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -123,8 +124,10 @@ class Evaluation:
         if not self.designs:
             columns = zip(self.wanted.constraints, zip(*margins, strict=True), strict=True)
             self._scales = np.array([_scale(one, column) for one, column in columns])
-        self.designs = tuple(designs)
         self._margins = np.array(margins, dtype=float).reshape(len(designs), -1) / self._scales
+        most = self._margins.max(axis=1, initial=-math.inf).tolist()
+        pairs = zip(designs, most, strict=True)
+        self.designs = tuple(replace(design, excess=excess) for design, excess in pairs)
 
 
 def _written(variable: Variable, share: float) -> str:

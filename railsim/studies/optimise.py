@@ -100,23 +100,31 @@ class Optimisation:
         if self.chosen is None:
             reasons = {design.reason for design in self.designs if design.reason}
             why = f": {sorted(reasons)[0]}" if reasons else ""
-            return [f"none of {len(self.designs)} designs keeps all constraints{why}"]
+            words = f"none of {len(self.designs)} designs keeps all constraints{why}"
+            known = [design for design in self.designs if math.isfinite(design.excess)]
+            if not known:
+                return [words]
+            nearest = min(known, key=lambda design: design.excess)
+            return [words, "", self._shown([nearest], "nearest")]
         shown = [*self.front[:: max(1, math.ceil(len(self.front) / MOST_ROWS))]]
         if self.chosen not in shown:
             shown.append(self.chosen)
-        designs, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
-        rows = [
-            ["chosen" if design is self.chosen else "", *designs.rows[design.number - 1][:-ends]]
-            for design in shown
-        ]
-        table = Table(["", *designs.columns[:-ends]], rows)
-        parts: list[str | Table] = [
-            f"front of {len(self.front)} in {len(self.designs)} designs", "", table, ""
-        ]  # fmt: skip
+        number = f"front of {len(self.front)} in {len(self.designs)} designs"
+        parts: list[str | Table] = [number, "", self._shown(shown, "chosen"), ""]
         parts += [f"remark: {self.chosen.remark}"] * bool(self.chosen.remark)
         parts += [f"active (within {NEAR_BOUND:.0%}): {words}" for words in self.active]
         parts += [one.sentence() for one in self.sensitivities]
         return [*parts, *map(str, self.vehicles), str(self.folder / "front.png")]
+
+    def _shown(self, shown: Sequence[Design], mark: str) -> Table:
+        """Some rows of the table; `mark` stands beside the last design or the chosen one."""
+        designs, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
+        marked = self.chosen or shown[-1]
+        rows = [
+            [mark if design is marked else "", *designs.rows[design.number - 1][:-ends]]
+            for design in shown
+        ]
+        return Table(["", *designs.columns[:-ends]], rows)
 
     def record(self) -> dict[str, Any]:
         """Return everything as plain data [SI]."""

@@ -337,6 +337,14 @@ def test_a_chosen_design_beyond_a_limit_is_said_to_be(tmp_path, capsys):
     assert record["front"] == []
     assert record["chosen"]["feasible"] is False
     assert f"\n# {words}\n" in (tmp_path / "o" / "mine_chosen.toml").read_text()
+    # without a choice the one with the smaller Y/Q is shown
+    assert main([*command, "--evaluations", "2"]) == 0
+    said, *_, row = capsys.readouterr().out.splitlines()
+    with open(tmp_path / "o" / "designs.csv", encoding="utf-8") as stream:
+        designs = list(csv.DictReader(stream))
+    least = min(designs, key=lambda design: float(design["curve.Y_over_Q"]))
+    assert said == "none of 2 designs keeps all constraints"
+    assert row.split()[:2] == ["nearest", least["design"]]
 
 
 def test_bounds_and_limits_are_told_with_all_their_digits():
@@ -408,6 +416,7 @@ def test_excess_over_a_limit_of_0_does_not_depend_on_the_unit(tmp_path, monkeypa
     assert first.constraints == pytest.approx(np.array([[1.0, -0.2], [0.0, 0.0], [-1.0, 0.2]]))
     assert evaluation(np.array([[0.4]])).constraints[3] == pytest.approx([-3.0, 0.6])
     assert [design.feasible for design in evaluation.designs] == [False, True, False, False]
+    assert [design.excess for design in evaluation.designs] == pytest.approx([1.0, 0.0, 0.2, 0.6])
 
 
 def test_a_study_says_that_it_does_not_optimise(tmp_path, capsys):
