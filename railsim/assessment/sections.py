@@ -22,7 +22,7 @@ from railsim.notation import SIDES
 from railsim.table import beside, beside_ends
 
 ROUNDING = 1e-6
-"""Of speeds [m/s] and cant deficiencies [m]: what was asked for is met."""
+"""Of speeds [m/s], cant deficiencies and places [m]: what was asked for is met."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def own_sections(
         zone = limits.zones.get(name)
         if zone and zone.radius and math.isinf(radius):  # neither wheel is the outer one
             zone, why = None, [f"given as of zone {name}, but straight"]
-        elif not begin - 1e-6 <= one.begin < one.end <= end + 1e-6:
+        elif not begin - ROUNDING <= one.begin < one.end <= end + ROUNDING:
             why = [f"not within {begin:.0f} to {end:.0f} m of constant curvature and cant"]
         elif zone is None:
             why = [f"no zone has the radius {abs(radius):.6g} m"]

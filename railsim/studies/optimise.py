@@ -105,21 +105,20 @@ class Optimisation:
             if not known:
                 return [words]
             nearest = min(known, key=lambda design: design.excess)
-            return [words, "", self._shown([nearest], "nearest")]
+            return [words, "", self._shown([nearest], nearest, "nearest")]
         shown = [*self.front[:: max(1, math.ceil(len(self.front) / MOST_ROWS))]]
         if self.chosen not in shown:
             shown.append(self.chosen)
         number = f"front of {len(self.front)} in {len(self.designs)} designs"
-        parts: list[str | Table] = [number, "", self._shown(shown, "chosen"), ""]
+        parts: list[str | Table] = [number, "", self._shown(shown, self.chosen, "chosen"), ""]
         parts += [f"remark: {self.chosen.remark}"] * bool(self.chosen.remark)
         parts += [f"active (within {NEAR_BOUND:.0%}): {words}" for words in self.active]
         parts += [one.sentence() for one in self.sensitivities]
         return [*parts, *map(str, self.vehicles), str(self.folder / "front.png")]
 
-    def _shown(self, shown: Sequence[Design], mark: str) -> Table:
-        """Some rows of the table; `mark` stands beside the last design or the chosen one."""
+    def _shown(self, shown: Sequence[Design], marked: Design, mark: str) -> Table:
+        """Some rows of the table, `mark` beside one of them."""
         designs, ends = self.table(), 3  # feasible, front and reason are for spreadsheets
-        marked = self.chosen or shown[-1]
         rows = [
             [mark if design is marked else "", *designs.rows[design.number - 1][:-ends]]
             for design in shown
