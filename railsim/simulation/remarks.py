@@ -165,14 +165,14 @@ def lifted_wheels(
 
 
 def stability(swings: Hunting | None, extremes: Mapping[str, Floats], duration: float) -> str:
-    """Remark on a vehicle that hunts, or that nothing has disturbed during the run [s]."""
+    """Remark on a vehicle that hunts, or that nothing has disturbed laterally in the run [s]."""
     if swings is not None:
         return swings.sentence
     if duration < LONG or not np.max(np.abs(extremes["wheelset_lateral"])) < UNDISTURBED:
         return ""
     return (
-        "Nothing disturbs the vehicle: no curve, no irregularity, no initial displacement. This "
-        "run proves nothing about its stability."
+        "Nothing disturbs the vehicle laterally: its wheelsets stay in the middle of the track, "
+        "and the run proves nothing about its stability."
     )
 
 

@@ -158,4 +158,4 @@ def test_each_remark_is_logged_once_and_what_was_asked_for_is_not(caplog):
     low_passed = [remark for remark in result.remarks if "low-pass" in remark]
     assert len(low_passed) == 1
     assert sorted(logged) == sorted(set(result.remarks) - set(low_passed))
-    assert any("Nothing disturbs the vehicle" in remark for remark in logged)
+    assert any("Nothing disturbs the vehicle laterally" in remark for remark in logged)
