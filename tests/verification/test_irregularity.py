@@ -118,6 +118,50 @@ def test_spectrum_of_a_long_track_is_the_given_one():
     assert np.percentile(ratio, [5, 95]) == pytest.approx([1.0, 1.0], abs=0.4)
 
 
+def test_rails_are_correlated_as_independent_channels_say():
+    """Mean of 24 seeds: both rails follow alignment and level, half of gauge and cross level apart.
+
+    Of products of independent channels a share of 0.03 of the variances is left.
+    """
+    s = 0.35 * np.arange(4000)
+    spectrum, found = SPECTRA["erri_b176_low"], np.zeros((4, 4))
+    for seed in range(24):
+        part = rails(track(random(seed=seed, end=1400.0)), s)[0][:4]
+        found += part @ part.T / s.size / 24.0
+    a, v, c, g = (spectrum.band_variance(channel, (3.0, 70.0)) for channel in CHANNELS)
+    c, g = 0.75**2 * c, 0.25 * g  # of one rail
+    expected = np.diag([a + g, v + c, a + g, v + c])
+    expected[[0, 2], [2, 0]], expected[[1, 3], [3, 1]] = a - g, v - c
+    size = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
+    np.testing.assert_allclose(found / size, expected / size, atol=0.05)
+
+
+# class: A_v, A_a [cm2 rad/m], omega_s [rad/m]; omega_c = 0.8245 rad/m: the published table, written
+# down a second time, from memory, without the first
+FRA = {
+    1: (1.2107, 3.3634, 0.6046),
+    2: (1.0181, 1.2107, 0.9308),
+    3: (0.6816, 0.4128, 0.8520),
+    4: (0.5376, 0.3027, 1.1312),
+    5: (0.2095, 0.0762, 0.8209),
+    6: (0.0339, 0.0339, 0.4380),
+}
+
+
+@pytest.mark.parametrize("number", FRA)
+def test_american_spectra_are_those_of_their_table(number):
+    """k = 1/4; cross level and gauge with 4 k A_v; all one-sided, over rad/m."""
+    A_v, A_a, omega_s = FRA[number]
+    w = np.geomspace(0.05, 3.0, 40)
+    single = 0.25e-4 * 0.8245**2 / (w**2 * (w**2 + 0.8245**2))
+    double = 1e-4 * A_v * 0.8245**2 / ((w**2 + 0.8245**2) * (w**2 + omega_s**2))
+    density = SPECTRA[f"fra_{number}"].density
+    np.testing.assert_allclose(density("vertical", w), A_v * single, rtol=1e-9)
+    np.testing.assert_allclose(density("lateral", w), A_a * single, rtol=1e-9)
+    np.testing.assert_allclose(density("cross_level", w), double / 1.5**2, rtol=1e-9)
+    np.testing.assert_allclose(density("gauge", w), double, rtol=1e-9)
+
+
 def test_same_seed_gives_the_same_track_and_another_seed_another():
     s = np.linspace(0.0, 500.0, 300)
     first, again, other = (rails(track(random(seed=seed)), s)[0] for seed in (7, 7, 8))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from railsim.errors import ModelError
 from railsim.springs import helical
@@ -35,6 +36,27 @@ def test_smooth_form_equals_printed_form_under_load(spring, fraction):
     # the printed form cancels about four digits at these loads
     assert helical.beam_stiffnesses(K_V, D, H0, fraction * H0, NU)[0] == pytest.approx(C_q, 1e-11)
     assert helical.beam_stiffnesses(K_V, D, H0, fraction * H0, NU)[1] == pytest.approx(C_r, 1e-11)
+
+
+@pytest.mark.parametrize("spring", SPRINGS)
+@pytest.mark.parametrize("fraction", [0.05, 0.2, 0.4])
+def test_stiffnesses_are_those_of_the_differential_equations_of_a_column(spring, fraction):
+    """Haringx (1948): y' = psi + (H + F psi)/S, B psi' = M, M' = -H - F y', clamped at one end."""
+    K_V, D, H0 = spring
+    F, Hs = K_V * fraction * H0, (1.0 - fraction) * H0
+    B = (1.0 + NU) * D**2 * K_V * Hs / (4.0 + 2.0 * NU)
+    S = 2.0 * (1.0 + NU) * K_V * Hs
+    slope = np.array([0.0, 1.0 + F / S, 0.0, 1.0 / S])
+    bend = np.array([0.0, 0.0, 1.0 / B, 0.0])
+    over = expm(Hs * np.array([slope, bend, -F * slope - [0.0, 0.0, 0.0, 1.0], np.zeros(4)]))
+    # M at the clamped end and H that displace the other end, that tilt it
+    displaced, tilted = np.linalg.inv(over[:2, 2:]).T
+    C_q, C_r = helical.beam_stiffnesses(K_V, D, H0, fraction * H0, NU)
+    assert C_q == pytest.approx(displaced[1], rel=1e-9)
+    assert C_r == pytest.approx(over[2, 2:] @ tilted, rel=1e-9)
+    # the moment that a displaced seat needs, and by reciprocity the force that a tilted one needs
+    assert over[2, 2:] @ displaced == pytest.approx(-0.5 * (F + C_q * Hs), rel=1e-9)
+    assert tilted[1] == pytest.approx(-0.5 * (F + C_q * Hs), rel=1e-9)
 
 
 @given(K_V=stiffnesses, D=diameters, H0=heights, load=st.floats(0.0, 1e-9))
