@@ -1,7 +1,7 @@
 """Torques on wheelsets: reaction, traction, load transfer, slip control, nose-suspended motor.
 
 A bogie alone: a frame on four springs, two driven wheelsets.  The frame's x is held, which takes
-the traction at the height of its centre of gravity.
+the traction at the height of its centre of gravity.  And a coach under brakes and in a side wind.
 """
 
 from functools import cache
@@ -184,6 +184,57 @@ def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back():
     assert np.all((rim > -1e-3) & (rim < 0.1))
     assert on_wheels(result)[-1] == pytest.approx(-0.1 * np.sum(result["Q"][-1], axis=1), rel=0.02)
     assert result["axle_torque"][-1] == pytest.approx(on_wheels(result)[-1] * RADIUS, rel=0.01)
+
+
+# of the coach's bodies in the order of the results: mass, height, place from the middle [kg, m]
+COACH = np.array(
+    [[43628.0, 1.8, 0.0], [2615.0, 0.6, 9.5], [2615.0, 0.6, -9.5]]
+    + [[1813.0, RADIUS, x] for x in (10.78, 8.22, -8.22, -10.78)]
+)
+SPIN = 112.0  # kg m2, of a wheelset
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_wheel_loads_of_a_braked_coach():
+    """By hand: V' = -4 T/r over all inertia; the loads' moment is V' (sum m h + 4 I/r).
+
+    Braking adds to the front bogie's loads.  Within 0.5 %, 0.1 % of it a resistance of 20 N.
+    """
+    coach = railsim.load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    drive = traction(kind="brake", demand_table=[[0.0, 0.0], [2.2, 1.0]])
+    coach["assemblies"]["bogie"]["assemblies"]["axle"]["elements"]["drive"] = drive
+    result = run(Vehicle.model_validate(coach), speed=20.0, duration=8.0, drive={"mode": "free"})
+    mass, height, place = COACH.T
+    rate = -4.0 * TORQUE / RADIUS / (mass.sum() + 4.0 * SPIN / RADIUS**2)
+    late = result.time > 5.0
+    x = place + result.body_position[late, :, 0].mean(axis=0)
+    loads = result.Q[late].sum(axis=2).mean(axis=0)
+    moment = 9.81 * np.sum(mass * x) - np.sum(loads * x[3:])
+    assert moment == pytest.approx(rate * (np.sum(mass * height) + 4.0 * SPIN / RADIUS), rel=5e-3)
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_wheel_loads_of_a_coach_in_a_side_wind():
+    """Moment about the track's middle of wind, weights and loads = sum(I roll'' + m h y'')."""
+    force, above = 20e3, 2.3
+    coach = railsim.load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    wind = {"kind": "applied_force", "bodies": ["carbody"], "point": [0.0, 0.0, -above]}
+    table = [[0.0] * 4, [2.0, 0.0, force, 0.0]]
+    coach["elements"] = {"wind": {**wind, "axes": "track", "force_table": table}}
+    result = run(Vehicle.model_validate(coach), speed=20.0, duration=6.0)
+    blown = result.time > 2.0
+    mass, height, _ = COACH.T
+    roll_inertia = np.array([56800.0, 1722.0, 1722.0] + [1120.0] * 4)
+    y = result.body_position[blown, :, 1]
+    touch = result.contact_y[blown] + y[:, 3:, None]
+    loads = np.sum(result.Q[blown] * touch, axis=(1, 2))
+    moment = force * above + 9.81 * y @ mass - loads
+    turning = result.body_acceleration[blown, :, 3] @ roll_inertia
+    turning += result.body_acceleration[blown, :, 1] @ (mass * height)
+    np.testing.assert_allclose(moment, turning, atol=2e-4 * np.max(loads))
+    assert y[-1, 0] > 0.05  # the car leans: its weight has a third of the moment
+    across = result.body_acceleration[blown, :, 1] @ mass
+    np.testing.assert_allclose(result.sum_Y[blown].sum(axis=1), force - across, atol=1e-3 * force)
 
 
 def test_locked_wheelsets_of_a_coach_stand_still():

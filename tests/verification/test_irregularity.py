@@ -123,7 +123,7 @@ def test_rails_are_correlated_as_independent_channels_say():
 
     Of products of independent channels a share of 0.03 of the variances is left.
     """
-    s = 0.35 * np.arange(4000)
+    s = 0.7 * np.arange(2000)
     spectrum, found = SPECTRA["erri_b176_low"], np.zeros((4, 4))
     for seed in range(24):
         part = rails(track(random(seed=seed, end=1400.0)), s)[0][:4]
