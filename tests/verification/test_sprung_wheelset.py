@@ -5,6 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import railsim
+from railsim.contact.hertzian import hertz
+from railsim.contact.kalker import kalker_coefficients
 from railsim.definitions.track.support import PRESETS
 from railsim.definitions.vehicle.definition import Vehicle
 
@@ -34,14 +36,14 @@ SUSPENSION = {
 }
 
 
-def sprung_wheelset():
+def sprung_wheelset(wheelset=WHEELSET, load=LOAD, suspension=SUSPENSION):
     return Vehicle.model_validate(
         {
             "format": "railsim-vehicle/1",
             "name": "sprung wheelset",
-            "wheelsets": {"wheelset": WHEELSET},
-            "bodies": {"load": LOAD},
-            "elements": {"suspension": SUSPENSION},
+            "wheelsets": {"wheelset": wheelset},
+            "bodies": {"load": load},
+            "elements": {"suspension": suspension},
         }
     )
 
@@ -92,6 +94,80 @@ def test_wheel_loads_and_accelerations_on_random_rails(preset):
         assert np.std(error) < 0.01 * rms
         # some 60 waves pass: their amplitudes are given, what they add up to over a part is not
         assert np.std(expected) == pytest.approx(rms, rel=0.1)
+
+
+CONE, HALF_TRACK, CROWN = (
+    0.05,
+    0.75,
+    0.3,
+)  # slope of the wheels, half the distance of contacts, rail
+LATERAL, LONGITUDINAL = 2e6, 5e6  # N/m, springs on either side, 1 m from the middle
+
+
+def lateral_response(omega, speed, load):
+    """Displacement [m] and yaw [rad] of a coned wheelset on springs over the alignment.
+
+    Wickens (2003), ch. 2 and 3: roll and conicity of cones on round rails, linear creep, spin.
+    """
+    radius, inertia = 0.46, 1120.0
+    G, nu = 8.2e10, 0.28
+    ellipse = hertz(0.5 / radius, 0.5 / CROWN, load, 2.0 * G * (1.0 + nu), nu)
+    area = ellipse.a * ellipse.b
+    C11, C22, C23 = kalker_coefficients(ellipse.a / ellipse.b, nu)[:3]
+    f11, f22, f23 = G * area * C11, G * area * C22, G * area**1.5 * C23
+    rolls = -CONE / (HALF_TRACK - radius * CONE)  # per displacement against the rails
+    conicity = -rolls * (HALF_TRACK + CROWN * CONE)
+    s, arm = 1j * omega, 1.0 - radius * rolls
+    # creepages of y, of the rails' y and of yaw: the contact is below the axle, which rolls
+    across = [s * arm / speed, s * radius * rolls / speed, -1.0]
+    spin = [rolls / radius, -rolls / radius, s / speed]
+    creep = [2.0 * (f22 * a + f23 * b) for a, b in zip(across, spin, strict=True)]
+    weight = 4.0 * load * CONE / HALF_TRACK  # gravitational stiffness
+    steer = 2.0 * HALF_TRACK * f11 * conicity / radius
+    turn = 2.0 * f23
+    y = -2.0 * WHEEL * omega**2 - inertia * rolls**2 * omega**2 + 2.0 * LATERAL
+    matrix = np.array([
+        [y + arm * creep[0] + weight, arm * creep[2]],
+        [steer - turn * across[0], -inertia * omega**2 + 2.0 * LONGITUDINAL
+         + 2.0 * HALF_TRACK**2 * f11 * s / speed - turn * across[2]],
+    ])  # fmt: skip
+    rails = np.array([weight - arm * creep[1] - inertia * rolls**2 * omega**2,
+                      steer + turn * across[1]])  # fmt: skip
+    return np.linalg.solve(matrix, rails)
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_a_coned_wheelset_on_springs_follows_random_alignment():
+    """Almost without friction limit: linear theory; the car is held, the springs carry it."""
+    suspension = SUSPENSION | {
+        "stiffness": [LONGITUDINAL, LATERAL, SPRING],
+        "damping": [0.0, 0.0, DAMPER],
+        "rotational_stiffness": [0.0, 0.0, 0.0],
+        "preload": [0.0, 0.0, -SPRUNG * 9.81],
+    }
+    vehicle = sprung_wheelset(
+        wheelset=WHEELSET | {"profile": "cone_1in20"},
+        load=LOAD | {"fixed": "track"},
+        suspension=suspension,
+    )
+    waves = {"spectrum": "erri_b176_low", "wavelengths": (3.0, 30.0), "channels": ["lateral"]}
+    track = railsim.load_track("straight").replace(
+        support={"preset": "rigid"},
+        inclination=CONE,
+        friction=(20.0, 20.0),
+        irregularities=[{"type": "random", "end": 400.0, "scale": 0.1, **waves}],
+    )
+    settings = railsim.Settings(creep_law="linear", output_rate=500.0, outputs={"track": True})
+    result = railsim.simulate(vehicle, track, speed=SPEED, duration=12.0, settings=settings)
+    rails = result["rail_lateral"][:, 0].mean(axis=1)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(rails.size, 1.0 / 500.0)
+    lines = np.fft.rfft(rails)
+    gains = np.array([lateral_response(w, SPEED, (WHEEL + SPRUNG) * 9.81) for w in omega])
+    within = (result.distance > 50.0) & (result.distance < 280.0)
+    found = result.wheelset_lateral[:, 0] + rails, result.wheelset_yaw[:, 0]
+    for values, gain in zip(found, gains.T, strict=True):
+        expected = np.fft.irfft(gain * lines, rails.size)[within]
+        assert np.std(values[within] - expected) < 0.02 * np.std(expected)
 
 
 @pytest.mark.usefixtures("small_contact_tables")
