@@ -1,5 +1,6 @@
 """Support of the rails as a track file says it: presets, single keys, contradictions."""
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -63,3 +64,17 @@ def test_slab_is_its_fastenings_in_the_static_shape_of_the_beam():
     slab = PRESETS["slab"]
     assert slab.pad_vertical == pytest.approx((stiffness, 1.5 * length * 52e3 / 0.63), rel=1e-3)
     assert slab.rail_mass == pytest.approx(1.5 * length * 60.64, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("hertz", "share"), [(1.0, 1.0), (30.0, 0.994), (100.0, 0.924), (200.0, 0.824), (700.0, 1.526)]
+)
+def test_how_far_the_slab_track_is_a_beam_on_a_foundation(hertz, share):
+    """Dynamic stiffness over that of an endless beam, 8 E I beta^3 (Grassie et al. 1982)."""
+    bending, rail, foundation, damping = 2.059e11 * 3.217e-5, 60.64, 40e6 / 0.63, 52e3 / 0.63
+    omega = 2.0 * np.pi * hertz
+    beta = ((foundation + 1j * omega * damping - rail * omega**2) / (4.0 * bending)) ** 0.25
+    slab = PRESETS["slab"]
+    stiffness, damper = slab.pad_vertical
+    found = stiffness + 1j * omega * damper - slab.rail_mass * omega**2
+    assert abs(found / (8.0 * bending * beta**3)) == pytest.approx(share, abs=2e-3)
