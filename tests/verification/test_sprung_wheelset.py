@@ -96,11 +96,8 @@ def test_wheel_loads_and_accelerations_on_random_rails(preset):
         assert np.std(expected) == pytest.approx(rms, rel=0.1)
 
 
-CONE, HALF_TRACK, CROWN = (
-    0.05,
-    0.75,
-    0.3,
-)  # slope of the wheels, half the distance of contacts, rail
+CONE = 0.05  # slope of the wheels
+HALF_TRACK, CROWN = 0.75, 0.3  # m, half the distance of the contacts, radius of the rails' tops
 LATERAL, LONGITUDINAL = 2e6, 5e6  # N/m, springs on either side, 1 m from the middle
 
 
@@ -120,7 +117,7 @@ def lateral_response(omega, speed, load):
     s, arm = 1j * omega, 1.0 - radius * rolls
     # creepages of y, of the rails' y and of yaw: the contact is below the axle, which rolls
     across = [s * arm / speed, s * radius * rolls / speed, -1.0]
-    spin = [rolls / radius, -rolls / radius, s / speed]
+    spin = [0.0, 0.0, s / speed]  # a cone's angle to its axle is the same everywhere
     creep = [2.0 * (f22 * a + f23 * b) for a, b in zip(across, spin, strict=True)]
     weight = 4.0 * load * CONE / HALF_TRACK  # gravitational stiffness
     steer = 2.0 * HALF_TRACK * f11 * conicity / radius
