@@ -17,7 +17,7 @@ so that a motion along the path has just these forces, and the tangent is the li
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError, argument_error
 from railsim.linear.coordinates import FreeVehicle
 from railsim.notation import ROLL, Y, Z
@@ -35,8 +35,8 @@ class ContactPath:
     def __init__(self, amplitude: float) -> None:
         self.amplitude = amplitude
         # where the path was found last, and the slopes there: the next speed's are near
-        self._known: dict[tuple[int, float], Floats] = {}
-        self._slopes: dict[tuple[int, float], Floats] = {}
+        self._known: dict[float, Floats] = {}
+        self._slopes: dict[float, Floats] = {}
 
     def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
         """Return the matrix of a linearisation with the columns of y replaced.
@@ -44,66 +44,70 @@ class ContactPath:
         `tangent`: its tangent matrix. Raises InputError: the contact table is narrower than the
         amplitude.
         """
+        place = vehicle.coordinates.position_of
+        columns = np.array([[place[b, k] for k in (Y, Z, ROLL)] for b in _bodies(vehicle)])
+        # sin(theta) has the same value at two angles of a quadrant's pair
+        sines = np.sin(2.0 * np.pi * (np.arange(ANGLES // 4) + 0.5) / ANGLES)
+        sines = np.concatenate([sines, -sines])
+        try:
+            poses = self._path(vehicle, columns, sines)
+            moved = np.tile(vehicle.x, (*poses.shape[:2], 1))
+            for w, column in enumerate(columns):  # each alone
+                moved[:, w, column] += poses[:, w]
+            rates = vehicle.rates(moved.reshape(-1, len(vehicle.x))).reshape(moved.shape)
+        except ModelError as error:
+            words = f"found {1e3 * self.amplitude:g} mm, but {error}"
+            raise argument_error("amplitude", words, "a smaller amplitude") from None
+        shares = 4.0 * sines / (ANGLES * self.amplitude)
+        force, path = (np.tensordot(shares, values, 1) for values in (rates, poses))
         found = tangent.copy()
-        vehicle.rate(vehicle.x)
-        goals = vehicle.work.rail_force[:, [2, 3]].copy()
-        for body in vehicle.system.contact.body:
-            y, z, roll = (vehicle.coordinates.position_of[int(body), k] for k in (Y, Z, ROLL))
-            force, height, angle = self._harmonics(vehicle, int(body), goals[body])
-            found[:, y] = force - tangent[:, z] * height - tangent[:, roll] * angle
+        for (y, z, roll), rate, (_, height, angle) in zip(columns, force, path, strict=True):
+            found[:, y] = rate - tangent[:, z] * height - tangent[:, roll] * angle
         return found
 
-    def _harmonics(
-        self, vehicle: FreeVehicle, body: int, goal: Floats
-    ) -> tuple[Floats, float, float]:
-        """H of the derivative, of z and of roll; `goal`: force and moment that the rails give."""
-        total = np.zeros(len(vehicle.x))
-        moved = np.zeros(2)
-        for side in (1.0, -1.0):
-            pose = np.zeros(2)
-            before = 0.0
-            # sin(theta) has the same value at two angles of a quadrant's pair
-            for sine in np.sin(2.0 * np.pi * (np.arange(ANGLES // 4) + 0.5) / ANGLES):
-                y = side * self.amplitude * sine
-                # from the middle outwards: far from its path a wheelset stands on one rail
-                guess = self._known.get((body, y), pose * (y / before if before else 0.0))
-                try:
-                    rate, pose = self._on_path(vehicle, body, y, guess, goal)
-                except ModelError as error:
-                    words = f"found {1e3 * self.amplitude:g} mm, but {error}"
-                    raise argument_error("amplitude", words, "a smaller amplitude") from None
-                self._known[body, y] = pose
-                before = y
-                share = 4.0 * side * sine / (ANGLES * self.amplitude)
-                total += share * rate
-                moved += share * pose
-        return total, float(moved[0]), float(moved[1])
+    def _path(self, vehicle: FreeVehicle, columns: Integers, sines: Floats) -> Floats:
+        """Return y, z, roll of the wheelsets on their paths, float64[sine, wheelset, 3]."""
+        goal, found = _forces(vehicle, vehicle.x), np.zeros((len(sines), *columns.shape))
+        for i, y in enumerate(self.amplitude * sines):
+            # from the middle outwards: far from its path a wheelset stands on one rail
+            outwards = i % (len(sines) // 2) > 0
+            guess = found[i - 1, :, 1:] * (y / found[i - 1, 0, 0]) if outwards else 0.0
+            self._known[y] = self._on_path(vehicle, columns, y, self._known.get(y, guess), goal)
+            found[i, :, 0], found[i, :, 1:] = y, self._known[y]
+        return found
 
     def _on_path(
-        self, vehicle: FreeVehicle, body: int, y: float, pose: Floats, goal: Floats
-    ) -> tuple[Floats, Floats]:
-        """Derivative with a wheelset moved by y along its path, and its dz and droll."""
-        indices = [vehicle.coordinates.position_of[body, k] for k in (Y, Z, ROLL)]
-        base = vehicle.x
+        self, vehicle: FreeVehicle, columns: Integers, y: float, guess: Floats | float, goal: Floats
+    ) -> Floats:
+        """Return z and roll of all wheelsets, moved by y at once: none feels another's rails."""
 
-        def tried(pose: Floats) -> tuple[Floats, Floats]:
-            x = base.copy()
-            x[indices] += (y, *pose)
-            return vehicle.rate(x), np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
+        def missing(pose: Floats) -> Floats:
+            x = vehicle.x
+            x[columns] += np.insert(pose, 0, y, axis=1)
+            return _forces(vehicle, x) - goal
 
-        before = np.inf
+        pose, before = np.zeros((len(columns), 2)) + guess, np.inf
         for _ in range(MOST_ITERATIONS):
-            rate, value = tried(pose)
-            size = np.max(np.abs(value))
+            value = missing(pose)
+            size = float(np.max(np.abs(value)))
             if size < BALANCED:
-                break
-            if (body, y) not in self._slopes or size > SLOW * before:
-                ends = [[tried(pose + d * STEP * e)[1] for d in (1.0, -1.0)] for e in np.eye(2)]
-                self._slopes[body, y] = np.transpose([a - b for a, b in ends]) / (2.0 * STEP)
+                return pose
+            if y not in self._slopes or size > SLOW * before:
+                ends = [[missing(pose + d * STEP * e) for d in (1.0, -1.0)] for e in np.eye(2)]
+                self._slopes[y] = np.stack([a - b for a, b in ends], axis=2) / (2.0 * STEP)
             try:
-                pose, before = pose - np.linalg.solve(self._slopes[body, y], value), size
+                pose = pose - np.linalg.solve(self._slopes[y], value[..., None])[..., 0]
             except np.linalg.LinAlgError:  # a wheelset off its rails has no slopes
-                raise ModelError("no contact path") from None
-        else:
-            raise ModelError("no contact path")
-        return rate, pose
+                break
+            before = size
+        raise ModelError("no contact path")
+
+
+def _bodies(vehicle: FreeVehicle) -> list[int]:
+    return [int(body) for body in vehicle.system.contact.body]
+
+
+def _forces(vehicle: FreeVehicle, x: Floats) -> Floats:
+    """Vertical force and roll moment that the rails give each wheelset, float64[wheelset, 2]."""
+    vehicle.rate(x)
+    return np.asarray(vehicle.work.rail_force[np.ix_(_bodies(vehicle), [2, 3])])
