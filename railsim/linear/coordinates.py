@@ -14,6 +14,7 @@ import numpy as np
 
 from railsim.arrays import Floats, Integers
 from railsim.errors import ModelError
+from railsim.kernels.creep import FASTRIP, FASTSIM, LINEAR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.state import N_SCALARS, SPEED, internal_begin, velocity_begin
 from railsim.kernels.status import RUNNING
@@ -47,6 +48,7 @@ class Coordinates:
     n_velocities: int  # of the bodies
     steps: Floats  # of difference quotients
     forceless: Integers  # rates of rails without mass: their equations say that the forces balance
+    wheelsets: Integers  # to which they and the rails beneath it belong, -1 of all others
 
     @property
     def positions(self) -> slice:
@@ -96,12 +98,15 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     indices += [velocity_begin(n) + 6 * b + k for b, k in velocities]
     indices += [internal_begin(n) + i for i in range(len(rest))]
     steps = [STEP] * len(positions) + [RATE_STEP] * len(velocities) + [FORCE_STEP] * len(rest)
+    number = {int(body): w for w, body in enumerate(model.system.contact.body)}
+    wheelsets = [number.get(b, -1) for b, _ in both] + [-1] * len(rest)
     forceless = []
     if not held:
         track, track_names = track_indices(model)
         indices += [*track, *(k + RATE for k in track)]
         rest += [*track_names, *(f"{name}'" for name in track_names)]
         steps += [STEP] * len(track) + [RATE_STEP] * len(track)
+        wheelsets += [*np.repeat(range(len(number)), len(track) // len(number))] * 2
         if model.system.support.massless:
             forceless = list(range(len(indices) - len(track), len(indices)))
     return Coordinates(
@@ -113,6 +118,7 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
         n_velocities=len(velocities),
         steps=np.array(steps),
         forceless=np.array(forceless, dtype=np.int64),
+        wheelsets=np.array(wheelsets, dtype=np.int64),
     )
 
 
@@ -183,8 +189,31 @@ class FreeVehicle:
         return self.state[self.coordinates.indices].copy()
 
     def tangent(self) -> Floats:
-        """Jacobian of `rate` in steady rolling, float64[n, n]; ModelError: it is not finite."""
-        matrix = jacobian(self.rates, self.x, self.coordinates.steps)
+        """Jacobian of `rate` in steady rolling, float64[n, n]; ModelError: it is not finite.
+
+        Where creep forces take most of the time, by a law that costs little; then the blocks in
+        which a wheelset and the rails beneath it act on themselves are corrected to the true law,
+        those of all wheelsets at once: no other creep force changes (Curtis, Powell and Reid 1974).
+        """
+        contact, c, law = self.system.contact, self.coordinates, self.system.contact.law
+        cheap, own = self.system, np.zeros((0, 0), dtype=np.int64)
+        # about a wheelset as reference body all others move as its creep forces change
+        if law.number in (FASTSIM, FASTRIP) and self.system.bodies.reference not in contact.body:
+            linear = contact._replace(law=law._replace(number=LINEAR))
+            cheap = self.system._replace(contact=linear)
+            own = np.array([np.flatnonzero(c.wheelsets == w) for w in range(len(contact.body))])
+
+        def correction(moved: Floats) -> Floats:
+            x = np.repeat(self.x[None], len(moved), axis=0)
+            for columns in own:
+                x[:, columns] += moved
+            return self.rates(x) - self.rates(x, cheap)
+
+        matrix = jacobian(lambda x: self.rates(x, cheap), self.x, c.steps)
+        if own.size:
+            blocks = jacobian(correction, np.zeros(own.shape[1]), c.steps[own[0]])
+            for block in own:
+                matrix[np.ix_(block, block)] += blocks[block]
         if not np.isfinite(matrix).all():
             raise ModelError("the vehicle cannot be linearised: a derivative is not finite")
         return matrix
@@ -202,11 +231,11 @@ class FreeVehicle:
 
     def evaluate(self, state: Floats) -> Floats:
         """Derivative of a whole state, forces left in `work`; ModelError: it is out of range."""
-        return np.asarray(self._evaluated(state[None])[0])
+        return np.asarray(self._evaluated(state[None], self.system)[0])
 
-    def _evaluated(self, states: Floats) -> Floats:
+    def _evaluated(self, states: Floats, system: System) -> Floats:
         derivatives = np.empty_like(states)
-        status, where, _ = right_hand_sides(self.system, self.work, states, derivatives)
+        status, where, _ = right_hand_sides(system, self.work, states, derivatives)
         if status != RUNNING:
             sentence = self.model.index.sentence(status, where)
             raise ModelError(f"outside the range of the model: {sentence}")
@@ -216,11 +245,11 @@ class FreeVehicle:
         """Derivative of the coordinates, float64[n]."""
         return np.asarray(self.rates(x[None])[0])
 
-    def rates(self, x: Floats) -> Floats:
-        """Derivatives of the coordinates, float64[k, n] of as many."""
+    def rates(self, x: Floats, system: System | None = None) -> Floats:
+        """Derivatives of the coordinates, float64[k, n] of as many; of another system if given."""
         trials = np.repeat(self.state[None], len(x), axis=0)
         trials[:, self.coordinates.indices] = x
-        derivatives = self._evaluated(trials)
+        derivatives = self._evaluated(trials, system or self.system)
         derivatives[:, self._reference[0]] = trials[:, self._reference[1]]
         of_velocities = slice(velocity_begin(self._n), internal_begin(self._n))
         velocities = derivatives[:, of_velocities].reshape(len(x), -1, 6)

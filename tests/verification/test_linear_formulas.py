@@ -183,6 +183,7 @@ def named(moves, eigenvalue=None, bodies=BODIES, cars=(0,)):
     c = Coordinates(
         tuple(map(str, both)), np.arange(2 * n), np.array([b for b, _ in both]),
         np.array([k for _, k in both]), n, n, np.ones(2 * n), np.array([], dtype=int),
+        np.array([b - 3 for b, _ in both]),
     )  # fmt: skip
     kind = np.array([RIGID] * 3 + [WHEELSET] * 4)
     system = SimpleNamespace(

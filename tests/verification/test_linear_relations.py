@@ -8,6 +8,7 @@ from suspension import Suspension
 
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.harmonic import ContactPath
+from railsim.linear.system import jacobian
 from railsim.linear.track_response import QUANTITIES, track_response
 from railsim.linear.vehicle import LinearVehicle, smooth_law
 from railsim.result.sensors import all_sensors
@@ -86,6 +87,18 @@ def test_harmonic_linearisation_of_a_small_amplitude_is_the_tangent_in_a_curve_t
     tangent, small = (vehicle.linearised(SPEED, path).matrix for path in (None, ContactPath(1e-6)))
     columns = np.max(np.abs(tangent), axis=0)
     np.testing.assert_allclose(small / columns, tangent / columns, atol=2e-3)
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.parametrize("law", ["fastsim", "fastrip"])
+def test_tangent_is_the_jacobian_of_the_derivative(law):
+    """Creep forces of all wheelsets by one difference, or by one for each coordinate."""
+    track = load_any_track("straight").replace(support={"preset": "co-running"})
+    coach, settings = load_vehicle("coach_flexicoil"), Settings(creep_law=law)
+    free = LinearVehicle(coach, track, radius=400.0, settings=settings).free(18.0)
+    plain = jacobian(free.rates, free.x, free.coordinates.steps)
+    of_row = np.abs(plain).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(free.tangent() / of_row, plain / of_row, rtol=0, atol=1e-11)
 
 
 @pytest.mark.usefixtures("small_contact_tables")
