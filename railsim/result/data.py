@@ -107,15 +107,17 @@ class Result:
     # -- the arrays ---------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Floats:
-        """Return the array of quantity `name` [SI]."""
+        """Return the array of quantity `name` [SI], or the names along a dimension."""
+        if name in self._coordinates:
+            return np.array(self._coordinates[name])
         try:
             return self._arrays[name]
         except KeyError:
             raise KeyError(f"no quantity '{name}'; {nearest(name, self._arrays)}") from None
 
     def __getattr__(self, name: str) -> Floats:
-        if not name.startswith("_") and name in self._arrays:
-            return self._arrays[name]
+        if not name.startswith("_") and (name in self._arrays or name in self._coordinates):
+            return self[name]
         raise AttributeError(f"a result has no '{name}'; {nearest(name, self._names())}")
 
     def __contains__(self, name: object) -> bool:

@@ -46,6 +46,12 @@ def test_names_are_read_as_text(written):
             assert file[name].dtype.kind == "S"  # fixed length: no pointers for other readers
 
 
+def test_names_along_dimensions_are_reached_like_arrays(written):
+    result = open_result(written)
+    for name, names in result.coordinates.items():
+        assert tuple(result[name]) == tuple(getattr(result, name)) == names
+
+
 def test_root_attributes_are_plain_text_and_numbers(written):
     with h5py.File(written) as file:
         for name in ("format", "railsim_version", "status", "status_reason", "created"):
