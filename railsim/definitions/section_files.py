@@ -118,21 +118,21 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Float
         allowed = f"{key}, file, or {key}, y, z"
         raise _wrong(path, "", f"columns {', '.join(columns)}", allowed)
     at, *of = map(columns.index, (key, "file") if listed else (key, "y", "z"))
-    found: dict[float, list[tuple[float, float]]] = {}
-    files: dict[float, str] = {}
+    found: dict[float, list[list[float]]] = {}
+    files: list[tuple[float, str]] = []
     for row in table:
         try:
-            position = float(row[at])
-            if listed:
-                files[position] = row[of[0]].strip()
-            else:
-                found.setdefault(position, []).append((float(row[of[0]]), float(row[of[1]])))
+            position, *point = (float(row[k]) for k in ([at] if listed else [at, *of]))
+            files.append((position, row[of[0]].strip()))
         except (IndexError, ValueError):
+            position, point = np.nan, []
+        if not np.isfinite([position, *point]).all():
             shown = ", ".join(row)
             allowed = f"{key}, file" if listed else f"numbers {key}, y, z"
-            raise _wrong(path, "", f"row '{shortened(shown)}'", allowed) from None
+            raise _wrong(path, "", f"row '{shortened(shown)}'", allowed)
+        found.setdefault(position, []).append(point)
     if listed:
-        return list(files), [_section(path, name) for name in files.values()]
+        return [position for position, _ in files], [_section(path, name) for _, name in files]
     return list(found), [_checked(path, np.array(points).T) for points in found.values()]
 
 
@@ -163,8 +163,6 @@ def _checked(file: Path, points: Floats) -> Floats:
     """Points of a section that can be one [m]."""
     if points.shape[-1] < FEWEST_POINTS:
         raise _wrong(file, "", f"{points.shape[-1]} points", f"{FEWEST_POINTS} at least")
-    if not np.isfinite(points).all():
-        raise _wrong(file, "", "a value that is no number", "finite y, z")
     width = float(np.ptp(points[0]))
     if not NARROWEST <= width <= WIDEST:
         found = f"a section {1e3 * width:.3g} mm wide"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_settings, load_track, load_track_text, load_vehicle
+from railsim.definitions.section_files import read_sections
 from railsim.errors import InputError
 from railsim.model.assembly import assemble
 
@@ -40,7 +41,8 @@ def test_plain_sections_are_taken_without_a_remark(tmp_path):
         (rows(y=np.concatenate([Y[:10], Y[25:9:-1], Y[26:]])), "without crossing itself"),
         (rows(z=-3.0 * TOP), "top at z = -36 mm; within 10 mm of the rail tops, z positive down"),
         (rows(y=Y + 0.03), "a jump of 30 mm from 0.9 to 1 m, which no blend can follow"),
-        (rows(z=TOP * np.nan), "a value that is no number"),
+        (rows(z=TOP * np.nan), r"row '1\.0, -0\.035, nan'; numbers s, y, z"),
+        ([*rows()[:3], (np.nan, Y, TOP), *rows()[3:]], "row 'nan, -0.035"),
         (rows(y=1e3 * Y), "wide; 10 to 400 mm; y, z in m or mm"),
         ([*rows()[:5], rows()[6], rows()[5], *rows()[7:]], "0.5 after 0.6; rising positions"),
         ([(1e3 * s, *points) for s, *points in rows()], "are the positions in m"),
@@ -50,6 +52,15 @@ def test_plain_sections_are_taken_without_a_remark(tmp_path):
 def test_wrong_sections_are_refused(tmp_path, sections, said):
     with pytest.raises(InputError, match=said):
         loaded(tmp_path, sections)
+
+
+def test_a_position_that_is_listed_twice_is_refused(tmp_path):
+    """Of two files at one place none is left out in silence."""
+    for name in ("one", "other"):
+        np.savetxt(tmp_path / f"{name}.csv", np.transpose([Y, TOP]), delimiter=",")
+    (tmp_path / "list.csv").write_text("s,file\n0,one.csv\n10,one.csv\n10.0,other.csv\n")
+    with pytest.raises(InputError, match="position 10 after 10; rising positions"):
+        read_sections(tmp_path / "list.csv", "rail")
 
 
 def test_a_section_that_only_grows_wider_is_no_jump(tmp_path):
