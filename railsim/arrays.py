@@ -1,4 +1,4 @@
-"""Types of arrays."""
+"""Types of arrays, and where in them something is."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,20 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 Indices = NDArray[np.intp]
+
+EQUAL = 1e-6  # share by which values of equal wheels may differ: by rounding, in single precision
+
+
+def first_largest(values: Floats) -> tuple[int, ...]:
+    """Index of the largest value: of those that are less by `EQUAL` of it at most the first.
+
+    What is equal but for rounding so bears the same name always.  NaN is left out.
+
+    >>> first_largest(np.array([[np.nan, 1.0], [2.0, 2.0 + 1e-9]]))
+    (1, 0)
+    """
+    near = np.isclose(values, np.fmax.reduce(values, axis=None), rtol=EQUAL, atol=0.0)
+    return tuple(int(k) for k in np.unravel_index(np.argmax(near), np.shape(values)))
 
 
 def stretches(flags: Flags) -> list[tuple[int, int]]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, first_largest
 from railsim.constants import CANT_BASE
 from railsim.definitions import Track
 from railsim.kernels.aligned import aligned
@@ -79,8 +79,8 @@ class TwistLoop:
     @property
     def worst(self) -> tuple[int, int]:
         """Wheelset and side of the wheel that is unloaded most."""
-        _, wheelset, side = np.unravel_index(np.argmax(self.unloading), self.Q.shape)
-        return int(wheelset), int(side)
+        wheelset, side = first_largest(self.unloading.max(axis=0))
+        return wheelset, side
 
     @property
     def on_level(self) -> tuple[float, float]:

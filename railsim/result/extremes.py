@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, first_largest
 from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.definitions.track.section import Section
@@ -100,12 +100,14 @@ def evaluated(result: Result) -> slice:
 
 
 def _extreme(array: Floats, kind: str) -> tuple[Any, ...]:
-    """Index of the extreme value of an array; values that are not a number are left out."""
+    """Index of the extreme value over time and wheels; of wheels with equal ones of the first.
+
+    Values that are not a number are left out.
+    """
     key = np.abs(array) if kind == "abs" else array if kind == "max" else -array
-    at = np.argmax(key)  # of what is not a number, where there is such
-    if np.isnan(key.flat[at]):
-        at = np.argmax(np.where(np.isnan(key), -np.inf, key))
-    return np.unravel_index(at, key.shape)
+    wheel: Any = first_largest(np.fmax.reduce(key, axis=0))
+    over_time = key[:, *wheel]
+    return int(np.argmax(np.where(np.isnan(over_time), -np.inf, over_time))), *wheel
 
 
 def _low_pass_of(result: Result, name: str, rate: float, known: dict[str, Floats]) -> Floats | None:
@@ -308,7 +310,7 @@ def _settling(values: Floats, medians: Floats) -> Floats:
 
 def _largest(result: Result, name: str, array: Floats, time: float, distance: float) -> Peak:
     """Largest magnitude over the dimensions of a quantity."""
-    index = _extreme(array, "abs")
+    index = _extreme(array[None], "abs")[1:]
     labels = _labels(result, name, index)
     return Peak(result.quantities[name], float(array[index]), labels, time, distance)
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, first_largest
 from railsim.definitions.settings import InitialState, Settings
 from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.rhs import right_hand_sides
@@ -116,7 +116,7 @@ def _impact(model: Model, loads: Floats | None, before: Floats, Q0: Floats) -> l
     if loads is None:
         return []
     ratio = np.abs(loads - before) / Q0
-    w, side = (int(k) for k in np.unravel_index(np.argmax(ratio), ratio.shape))
+    w, side = first_largest(ratio)
     if ratio[w, side] <= IMPACT:
         return []
     return [

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, first_largest
 from railsim.contact.table import TableGrid
 from railsim.kernels.actuators import ABOUT, ACTION, BY_DAMPER, COMMAND, MODE
 from railsim.kernels.state import ARC_LENGTH, SPEED, TIME
@@ -127,7 +127,7 @@ def beyond_experience(
     """
     found = []
     ratio = extremes["Q"][0] / Q0
-    w, side = _largest(ratio)
+    w, side = first_largest(ratio)
     if ratio[w, side] > MOST_Q:
         where = _where(extremes, "Q", (0, w, side), f"{wheelsets[w]}, {SIDES[side]}")
         found.append(
@@ -136,7 +136,7 @@ def beyond_experience(
         )
     limit = 10e3 + Q0.sum(axis=1) / 3.0
     ratio = np.abs(extremes["sum_Y"]) / limit
-    row, w = _largest(ratio)
+    row, w = first_largest(ratio)
     if ratio[row, w] > MOST_SUM_Y:
         where = _where(extremes, "sum_Y", (row, w), wheelsets[w])
         found.append(
@@ -154,7 +154,7 @@ def lifted_wheels(
     number = int(np.count_nonzero(unloaded))
     if number == 0:
         return ""
-    w, side = _largest(unloaded)
+    w, side = first_largest(unloaded)
     where = _where(extremes, "Q", (1, w, side), "first at")
     who = f"{wheelsets[w]}, {SIDES[side]}"
     others = "" if number == 1 else f"; {number} wheels in all were off their rails"
@@ -174,12 +174,6 @@ def stability(swings: Hunting | None, extremes: Mapping[str, Floats], duration: 
         "Nothing disturbs the vehicle laterally: its wheelsets stay in the middle of the track, "
         "and the run proves nothing about its stability."
     )
-
-
-def _largest(ratio: Floats) -> tuple[int, ...]:
-    """Index of the largest value; of a run that ended before its first instant all are NaN."""
-    known = np.where(np.isnan(ratio), -np.inf, ratio)
-    return tuple(int(k) for k in np.unravel_index(np.argmax(known), ratio.shape))
 
 
 def _where(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str) -> str:
@@ -248,7 +242,7 @@ def alternation(measured: Floats, Q0: Floats, wheelsets: Sequence[str], divided:
     if not len(measured):
         return ""
     amplitude = 0.25 * np.sqrt(measured[..., ALTERNATION])
-    w, side = _largest(amplitude / Q0)
+    w, side = first_largest(amplitude / Q0)
     if not amplitude[w, side] > ALTERNATES[divided > 0] * Q0[w, side]:
         return ""
     return (
@@ -296,7 +290,7 @@ def vibration(
     if not len(measured):
         return ""
     share = measured[..., AMPLITUDE] / Q0
-    w, side = _largest(share)
+    w, side = first_largest(share)
     if not share[w, side] > VIBRATES:
         return ""
     frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]

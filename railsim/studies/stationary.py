@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from railsim.arrays import Floats
+from railsim.arrays import Floats, first_largest
 from railsim.cant import cant_deficiency
 from railsim.constants import CANT_BASE, WIDENED
 from railsim.definitions import Settings, Track, Vehicle
@@ -332,7 +332,7 @@ def _lean(
     worst, wheel, share, most = np.nan, "", np.nan, np.nan
     if standings:
         shares = np.array([(standing.Q0 - standing.Q) / standing.Q0 for standing in standings])
-        way, w, side = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        way, w, side = first_largest(shares)
         worst, wheel = float(shares[way, w, side]), f"wheelset {w + 1} {SIDES[side]}"
         leaning = zip(standings, (cant, -cant), strict=True)
         rolls = [roll_coefficient(model, standing, height, body) for standing, height in leaning]

@@ -31,6 +31,16 @@ def test_peak_names_value_wheel_and_time():
     assert peak(result, "Q", "min").value == -7.0
 
 
+@pytest.mark.parametrize("more", [1e-9, -1e-9])
+def test_of_equal_wheels_the_first_is_named(more):
+    """Which of both is larger by rounding decides about no name and no sign."""
+    result = small([[[1.0, -1.0]], [[7.0, -7.0 * (1.0 + more)]], [[5.0, -6.0]]])
+    for kind, side in (("abs", "left"), ("max", "left"), ("min", "right")):
+        assert peak(result, "Q", kind).labels["side"] == side
+    assert peak(result, "Q").value == 7.0
+    assert peak(small([[[1.0, 7.0]], [[-7.0, 7.0]], [[np.nan, 6.0]]]), "Q").value == -7.0
+
+
 def test_peak_of_all_steps_has_their_time_and_place():
     """Largest and smallest of every wheel between the stored instants, as a run keeps them."""
     whole = small([[[1.0, 2.0]], [[3.0, -7.0]], [[5.0, 6.0]]])
