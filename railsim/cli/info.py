@@ -24,7 +24,7 @@ DRAWN = "--draw is for vehicles and tracks"
 @cli.option("--draw", "Draw a vehicle in three views, or a track.", "F.png")
 @cli.load_option
 @cli.set_option
-@cli.collected("output", cli.Output, cli.overwrite_option, cli.json_option)
+@cli.output_options()
 def command(
     file: str,
     speeds: tuple[float, ...],

@@ -96,9 +96,9 @@ def _with_pressing_wedges(model: Model) -> Model:
     least = {e.name: 1.0 if e.definition.preload_is_free else 0.0 for e in wedges}
     if wrong := [name for name, needed in least.items() if force[name] < needed]:
         raise ModelError(
-            "wedges press and never pull, these would have to pull in the nominal position: "
-            + ", ".join(wrong)
-            + "; body 1 of a wedge is the side frame, body 2 the bolster that rests on it"
+            f"no static equilibrium of '{model.flat.name}': wedges press and never pull, these "
+            f"would have to pull in the nominal position: {', '.join(wrong)}; body 1 of a wedge is "
+            "the side frame, body 2 the bolster that rests on it"
         )
     return model
 

@@ -244,6 +244,8 @@ def test_they_are_shown_by_validate_info_and_once_by_a_run(tmp_path, capsys):
     for command in ("validate", "info"):
         assert cli.main([command, str(path)]) == 0
         assert "frame: below the rails" in capsys.readouterr().out.replace("remark: ", "")
+    assert cli.main(["info", str(path), "--quiet"]) == 0
+    assert "below the rails" not in capsys.readouterr().out
     out = tmp_path / "run.h5"
     cli.main(
         ["run", str(path), "straight", "--speed", "10", "--duration", "0.1", "--out", str(out)]

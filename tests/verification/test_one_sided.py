@@ -122,7 +122,9 @@ def test_wedge_the_wrong_way_round_is_refused_by_name():
     right = with_elements(wagon(), "end", wedge=WEDGE)
     assert railsim.static_loads(right).preload["front.wedge.left"][2] > 0.0
     wrong = with_elements(wagon(), "end", wedge={**WEDGE, "bodies": ["body", "axle"]})
-    with pytest.raises(ModelError, match=r"would have to pull.*front\.wedge\.right"):
+    with pytest.raises(
+        ModelError, match=rf"'{wrong.name}'.* would have to pull.*front\.wedge\.right"
+    ):
         railsim.static_loads(wrong)
 
 
