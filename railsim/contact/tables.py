@@ -51,11 +51,12 @@ def conicity_table(found: ContactSummary) -> Table:
 
 def printed_conicity(found: ContactSummary) -> Table:
     """Return the equivalent conicity of every whole millimetre, side by side."""
-    rows = zip(found.amplitudes[1::2], found.conicity[1::2], strict=True)
-    known = [row for row in rows if np.isfinite(row[1])]
-    upright = Table([Column("amplitude", unit="mm", format="g"), _CONICITY], known)
+    rows = list(zip(found.amplitudes[1::2], found.conicity[1::2], strict=True))
+    upright = Table([Column("amplitude", unit="mm", format="g"), _CONICITY], rows)
     upright = upright.transposed("amplitude mm")
     upright.caption = "Equivalent conicity (EN 15302)"
+    if np.isnan(found.conicity[1::2]).any():
+        upright.caption += "; -: no oscillation with this amplitude within the range"
     return upright
 
 

@@ -2,14 +2,17 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from railsim import cli
+from railsim.contact import contact_geometry
 from railsim.contact.gauges import gauge_table, wheel_gauge
 from railsim.contact.summary import Pair
+from railsim.contact.tables import printed_conicity
 from railsim.profiles import Profile, load_profile
 
 NAMES = (
@@ -292,3 +295,17 @@ def test_creep_pictures_are_written(tmp_path, capsys):
             assert min(picture.size) > 600
     with (out / "creep_curves.csv").open() as file:
         assert {"law", "T_x", "T_y", "M_z"} <= set(next(csv.DictReader(file)))
+
+
+def test_an_amplitude_without_an_oscillation_is_shown():
+    """Between its two contacts a hollow wheel has a hump: 1 mm is less than what crosses it."""
+    hollow, rail = load_profile("S1002_hollow"), load_profile("60E1")
+    geometry = contact_geometry(hollow, rail, inclination=0.025, gauge=1.436)
+    amplitudes = 1e-3 * np.arange(0.5, 3.1, 0.5)
+    found = SimpleNamespace(
+        amplitudes=amplitudes, conicity=geometry.equivalent_conicity(amplitudes)
+    )
+    caption, heading, values = printed_conicity(found).lines()
+    assert "-: no oscillation with this amplitude" in caption
+    assert heading.split()[2:] == ["1", "2", "3"]
+    assert values.split()[1] == "-"
