@@ -91,7 +91,7 @@ class Column:
         """
         if isinstance(value, Amount):
             unit = f" {value.column.unit}" if value.with_unit and value.column.unit else ""
-            return value.column.text(value.value) + unit
+            return value.column._beside(value.value, value.limit) + unit
         if value is None:
             return ""
         if isinstance(value, bool) or not isinstance(value, Real):
@@ -101,17 +101,27 @@ class Column:
         without_minus_zero = self.format.replace(".", "z.", 1 if self.format.endswith("f") else 0)
         return format(value * self.scale, without_minus_zero)
 
+    def _beside(self, value: Any, limit: float | None) -> str:
+        text = self.text(value)
+        if limit is None or text != self.text(limit):
+            return text
+        return beside(self.scale * value, self.scale * limit, int(self.format[1:-1]))
+
 
 class Amount(NamedTuple):
-    """A cell whose quantity is not its column's, as where rows are quantities.
+    """A cell whose quantity is not its column's, as where rows are quantities, or with a limit.
 
-    >>> Column("value").text(Amount(95040.0, Column("Q", unit="kN", format=".1f"), with_unit=True))
+    >>> Q = Column("Q", unit="kN", format=".1f")
+    >>> Column("value").text(Amount(95040.0, Q, with_unit=True))
     '95.0 kN'
+    >>> Q.text(Amount(95040.0, Q, limit=95e3))
+    '95.04'
     """
 
     value: Any
     column: Column
     with_unit: bool = False  # whether its unit stands behind it
+    limit: float | None = None  # with more digits where it would read like this, but is not
 
 
 class Table:

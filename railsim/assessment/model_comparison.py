@@ -176,7 +176,9 @@ class ModelValidation:
         rows: list[list[object]] = []
         for one in self.comparisons:
             c = one.quantity.column
-            amounts = [Amount(v, c) for v in (one.mean, one.mean_limit, one.deviation, one.limit)]
+            mean = Amount(one.mean, c, limit=math.copysign(one.mean_limit, one.mean))
+            scatter = Amount(one.deviation, c, limit=one.limit)
+            amounts = mean, Amount(one.mean_limit, c), scatter, Amount(one.limit, c)
             rows.append([one.quantity.name, one.quantity.words, c.unit, one.sections,
                          len(one.pairs), *amounts, one.verdict])  # fmt: skip
         return Table(

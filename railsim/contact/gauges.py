@@ -20,7 +20,7 @@ import numpy as np
 from railsim.constants import NORMAL_GAUGE, WIDENED
 from railsim.notation import SIDES
 from railsim.profiles.profile import FLANGE_BACK, Profile
-from railsim.table import Column, Table
+from railsim.table import Amount, Column, Table
 
 FLANK, BELOW_TIP = 0.010, 0.002
 """Where the flank is measured: beyond the nominal rolling circle, below the flange tip [m]."""
@@ -98,8 +98,15 @@ def gauge_table(
     ]
     return Table(
         [Column("name", "gauge value"), Column("words", " "), *lengths, Column("verdict", " ")],
-        [[*row, _verdict(*row[2:])] for row in rows],
+        [[*row[:2], _amount(lengths[0], *row[2:]), *row[3:], _verdict(*row[2:])] for row in rows],
     )
+
+
+def _amount(column: Column, value: float, *limits: float | None) -> Amount:
+    """Return a value that does not read like the nearer limit where it is beyond it."""
+    known = [limit for limit in limits if limit is not None]
+    nearer = min(known, key=lambda limit: abs(limit - value), default=None)
+    return Amount(value, column, limit=nearer)
 
 
 def _verdict(value: float, least: float | None, most: float | None) -> str:

@@ -99,18 +99,17 @@ class Stationary:
         """Return the values with their limits; a value without a steady state is left open."""
         columns = [Column("case", "standing on"), Column("quantity"), Column("place", "location"),
                    Column("value", format=">"), Column("limit", format=">")]  # fmt: skip
-        number, angle = Column("", format=".3f"), Column("", format=".2f")
+        number, angle = Column("", format=".3f"), Column("", unit="deg", format=".2f")
 
-        def shown(quantity: str, value: float | None) -> object:
+        def shown(quantity: str, value: float | None, limit: float | None = None) -> object:
             if value is None or np.isnan(value):
                 return None
             if np.isinf(value):
                 return "no load"
-            if quantity.startswith("angle"):
-                return f"{angle.text(float(np.degrees(value)))} deg"
-            return Amount(value, number)
+            column = angle if quantity.startswith("angle") else number
+            return Amount(value, column, with_unit=True, limit=limit)
 
-        rows = [[v.case, v.quantity, v.place, shown(v.quantity, v.value),
+        rows = [[v.case, v.quantity, v.place, shown(v.quantity, v.value, v.limit),
                  shown(v.quantity, v.limit)] for v in self.values]  # fmt: skip
         return Table(columns, rows)
 

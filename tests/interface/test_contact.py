@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -138,6 +139,15 @@ def test_gauge_of_a_flange_with_a_straight_flank(high, slope, thick, z):
     y = [-0.070, -0.065, at_10_mm - (high - 0.010) / slope, at_10_mm + 0.010 / slope, 0.0, 0.06]
     wheel = Profile("made", "wheel", y, np.add([0.0, 0.9 * high, high, 0.0, 0.0, 0.0], z), "made")
     assert wheel_gauge(wheel) == pytest.approx((high, thick, (high - 0.012) / slope), abs=1e-9)
+
+
+def test_gauge_values_that_fail_do_not_read_like_their_limits():
+    """40 um beyond 33 mm and 1426 mm were "33.0" of 33.0 and "1426.0" of 1426.0, and failed."""
+    wheel = load_profile("S1002")
+    thicker = replace(wheel, y=np.where(wheel.y < -0.03, wheel.y + 0.00054, wheel.y))
+    rows = {row[1]: row for row in gauge_table((thicker, thicker), back_to_back=1.35995).texts()}
+    assert rows["flange thickness, left"][2:] == ["33.04", "22.0", "33.0", "fail"]
+    assert rows["active faces"][2:] == ["1426.03", "1410.0", "1426.0", "fail"]
 
 
 @pytest.mark.parametrize(("gauge", "verdict"), [(1.445, "fail"), (1.000, ""), (1.668, "")])

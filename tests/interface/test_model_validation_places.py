@@ -98,8 +98,10 @@ def test_a_mean_difference_passes_up_to_two_thirds_of_its_limit(
     quantity, channel, simulated, limit, sense
 ):
     """EN 14363, Annex T, as the limits file recalls it, over twelve sections at least."""
-    for share, verdict in ((0.99, "pass"), (1.01, "fail")):
-        found = steady({channel: simulated + sense * share * 2.0 / 3.0 * limit})[quantity]
+    for share, verdict in ((0.99, "pass"), (1.00005, "fail"), (1.01, "fail")):
+        whole = steady({channel: simulated + sense * share * 2.0 / 3.0 * limit})
+        found, rows = whole[quantity], {row[0]: row for row in whole.table().texts()}
+        assert rows[quantity][5].lstrip("-") != rows[quantity][6]  # it does not read like its limit
         assert found.sections >= 12
         assert abs(found.mean) == pytest.approx(share * 2.0 / 3.0 * limit)
         assert (found.limit, found.verdict) == (pytest.approx(limit), verdict)

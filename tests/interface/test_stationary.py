@@ -15,7 +15,7 @@ from railsim.linear.steady import NotConverged
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.stability.curving import curving
-from railsim.studies.stationary import _force, stationary
+from railsim.studies.stationary import Stationary, StationaryValue, _force, stationary
 
 COACH = ["stationary", "benchmark_vehicle1", "--cant", "0.1"]
 
@@ -100,6 +100,21 @@ def test_both_branches_of_a_wagon_are_told_and_drawn(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("guided")
+def test_a_value_that_exceeds_its_limit_does_not_read_like_it():
+    values = [
+        StationaryValue("cant", "guiding Y/Q", 1.20004, 1.2, "wheelset 1 outer"),
+        StationaryValue(
+            "cant", "angle of the floor", np.radians(8.6), np.radians(8.599), "carbody"
+        ),
+    ]
+    found = Stationary("coach", "EN 14363", True, tuple(values), ())
+    assert found.verdict == "fail"
+    assert [row[3:] for row in found.table().texts()] == [
+        ["1.20004", "1.200"],
+        ["8.600 deg", "8.60 deg"],
+    ]
+
+
 def test_limit_in_the_picture_has_its_value():
     figure = stationary(
         railsim.load_vehicle("coach_manchester"),

@@ -119,6 +119,16 @@ def test_rows_may_be_mappings_and_quantities():
     assert Table(["value"], [[cell]]).records() == [{"value": 0.0021}]
 
 
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(0.0332, "33.2"), (0.03302, "33.02"), (0.033, "33.0"), (0.0, "0.0"), (np.nan, "-")],
+)
+def test_a_value_reads_like_its_limit_only_where_it_is_equal(value, shown):
+    column = Column("Sd", unit="mm", format=".1f")
+    (row,) = Table([column], [[Amount(value, column, limit=0.033)]]).texts()
+    assert row == [shown]
+
+
 def test_units_of_the_quantities_are_those_of_tables():
     for quantity in [*QUANTITIES.values(), *REQUESTED.values()]:
         if "," not in quantity.unit:
