@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from railsim.design_checks import Check, check_table
 from railsim.notation import QUANTITIES, REQUESTED, SHOWN_UNITS
 from railsim.table import Amount, Column, Table
 
@@ -127,6 +128,13 @@ def test_a_value_reads_like_its_limit_only_where_it_is_equal(value, shown):
     column = Column("Sd", unit="mm", format=".1f")
     (row,) = Table([column], [[Amount(value, column, limit=0.033)]]).texts()
     assert row == [shown]
+
+
+def test_a_check_that_fails_does_not_read_like_its_limit():
+    clearance = Check("radial_clearance", 3.997e-3, 4e-3, "above", "m", "")
+    assert check_table([clearance]).texts() == [
+        ["radial_clearance", "3.997", ">= 4.00", "mm", "fail"]
+    ]
 
 
 def test_units_of_the_quantities_are_those_of_tables():
