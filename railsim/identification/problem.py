@@ -24,6 +24,7 @@ from railsim.identification.runs import Prepared
 from railsim.processes import WorkerPool
 from railsim.profiles import load_profile
 from railsim.profiles.used import used_profiles
+from railsim.version import __version__
 
 STEP = 0.02  # of a coordinate, for differences: sticking and cells of the contact are not smooth
 STRETCH = 1e-4  # scale of the coordinate of the stretch: 0.1 m/km
@@ -79,7 +80,7 @@ class Problem:
     _central: bool = False  # whether those are central
 
     def __post_init__(self) -> None:
-        digest = hashlib.sha256()
+        digest = hashlib.sha256(__version__.encode())
         for text in (self.model.vehicle.to_toml(), repr(self.parameters), self.form):
             digest.update(repr(text).encode())
         for one in self.runs:

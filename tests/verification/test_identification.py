@@ -17,6 +17,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
 from railsim.identification.fit import _at_best_shares, _covariance
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
+from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import model_of, prepared, simulated_run
 from railsim.profiles import load_profile
@@ -151,6 +152,17 @@ def test_an_interrupted_identification_goes_on_and_finds_the_same(found):
     )
     assert again.simulations == 1
     assert np.array_equal(again.x, one.x)
+
+
+def test_runs_that_another_version_kept_are_not_used(monkeypatch):
+    """As in studies: one identification does not mix what two versions compute."""
+    names = []
+    for version in ("0.1.0", "0.1.0", "0.2.0"):
+        monkeypatch.setattr("railsim.identification.problem.__version__", version)
+        form = Form("history", (0.5, 14.0))
+        one = Problem(Model(quarter(), TRACK), [], [], form, False, Workers(1), None, print)
+        names.append(one._name(np.zeros(0), 0, False))
+    assert names[0] == names[1] != names[2]
 
 
 def test_the_fitted_file_extends_the_original(found, tmp_path):
