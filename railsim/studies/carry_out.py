@@ -99,7 +99,8 @@ def carry_out(
         elif known is None and journal.entries:
             raise argument_error("out", f"another study has begun in {folder}")
         journal.begin(inputs)
-        for text in state.settle(journal):
+        unused = (f"{one} has no effect: the study varies its key" for one in spec.overruled)
+        for text in (*unused, *state.settle(journal)):
             remark(text)
         jobs = _jobs(state, spec, keep, folder, execution)
         try:

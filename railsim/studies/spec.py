@@ -137,6 +137,13 @@ class StudySpec(BaseModel):
         """Return a study with other inputs."""
         return self.model_copy(update=changes)
 
+    @property
+    def overruled(self) -> list[str]:
+        """Assignments whose keys vary, so that no run has their values."""
+        varied = {*self.grid, *(key for table in self.linked for key in table)}
+        varied |= {*self.sample.parameters} if self.sample else set()
+        return [one for one in self.assignments if one.partition("=")[0].strip() in varied]
+
     def stored(self) -> dict[str, Any]:
         """Return the study as plain data."""
         return self.model_dump(mode="json")

@@ -794,6 +794,17 @@ def test_runs_in_one_call_are_an_option_without_effect(tmp_path, capsys):
         railsim.study(COACH, "straight", 20.0, until=2.0, out=tmp_path / "s", together=8, workers=1)
 
 
+@pytest.mark.usefixtures("simulated")
+def test_an_assignment_of_a_key_that_varies_is_told(tmp_path):
+    """`--set` beside `--grid` had no effect, in silence."""
+    remarks = []
+    how = {"out": tmp_path, "workers": 1, "on_remark": remarks.append}
+    values = ["track.friction=0.2", "track.inclination=0.05"]
+    varied = {"track.friction": [0.3]}
+    railsim.study([COACH], [CURVE], [20.0], grid=varied, assignments=values, **how)
+    assert remarks == ["track.friction=0.2 has no effect: the study varies its key"]
+
+
 def test_a_key_that_changes_nothing_is_told(tmp_path, capsys):
     """Friction beside a table of it; cells of FASTSIM do change something."""
     table = "track.friction_table=[[0.0, 0.4], [50.0, 0.1]]"
