@@ -17,7 +17,14 @@ from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.errors import Faults, argument_error
 from railsim.files.access import make_folder
-from railsim.identification.identified import AT_BOUND, INFINITE, Channel, Identified, Place
+from railsim.identification.identified import (
+    AT_BOUND,
+    INFINITE,
+    Channel,
+    Identified,
+    Place,
+    coloured,
+)
 from railsim.identification.parameters import Parameter, parsed
 from railsim.identification.problem import STRETCH, Problem, Workers
 from railsim.identification.residuals import FORMS, Form, banded, whiteness
@@ -348,6 +355,7 @@ def _outcome(
         if abs(place.stretch) > STRETCHED
     ]
     remarks += _at_bounds(problem.parameters, x)
+    remarks += filter(None, [coloured((one.name, one.is_white) for one in channels)])
     return Identified(
         problem.model.vehicle, tuple(problem.parameters), x[:count], covariance[:count, :count],
         values, vectors, tuple(channels), tuple(places), problem.form.kind, problem.form.band,

@@ -1,7 +1,7 @@
 """What an identification has found: values, how well they are known, and the residuals."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -330,6 +330,22 @@ def _wheels(vehicle: Vehicle, files: Mapping[str, tuple[str, str]]) -> dict[str,
         for key, names in found.items()
         if files.keys() & {*names}
     }
+
+
+def coloured(channels: Iterable[tuple[str, bool]]) -> str:
+    """Say what residuals that are not white mean; nothing where all are.
+
+    `channels`: names, and whether the residuals are white.
+    """
+    known = list(channels)
+    names = list(dict.fromkeys(name for name, white in known if not white))
+    if names and not any(white for _, white in known):
+        return (
+            "The residuals of no channel are white: the model lacks something, and the values are "
+            "not to be believed, whatever their intervals."
+        )
+    which = f"The residuals of {', '.join(names)} are not white: the model lacks something"
+    return f"{which}, and the intervals are too narrow." if names else ""
 
 
 def parameter_table(record: Mapping[str, Any]) -> Table:

@@ -15,6 +15,7 @@ from railsim.files.access import read_bytes
 from railsim.identification import Identified
 from railsim.identification.identified import (
     AT_BOUND,
+    coloured,
     correlation_table,
     parameter_table,
     residual_table,
@@ -125,22 +126,22 @@ def identification_figures(found: Identified) -> dict[str, Figure]:
 def of_identification(record: Mapping[str, Any], figures: list[Drawing]) -> Part:
     """Return what a page says about an identification, by its record."""
     unidentified = record["unidentified"]
-    coloured = [one["channel"] for one in record["channels"] if one["white"] is False]
+    not_white = coloured((one["channel"], one["white"] is not False) for one in record["channels"])
     bounded = [words for words in record["remarks"] if AT_BOUND in words]
     text = "All parameters are identified; the residuals are white."
     if unidentified:
         text = "Not all parameters can be told apart."
     elif bounded:
         text = " ".join(bounded)
-    elif coloured:
-        text = f"The residuals of {', '.join(coloured)} are not white: the model lacks something."
+    elif not_white:
+        text = not_white
     sections = [
         Section("Parameters", unidentified, [parameter_table(record), correlation_table(record)]),
         Section("Residuals", tables=[residual_table(record)]),
         Section("Pictures", drawings=figures),
     ]
     title = f"{record['vehicle']}: identified parameters"
-    good = not (coloured or unidentified or bounded)
+    good = not (not_white or unidentified or bounded)
     remarks = [words for words in record["remarks"] if words not in text]
     return Part(title, text, good, remarks, sections, IDENTIFICATION)
 

@@ -16,6 +16,7 @@ from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
 from railsim.identification.fit import _at_best_shares, _covariance
+from railsim.identification.identified import coloured
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
@@ -315,8 +316,15 @@ def test_a_model_that_lacks_a_damper_leaves_residuals_that_are_not_white(tmp_pat
     path = measured(tmp_path, quarter(extra=damper), noise=0.01)
     one = railsim.identify(quarter(), path, [PRIMARY, SECONDARY], band=(0.5, 14.0), workers=1)
     assert not all(channel.is_white for channel in one.channels)
+    assert "not white: the model lacks something" in one.remarks[-1]
     assert max(channel.level for channel in one.channels) > 2.0
     assert one.inflation > 4.0
+
+
+def test_what_is_said_of_residuals_that_are_not_white():
+    assert coloured([("Q", True), ("Y", True)]) == ""
+    assert coloured([("Q", True), ("Y", False), ("Y", False)]).startswith("The residuals of Y are")
+    assert "not to be believed" in coloured([("Q", False), ("Y", False)])
 
 
 def test_whiteness_has_its_own_level():
