@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
+from railsim.definitions.track.definition import Track
 from railsim.definitions.track.layout import curvature_sections
 from railsim.errors import Fault, Faults
 from railsim.notation import Quantity
@@ -20,6 +21,7 @@ from railsim.result.tables import PLACE
 from railsim.table import Amount, Column, Table
 from railsim.text import in_words, printable, shortened
 
+BESIDE = 1e-6  # m, from ends of elements, at which the curvature may jump
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
 
@@ -168,7 +170,7 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
     (first, base), *others = results.items()
     faults = Faults()
     for label, result in others:
-        if curvature_sections(result.track()) != curvature_sections(base.track()):
+        if not _of_one_plan(base.track(), result.track()):
             found = f"runs over another plan than {first}"
             faults.append(Fault(label, "track", found, "results over one plan"))
         elif not _shared(*_places(base, result)).any():
@@ -189,6 +191,18 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
                     apart, quantity = there_too - values[there], base.quantities[name]
                     found_ones.append(Difference(quantity, labels, label, positions, apart))
     return found_ones
+
+
+def _of_one_plan(one: Track, other: Track) -> bool:
+    """Whether two tracks have the same curvature up to rounding, however they are divided."""
+    plans = []
+    for track in (one, other):
+        parts = curvature_sections(track)
+        ends = np.ravel([(part.begin + BESIDE, part.end - BESIDE) for part in parts])
+        plans.append((ends, np.ravel([(part.start_value, part.end_value) for part in parts])))
+    at = np.concatenate([ends for ends, _ in plans])
+    mine, others = (np.interp(at, *plan) for plan in plans)
+    return bool(np.allclose(mine, others, rtol=1e-6, atol=1e-9))
 
 
 def _leading(result: Result, name: str) -> dict[str, Floats]:

@@ -91,6 +91,31 @@ def test_leading_wheelsets_are_compared_at_the_same_place():
         assert one.distance[-1] == base["distance"][-1]
 
 
+@pytest.mark.parametrize(
+    ("written", "instead", "same"),
+    [
+        ("radius = 250.0", "radius = 250.0000000001", True),
+        (
+            '{ type = "STR", length = 300.0 }',
+            '{ type = "STR", length = 100.0 }, { type = "STR", length = 200.0 }',
+            True,
+        ),
+        ("radius = 250.0", "radius = 250.1", False),
+        ("length = 300.0", "length = 300.001", False),
+    ],
+)
+def test_a_plan_is_the_same_up_to_rounding_and_however_it_is_divided(written, instead, same):
+    base, track = example_result(), text("tracks/curve_r250.toml")
+    assert written in track
+    base = changed(base, {"track_toml": track})
+    other = changed(base, {"track_toml": track.replace(written, instead)})
+    if same:
+        assert not differences({"base": base, "other": other}, ["sum_Y"])[0].values.any()
+    else:
+        with pytest.raises(railsim.InputError, match="runs over another plan than base"):
+            differences({"base": base, "other": other}, ["sum_Y"])
+
+
 def test_conditions_that_differ_are_said_and_those_alike_are_not(files, tmp_path, capsys):
     """Another friction on one rail, rigid rails and another law: not the vehicle's doing."""
     track = text("tracks/curve_r250.toml") + '\n[support]\npreset = "rigid"\n'
