@@ -7,7 +7,7 @@ import numpy as np
 from railsim.arrays import Flags, Integers, stretches
 from railsim.definitions import Track
 from railsim.definitions.excitations.recording import BANDS, band_passed
-from railsim.table import Column, Table
+from railsim.table import Amount, Column, Table
 from railsim.track.irregularity import displacement
 
 CELL, SECTION = 25.0, 200.0  # m
@@ -64,12 +64,12 @@ class RecordedGeometry:
         left, if that is less than half a section.
         """
         row = next((row for row in GEOMETRY if 3.6 * speed <= row[0] + 1e-3), GEOMETRY[-1])
-        columns: list[Column | str] = [
-            Column(name, unit="m", format=".0f") for name in ("begin", "end")
+        ends = [Column(name, unit="m", format=".0f") for name in ("begin", "end")]
+        limits = [1e-3 * limit for limit in row[1:]]
+        compared = [
+            Column(name, f"{words} D1, limit {1e3 * limit:g}", "mm", form)
+            for (name, words, form), limit in zip(COMPARED, limits, strict=True)
         ]
-        for (name, words, form), limit in zip(COMPARED, row[1:], strict=True):
-            columns.append(Column(name, f"{words} D1, limit {limit:g}", "mm", form))
-        columns += ["geometry", "vehicles"]
         rows, flagged = [], np.zeros(5, dtype=np.int64)
         first, last = self.s[0], self.s[-1] + STEP
         edges = first + SECTION * np.arange(max(1, round((last - first) / SECTION)) + 1)
@@ -80,12 +80,14 @@ class RecordedGeometry:
             deviations, peaks = there.std(axis=1), np.abs(there).max(axis=1)
             values = [max(deviations[1], deviations[3]), max(deviations[0], deviations[2]),
                       max(peaks[1], peaks[3]), max(peaks[0], peaks[2])]  # fmt: skip
-            by_geometry = any(1e3 * v > m for v, m in zip(values, row[1:], strict=True))
+            by_geometry = any(v > limit for v, limit in zip(values, limits, strict=True))
             inside = (cells >= begin - 1e-6) & (cells < end - 1e-6)
             by_vehicles = bool(exceeded[inside].any())
             both = (0 if by_geometry else 1) if by_vehicles else (2 if by_geometry else 3)
             not_run = not by_vehicles and bool(unknown[inside].any())
             flagged[4 if not_run else both] += 1
-            rows.append([begin, end, *map(float, values), "flagged" if by_geometry else "",
+            judged = zip(map(float, values), compared, limits, strict=True)
+            shown = [Amount(value, column, limit=limit) for value, column, limit in judged]
+            rows.append([begin, end, *shown, "flagged" if by_geometry else "",
                          "not run" if not_run else "flagged" if by_vehicles else ""])  # fmt: skip
-        return Table(columns, rows), flagged
+        return Table([*ends, *compared, "geometry", "vehicles"], rows), flagged

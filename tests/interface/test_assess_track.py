@@ -402,6 +402,18 @@ def test_sections_are_counted_by_hand():
     assert records[-1]["end"] == pytest.approx(1060.0)
 
 
+def test_geometry_beyond_a_limit_does_not_read_like_it():
+    """Waves of 10 m whose standard deviation in D1 is 1.403 mm, of 1.4 mm up to 160 km/h."""
+    s = np.arange(0.0, 1000.0, 0.25)
+    geometry = object.__new__(RecordedGeometry)
+    wave = np.sqrt(2.0) * 1.403e-3 * np.sin(2.0 * np.pi * s / 10.0)
+    geometry.s, geometry.rails = s, np.array([0.0 * s, wave, 0.0 * s, wave])
+    cells = np.zeros(40, dtype=bool)
+    table, _ = geometry.sections(cells, cells, 40.0)
+    level = table.texts()[0][2]
+    assert (level, table.texts()[0][6]) == ("1.403", "flagged")
+
+
 def test_limits_of_geometry_are_the_least_of_en_13848_5():
     """Ranges of the standard, from memory, D1 [mm], up to a speed [km/h].
 
