@@ -52,8 +52,9 @@ def range_values(text: str) -> list[float] | None:
     if not found or (found[3] or found[7]) != (found[5] or found[7]) or (found[3] and found[7]):
         return None
     first, last, number = float(found[2]), float(found[4]), int(found[6])
-    if not 1 <= number <= MOST_VALUES:
-        raise ValueError(f"{number} values; 1 to {MOST_VALUES} are allowed")
+    least = 1 if first == last else 2  # of two ends one would be left out
+    if not least <= number <= MOST_VALUES:
+        raise ValueError(f"a range of {number}; {least} to {MOST_VALUES} values are allowed")
     scale = UNITS[found[3] or found[7] or "m"]
     shares = [k / (number - 1) if number > 1 else 0.0 for k in range(number)]
     if found[1]:

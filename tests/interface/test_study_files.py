@@ -23,6 +23,7 @@ from railsim.studies.plan import Plan
 from railsim.studies.rows import made_rows, quantile, sampled
 from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.study import run_study
+from railsim.units import range_values
 
 COACH = "coach_manchester"
 HEAD = f'format = "railsim-study/1"\nname = "n"\nvehicles = ["{COACH}"]\ntracks = ["{CURVE}"]\n'
@@ -217,6 +218,13 @@ def test_short_path_changes_what_the_long_one_does(tmp_path):
 def test_value_with_a_unit_is_in_si_and_text_stays_text():
     assert load_track(CURVE, ["gauge=1440mm"]).gauge == pytest.approx(1.44, rel=1e-12)
     assert load_track(CURVE, ["name=12mm"]).name == "12mm"
+
+
+def test_a_range_of_one_value_has_equal_ends():
+    """0.3:0.5:1 was 0.3 alone: the other end was left out in silence."""
+    assert range_values("0.3:0.3:1") == [0.3]
+    with pytest.raises(ValueError, match="a range of 1; 2 to 100000 values"):
+        range_values("0.3:0.5:1")
 
 
 def test_speeds_and_grid_take_units_and_ranges(tmp_path, simulated):
