@@ -324,7 +324,7 @@ def values_of(text: str, option: str) -> list[float]:
     """
     from railsim.units import number_with_unit, range_values
 
-    allowed = "first:last:number, such as 10:60:26, or values with commas between"
+    allowed = "first:last:number, such as 10:60:26, at least 2; or values with commas between"
     try:
         values = range_values(text)
         if values is None:

@@ -20,6 +20,7 @@ from railsim.files.access import make_folder
 from railsim.identification.identified import (
     AT_BOUND,
     INFINITE,
+    NORMAL,
     Channel,
     Identified,
     Place,
@@ -46,7 +47,7 @@ NARROW = 0.01  # of the distance between its bounds, within which a parameter li
 PART, LONG = 8.0, 3.0  # s that a first search uses, of runs that are as many times as long
 REWEIGHTED = 2  # times that the noise is taken from the residuals
 SHARES = 5  # of profiles that are tried before the search
-STRETCHED = 1e-3  # of the arc length, from which it is said
+STRETCHED = 1e-3  # of the arc length, from which it is said: its whole 95 % interval
 SCALE = 5.0  # weight of a residual in units of the noise beyond which a robust loss yields
 
 
@@ -348,12 +349,7 @@ def _outcome(
             problem.runs if problem.place else (), np.reshape(x[count:], (-1, 2)), strict=True
         )
     ]
-    remarks += [
-        f"{place.run}: its arc length is stretched by {1e3 * place.stretch:+.2f} m/km: distance, "
-        "speed or clock are off by as much; where it is the clock, so are all frequencies."
-        for place in places
-        if abs(place.stretch) > STRETCHED
-    ]
+    remarks += _stretched(places, STRETCH * np.sqrt(np.diag(covariance))[count + 1 :: 2])
     remarks += _at_bounds(problem.parameters, x)
     remarks += filter(None, [coloured((one.name, one.is_white) for one in channels)])
     return Identified(
@@ -361,6 +357,16 @@ def _outcome(
         values, vectors, tuple(channels), tuple(places), problem.form.kind, problem.form.band,
         inflation, problem.simulations, tuple(remarks),
     )  # fmt: skip
+
+
+def _stretched(places: Sequence[Place], deviations: Floats) -> list[str]:
+    """Say whose arc length is stretched, its standard deviation being known: not what is noise."""
+    return [
+        f"{place.run}: its arc length is stretched by {1e3 * place.stretch:+.2f} m/km: distance, "
+        "speed or clock are off by as much; where it is the clock, so are all frequencies."
+        for place, deviation in zip(places, deviations, strict=True)
+        if abs(place.stretch) - NORMAL * deviation > STRETCHED
+    ]
 
 
 def _at_bounds(parameters: Sequence[Parameter], x: Floats) -> list[str]:

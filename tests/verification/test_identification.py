@@ -15,8 +15,8 @@ import railsim
 from railsim.cli import railsim as command_line
 from railsim.definitions.vehicle.definition import Vehicle
 from railsim.identification import Identified
-from railsim.identification.fit import _at_best_shares, _covariance
-from railsim.identification.identified import coloured
+from railsim.identification.fit import _at_best_shares, _covariance, _stretched
+from railsim.identification.identified import Place, coloured
 from railsim.identification.parameters import Model, Parameter, blended, parsed, scaled
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
@@ -634,6 +634,13 @@ def test_a_stretched_arc_length_is_said(found, tmp_path):
     one = railsim.identify(quarter(), runs, keys, band=(0.5, 14.0), workers=1)
     (words,) = (words for words in one.remarks if "stretched" in words)
     assert words.startswith("off: its arc length is stretched by -3.0")
+
+
+def test_a_stretch_that_the_noise_explains_is_not_said():
+    """-1.21 m/km with a standard deviation of 0.58 m/km, from a band with nothing but noise."""
+    places = [Place("a", 0.2, -1.21e-3), Place("b", 0.0, -1.21e-3), Place("c", 0.0, 9e-4)]
+    (said,) = _stretched(places, np.array([0.58e-3, 0.05e-3, 1e-6]))
+    assert said.startswith("b: its arc length is stretched by -1.21 m/km")
 
 
 def test_a_share_of_profiles_begins_in_the_deepest_of_several_valleys():
