@@ -57,8 +57,9 @@ def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
     The accelerations of the seat surface (A) and back (D) are those of the floor: the model has no
     seat.
 
-    `a` (float64[time, 3]): Acceleration along x, y, z [m/s2]. `rate`: Samples per second [1/s].
-    Returns: Values are nan where the record is shorter than a block.
+    `a` (float64[time, 3]): Acceleration along x, y, z [m/s2]; where it begins abruptly the weighted
+    one is in error for 3 s, and the first block by 10 %. `rate`: Samples per second [1/s]. Returns:
+    Values are nan where the record is shorter than a block.
     """
     floor, back = weighted_for_comfort(a, rate)
     return mean_comfort(block_rms(floor, rate), block_rms(back, rate))
