@@ -13,7 +13,7 @@ from railsim.files.access import check_folder, make_folder
 @click.command()
 @click.argument("kinds", nargs=-1, metavar="[KIND]...")
 @cli.option("--draw", "Draw every listed vehicle and track into this folder.", "DIR")
-@cli.collected("output", cli.Output, cli.overwrite_option, cli.json_option)
+@cli.output_options()
 def command(kinds: tuple[str, ...], draw: str | None, output: cli.Output) -> None:
     """List everything that can be given by its bare name: vehicles, tracks, profiles, laws ...
 

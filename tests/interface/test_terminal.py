@@ -4,9 +4,10 @@ import json
 import re
 import sys
 
+import click
 import pytest
 
-from railsim.cli import main
+from railsim.cli import main, railsim
 from railsim.cli.terminal import in_width, show
 from railsim.table import Table
 
@@ -32,6 +33,20 @@ def test_a_terminal_gets_tables_of_its_width(columns, colours, capsys, monkeypat
 def test_long_lines_are_folded_between_words_under_their_beginning():
     assert in_width("  source: of the number", 16) == "  source: of the\n    number"
     assert in_width("  source: of the number", None) == "  source: of the number"
+
+
+def commands(group, context):
+    for name in group.list_commands(context):
+        inner = group.get_command(context, name)
+        below = click.Context(inner, info_name=name, parent=context)
+        yield from commands(inner, below) if isinstance(inner, click.Group) else [below]
+
+
+def test_every_command_has_an_example_and_answers_quietly_and_in_json():
+    for context in commands(railsim, click.Context(railsim, info_name="railsim")):
+        text = context.get_help()
+        assert "Example" in text, context.command_path
+        assert {"--json", "--quiet"} <= set(text.split()), context.command_path
 
 
 def test_a_file_gets_whole_lines(capsys):
