@@ -2,14 +2,14 @@
 
 import pickle
 from collections.abc import Iterable, Mapping
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, get_args
 
 import tomli_w
 from pydantic import ValidationError
 
-from railsim.definitions.base import Definition, Remark
+from railsim.definitions.base import Definition, Remark, kept
 from railsim.definitions.faults import validation_faults
 from railsim.errors import Fault, InputError
 from railsim.files.access import check_file, write_text
@@ -74,12 +74,8 @@ class FileDefinition(Definition):
 
     def to_toml(self) -> str:
         """Return the whole definition as TOML text, defaults included, `extends` resolved."""
-        return self._toml
-
-    @cached_property
-    def _toml(self) -> str:
         # a study asks for it once for every run
-        return tomli_w.dumps(self.model_dump(exclude_none=True))
+        return str(kept(self, "_toml", lambda: tomli_w.dumps(self.model_dump(exclude_none=True))))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the definition as a file, which appears when it is whole.
@@ -124,13 +120,10 @@ class FileDefinition(Definition):
         return validated(kind, with_values(source, values, kind.OPEN_TABLES, _defaults(kind)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return restored, (type(self), self._pickled)
-
-    @cached_property
-    def _pickled(self) -> bytes:
         # its values alone, without what was worked out
         values = {name: self.__dict__[name] for name in type(self).model_fields}
-        return pickle.dumps((self.model_fields_set, values))
+        given = self.model_fields_set
+        return restored, (type(self), kept(self, "_pickled", lambda: pickle.dumps((given, values))))
 
     def __repr__(self) -> str:
         kind, name = type(self).__name__, getattr(self, "name", None)

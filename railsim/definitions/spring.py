@@ -307,7 +307,24 @@ class TrailingArmSuspension(FileDefinition):
 
     def unusual(self) -> list[base.Remark]:
         """Return what is allowed but unusual."""
-        return spring_remarks(self)
+        remarks = []
+        if self.search is not None:
+            unlimited = "missing: the search does not limit the stress"
+            if self.material.tau_allowable is None:
+                remarks.append(
+                    base.Remark("material.tau_allowable", f"{unlimited} of the solid springs")
+                )
+            if self.fatigue is None:
+                remarks.append(base.Remark("fatigue", f"{unlimited} in service"))
+        for name, spring in self.springs.items():
+            wire = spring.wire_diameter
+            if wire is not None and not 3.0 <= (index := spring.mean_diameter / wire) <= 12.0:
+                text = f"spring index D/d is {index:.2f}; EN 13906-1 covers 3 to 12, hot coiled"
+                remarks.append(base.Remark(f"{name}.mean_diameter", text))
+            if spring.active_coils is not None and spring.active_coils < 3.0:
+                text = "EN 13906-1 covers hot coiled springs from 3 on"
+                remarks.append(base.Remark(f"{name}.active_coils", text))
+        return remarks
 
     @property
     def seat_heights(self) -> tuple[float, ...]:
@@ -368,28 +385,6 @@ def _tolerance_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
             if value is not None and deviation >= value:
                 found = f"{deviation:g}, but {name}.{key} is {value:g}"
                 yield Fault("", f"tolerances.{key}", found, "less than what deviates")
-
-
-def spring_remarks(suspension: TrailingArmSuspension) -> list[base.Remark]:
-    """What is allowed in a spring file but unusual."""
-    remarks = []
-    if suspension.search is not None:
-        unlimited = "missing: the search does not limit the stress"
-        if suspension.material.tau_allowable is None:
-            remarks.append(
-                base.Remark("material.tau_allowable", f"{unlimited} of the solid springs")
-            )
-        if suspension.fatigue is None:
-            remarks.append(base.Remark("fatigue", f"{unlimited} in service"))
-    for name, spring in suspension.springs.items():
-        wire = spring.wire_diameter
-        if wire is not None and not 3.0 <= (index := spring.mean_diameter / wire) <= 12.0:
-            text = f"spring index D/d is {index:.2f}; EN 13906-1 covers 3 to 12, hot coiled"
-            remarks.append(base.Remark(f"{name}.mean_diameter", text))
-        if spring.active_coils is not None and spring.active_coils < 3.0:
-            text = "EN 13906-1 covers hot coiled springs from 3 on"
-            remarks.append(base.Remark(f"{name}.active_coils", text))
-    return remarks
 
 
 def radial_clearance(outer: HelicalSpring, inner: HelicalSpring) -> float:

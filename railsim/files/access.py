@@ -85,7 +85,11 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
         found, allowed = f"{folder.name} is the name of a file", "give the name of a folder"
     elif found := _unwritable(folder):
         allowed = "choose another folder"
-    elif unlike := [name for name in names if _is_other_kind(folder / name, name)]:
+    elif unlike := [
+        name
+        for name in names
+        if (folder / name).exists() and (folder / name).is_dir() != name.endswith("/")
+    ]:
         found = f"{folder / unlike[0]} is a {'file' if unlike[0].endswith('/') else 'folder'}"
         allowed = "rename it, or choose another folder"
     elif not overwrite and (
@@ -93,10 +97,6 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
     ):
         found, allowed = f"{folder} holds {', '.join(there)}", "give `overwrite` or another folder"
     _refuse(found, allowed, parameter="out")
-
-
-def _is_other_kind(path: Path, name: str) -> bool:
-    return path.exists() and path.is_dir() != name.endswith("/")
 
 
 def write_folder(

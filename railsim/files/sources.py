@@ -342,7 +342,8 @@ def _merge(
         path = (*at, key)
         old = table.get(key)
         origin[path] = file
-        if isinstance(value, dict) and isinstance(old, dict) and not _other_kind(old, value):
+        kind = old.get("kind") if isinstance(old, dict) else None
+        if isinstance(value, dict) and isinstance(old, dict) and value.get("kind", kind) == kind:
             _merge(old, value, path, origin, file)
         else:
             table[key] = value
@@ -357,10 +358,6 @@ def replace_origin(
         origin.pop(known, None)
     origin[path] = file
     origin.update(dict.fromkeys(_paths(value, path), file))
-
-
-def _other_kind(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    return "kind" in new and new["kind"] != old.get("kind")
 
 
 def _remove(base: Source, key: str, file: str) -> list[Fault]:

@@ -201,10 +201,12 @@ class _Pool:
                 for future in ended:
                     index = self._running[future]
                     try:
-                        record = _outcome(future, self._jobs[index])
+                        record = future.result()
                     except BrokenProcessPool:
                         broken = True
                         continue
+                    except Exception as error:
+                        record = failed_record(self._jobs[index].case, error)
                     del self._running[future]
                     done += 1
                     yield index, record
@@ -317,15 +319,6 @@ def _taken(future: Any, job: Job) -> Record:
         return failed_record(job.case, error)
     found: Record = record
     return found
-
-
-def _outcome(future: Future[Record], job: Job) -> Record:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        raise
-    except Exception as error:
-        return failed_record(job.case, error)
 
 
 # shared with worker processes: progress and process of all jobs, and whether to stop

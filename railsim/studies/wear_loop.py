@@ -92,13 +92,6 @@ class WearStep:
         return self.depths[WHEEL]
 
 
-class _Wear(NamedTuple):
-    """Mean depth of wear per distance or tonnage; sentences on hunting by track and speed."""
-
-    depths: dict[str, Floats]
-    hunts: dict[str, str]
-
-
 @dataclass(frozen=True)
 class Loop:
     """How a loop is carried out.
@@ -212,19 +205,19 @@ def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
                 )
                 if kept := kept_record(path, remark):
                     depths = {name: np.asarray(depth) for name, depth in kept["depths"].items()}
-                    wear = _Wear(depths, kept["hunts"])
+                    hunts = kept["hunts"]
                 else:
-                    wear = _wear(wearing, settings, law, worn, at, part)
+                    depths, hunts = _wear(wearing, settings, law, worn, at, part)
                     if path is not None:
-                        lists = {name: depth.tolist() for name, depth in wear.depths.items()}
-                        write_record(path, {"distance": at, "depths": lists, "hunts": wear.hunts})
-                for route, words in wear.hunts.items():
+                        lists = {name: depth.tolist() for name, depth in depths.items()}
+                        write_record(path, {"distance": at, "depths": lists, "hunts": hunts})
+                for route, words in hunts.items():
                     if route not in hunting:
                         remark(f"after {wearing.amount(at)} on {route}: {words}")
-                hunting |= wear.hunts.keys()
-                length = left / max(parts_of_step(worn[k], wear.depths[k], left) for k in worn)
-                worn = {k: worn_profile(worn[k], wear.depths[k], length) for k in worn}
-                lost = {k: lost[k] + wear.depths[k] * length for k in worn}
+                hunting |= hunts.keys()
+                length = left / max(parts_of_step(worn[k], depths[k], left) for k in worn)
+                worn = {k: worn_profile(worn[k], depths[k], length) for k in worn}
+                lost = {k: lost[k] + depths[k] * length for k in worn}
                 at, left = at + length, left - length
                 if why := wearing.ended(worn):
                     remark(f"after {wearing.amount(at)}: {why}: the loop ends")
@@ -345,8 +338,11 @@ def _wear(
     worn: Mapping[str, Profile],
     at: float,
     progress: Callable[[float], None],
-) -> _Wear:
-    """Mean of the runs weighted by their shares."""
+) -> tuple[dict[str, Floats], dict[str, str]]:
+    """Depth of wear per distance or tonnage, mean of the runs weighted by their shares.
+
+    And sentences on hunting by track and speed.
+    """
     total = sum(run.share for run in wearing.runs)
     several = len({run.vehicle.name for run in wearing.runs}) > 1  # of them it is said which
     depths, hunts = [], dict[str, str]()
@@ -375,7 +371,7 @@ def _wear(
             raise ModelError(f"{place}: {error}") from None
         if words:
             hunts[f"{run.track.name} at {run.speed:g} m/s{of}"] = words
-    return _Wear({k: np.asarray(np.sum([d[k] for d in depths], axis=0)) for k in worn}, hunts)
+    return ({k: np.asarray(np.sum([d[k] for d in depths], axis=0)) for k in worn}, hunts)
 
 
 def _hunting(result: Result) -> str | None:

@@ -97,7 +97,9 @@ class Random(base.Stretch):
             shares *= base.MIRROR[channel] if self.mirror else 1.0
             shares *= spectrum.half_base if channel == "cross_level" else 1.0
             amplitudes = _amplitudes(spectrum, channel, self.wavelengths, period)
-            phases = _phases(self.seed, channel, amplitudes.size)
+            # the same for a seed whatever the other channels
+            generator = np.random.default_rng([self.seed, base.CHANNELS.index(channel)])
+            phases = generator.uniform(0.0, 2.0 * np.pi, amplitudes.size)
             waves = _waves(amplitudes, phases, period, n_points)
             for k in np.flatnonzero(shares):
                 lattice[:, k] += shares[k] * waves
@@ -117,12 +119,6 @@ def _amplitudes(
     middle = step * np.arange(int(np.ceil(high / step)) + 1)
     begin, end = np.clip([middle - 0.5 * step, middle + 0.5 * step], low, high)
     return np.sqrt(2.0 * spectrum.bin_variances(channel, begin, end))
-
-
-def _phases(seed: int, channel: str, number: int) -> Floats:
-    """Random phases of a channel: the same for a seed whatever the other channels [rad]."""
-    generator = np.random.default_rng([seed, base.CHANNELS.index(channel)])
-    return generator.uniform(0.0, 2.0 * np.pi, number)
 
 
 def _waves(amplitudes: Floats, phases: Floats, period: float, n_points: int) -> Floats:

@@ -6,14 +6,13 @@ allowed but unusual is a remark.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
-from railsim.definitions.track.alignment_rules import alignment_remarks
+from railsim.definitions.track.alignment_rules import alignment_remarks, cant_at
 from railsim.definitions.track.elements import TrackElement
 from railsim.definitions.track.section import Section
 from railsim.errors import Fault
@@ -287,13 +286,13 @@ def _cant_base(cant: Sequence[Section], base: float) -> list[Remark]:
 
 def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:
     """Remark on cant on a straight and on cant whose outer rail is the lower one."""
-    if not cant:
-        return []
-    last = cant[-1]
-    rest = replace(last, begin=last.end, end=last.end + plan[-1].end, start_value=last.end_value)
     remarks = []
-    for element in plan:
-        pairs = _curvature_and_cant(element, (*cant, rest))
+    for element in plan if cant else ():
+        inside = [one.end for one in cant if element.begin < one.end < element.end]
+        ends = [element.begin, *inside, element.end]
+        # ends and middles of the stretches with one element of the cant
+        places = [*ends, *(0.5 * (begin + end) for begin, end in pairwise(ends))]
+        pairs = [(element.value(s), cant_at(cant, s)) for s in places]
         if element.type == "STR":
             found, astray = "cant without curve", [abs(height) for _, height in pairs]
         else:
@@ -302,14 +301,3 @@ def _cant_sides(cant: Sequence[Section], plan: Sequence[Section]) -> list[Remark
         if max(astray, default=0.0) > ASTRAY_CANT:
             remarks.append(Remark(element.key, f"{found}: {1e3 * max(astray):.0f} mm"))
     return remarks
-
-
-def _curvature_and_cant(element: Section, cant: Sequence[Section]) -> list[tuple[float, float]]:
-    """Return pairs of curvature and cant at the ends and middles of their common stretches."""
-    pairs = []
-    for section in cant:
-        begin, end = max(element.begin, section.begin), min(element.end, section.end)
-        if end - begin > SMALL:
-            stretch = (begin, 0.5 * (begin + end), end)
-            pairs += [(element.value(s), section.value(s)) for s in stretch]
-    return pairs

@@ -12,10 +12,6 @@ from railsim.arrays import Floats
 from railsim.definitions.track.section import Section
 
 
-def _array(s: ArrayLike) -> Floats:
-    return np.asarray(s, dtype=np.float64)
-
-
 def _running(parts: Floats) -> Floats:
     """Sum of all parts before each."""
     return np.concatenate([[0.0], np.cumsum(parts)[:-1]])
@@ -38,8 +34,9 @@ class RoundedProfile:
         once = _running(value * width + slope * width**2 / 2.0)
         twice = _running(once * width + value * width**2 / 2.0 + slope * width**3 / 6.0)
         self._knots = origin + np.array(knots)
-        # coefficients of each piece, highest power first: of derivative, value and two integrals
+        # coefficients of each piece, highest power first: of two derivatives, value, two integrals
         self._pieces = (
+            (np.zeros_like(slope),),
             (slope,),
             (slope, value),
             (slope / 2.0, value, once),
@@ -48,47 +45,39 @@ class RoundedProfile:
         self._half_window = 0.5 * rounding
         self._is_zero = not sections
 
-    def _plain(self, times: int, s: ArrayLike) -> Floats:
-        """Derivative (-1), value (0), integral (1) or double integral (2) before rounding."""
+    def _plain(self, times: int, at: Floats) -> Floats:
+        """Derivatives (-2, -1), value (0) or integrals (1, 2) before rounding."""
         # scipy's PPoly does this too, but its package takes a quarter of a second to import
-        at = _array(s)
-        if self._is_zero:
-            return np.zeros_like(at)
         piece = np.clip(np.searchsorted(self._knots, at, side="right") - 1, 0, None)
         u = at - self._knots[piece]
-        highest, *others = self._pieces[times + 1]
+        highest, *others = self._pieces[times + 2]
         total: Floats = highest[piece]
         for coefficient in others:
             total = total * u + coefficient[piece]
         return total
 
-    def _mean(self, times: int, s: ArrayLike) -> Floats:
-        at, h = _array(s), self._half_window
+    def _rounded(self, times: int, s: ArrayLike) -> Floats:
+        """As `_plain`, the mean over the window."""
+        at, h = np.asarray(s, dtype=np.float64), self._half_window
         if self._is_zero:
             return np.zeros_like(at)
-        mean: Floats = (self._plain(times, at + h) - self._plain(times, at - h)) / (2.0 * h)
+        if h == 0.0:
+            return self._plain(times, at)
+        mean: Floats = (self._plain(times + 1, at + h) - self._plain(times + 1, at - h)) / (2.0 * h)
         return mean
 
     def __call__(self, s: ArrayLike) -> Floats:
         """Value at the arc length `s` [m]."""
-        if self._half_window == 0.0:
-            return self._plain(0, s)
-        return self._mean(1, s)
+        return self._rounded(0, s)
 
     def rate(self, s: ArrayLike) -> Floats:
         """Derivative along the track at `s`."""
-        if self._half_window == 0.0:
-            return self._plain(-1, s)
-        return self._mean(0, s)
+        return self._rounded(-1, s)
 
     def second_rate(self, s: ArrayLike) -> Floats:
         """Second derivative along the track."""
-        if self._half_window == 0.0:
-            return np.zeros_like(_array(s))
-        return self._mean(-1, s)
+        return self._rounded(-2, s)
 
     def integral(self, s: ArrayLike) -> Floats:
         """Integral from 0 to `s`."""
-        if self._half_window == 0.0:
-            return self._plain(1, s) - self._plain(1, 0.0)
-        return self._mean(2, s) - self._mean(2, 0.0)
+        return self._rounded(1, s) - self._rounded(1, 0.0)

@@ -6,7 +6,7 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -43,6 +43,7 @@ class FlatBody:
     parent: str | None = None  # wheelset that carries the axlebox
     pitch_inertia: float = 0.0  # of an axlebox about the axle [kg m2]
     fixed: str | None = None  # where a body is held: ``track`` or ``ground``
+    key: str = field(default="", compare=False)  # of its table in the file; not of bodies
 
 
 @dataclass(frozen=True)
@@ -198,8 +199,9 @@ def _bodies(group: Group, frame: _Frame) -> Iterator[FlatBody]:
 
 def _wheelsets(group: Group, frame: _Frame) -> Iterator[FlatBody]:
     for name, wheelset in group.wheelsets.items():
-        at = frame.point(wheelset.position)
-        yield FlatBody(frame.full(name), "wheelset", wheelset.mass, wheelset.inertia, at, wheelset)
+        about = wheelset.mass, wheelset.inertia, frame.point(wheelset.position), wheelset
+        key = frame.key("wheelsets", name)
+        yield FlatBody(frame.full(name), "wheelset", *about, key=key)
 
 
 def _axleboxes(group: Group, frame: _Frame, wheelsets: Mapping[str, int]) -> Iterator[FlatBody]:
@@ -214,6 +216,7 @@ def _axleboxes(group: Group, frame: _Frame, wheelsets: Mapping[str, int]) -> Ite
                 frame.point(box.position, side),
                 parent=parent,
                 pitch_inertia=box.pitch_inertia,
+                key=frame.key("axleboxes", name),
             )
 
 
@@ -247,7 +250,7 @@ def position_faults(vehicle: "Vehicle") -> list[Fault]:
 
 
 def _position_faults(vehicle: "Vehicle") -> Iterator[Fault]:
-    flat, keys = _flat(vehicle), _keys(vehicle)
+    flat = _flat(vehicle)
     wheelsets = flat.of_kind("wheelset")
     for body in wheelsets:
         assert body.wheelset is not None  # of its kind
@@ -255,32 +258,21 @@ def _position_faults(vehicle: "Vehicle") -> Iterator[Fault]:
         if abs(body.position[2] + radius) > POSITION_TOLERANCE:
             found = f"the axle of '{body.name}' is at z = {body.position[2]:g} m"
             allowed = f"z = {-radius:g} m, so that the wheels stand on the rails"
-            yield Fault("", f"{keys[body.name]}.position", found, allowed)
+            yield Fault("", f"{body.key}.position", found, allowed)
     for box in flat.of_kind("axlebox"):
         axle = flat.body(box.parent or "").position
         if max(abs(box.position[i] - axle[i]) for i in (0, 2)) > POSITION_TOLERANCE:
             found = f"'{box.name}' is off its axle by more than {POSITION_TOLERANCE * 1e3:g} mm"
             allowed = f"x = {axle[0]:g} m, z = {axle[2]:g} m in vehicle axes"
-            yield Fault("", f"{keys[box.name]}.position", found, allowed)
+            yield Fault("", f"{box.key}.position", found, allowed)
     for ahead, behind in pairwise(wheelsets):
         if ahead.position[0] - behind.position[0] < POSITION_TOLERANCE:
             found = f"'{ahead.name}' and '{behind.name}' stand at the same position"
-            key = f"{keys[behind.name]}.position"
-            yield Fault("", key, found, "wheelsets one behind the other")
+            yield Fault("", f"{behind.key}.position", found, "wheelsets one behind the other")
     kinds = {body.name: body.kind for body in flat.bodies}
     for group, frame in _frames(vehicle, _Frame()):
         yield from _side_faults(group, frame)
         yield from _torque_faults(group, frame, kinds)
-
-
-def _keys(vehicle: "Vehicle") -> dict[str, str]:
-    return {
-        frame.full(sided): frame.key(table, name)
-        for group, frame in _frames(vehicle, _Frame())
-        for table in ("wheelsets", "axleboxes")
-        for name, part in getattr(group, table).items()
-        for sided, _ in sided_names(name, getattr(part, "sides", None))
-    }
 
 
 def _side_faults(group: Group, frame: _Frame) -> Iterator[Fault]:
