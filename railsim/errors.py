@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 
@@ -152,9 +153,9 @@ class InputError(RailsimError):
         return type(self), (self.faults,)
 
 
-def input_error(file: str, found: str, allowed: str = "", key: str = "") -> InputError:
+def input_error(file: str | Path, found: str, allowed: str = "", key: str = "") -> InputError:
     """Return the error of one fault, see `Fault`."""
-    return InputError([Fault(file, key, found, allowed)])
+    return InputError([Fault(str(file), key, found, allowed)])
 
 
 def argument_error(

@@ -169,7 +169,7 @@ def running_limits(standard: str, file: str | Path | None) -> RunningLimits:
         faults = (Fault(str(file), f"limits.{name}", *words) for name, words in found.items())
         raise InputError(faults)
     if limits.standard != standard:
-        raise input_error(str(file), repr(limits.standard), f"wanted: '{standard}'", "standard")
+        raise input_error(file, repr(limits.standard), f"wanted: '{standard}'", "standard")
     return limits
 
 

@@ -80,7 +80,7 @@ def _read(file: Path) -> dict[str, Any]:
     try:
         data: Any = json.loads(read_text(file, TABLE_BYTES))
     except (ValueError, RecursionError) as error:
-        raise input_error(str(file), f"cannot be read ({error})") from None
+        raise input_error(file, f"cannot be read ({error})") from None
     if isinstance(data, list) and data:
         data = data[0]
     modes = data.get("modes") if isinstance(data, dict) else None
@@ -88,6 +88,6 @@ def _read(file: Path) -> dict[str, Any]:
     complete = isinstance(modes, list) and all(isinstance(m, dict) and known <= {*m} for m in modes)
     if not modes or not complete:
         allowed = "the JSON of railsim modes"
-        raise input_error(str(file), "missing or incomplete", allowed, key="modes")
+        raise input_error(file, "missing or incomplete", allowed, key="modes")
     checked: dict[str, Any] = data
     return checked

@@ -20,7 +20,7 @@ import numpy as np
 
 from railsim.arrays import Floats
 from railsim.definitions.embedding import embed, tables_of
-from railsim.errors import Fault, InputError, input_error
+from railsim.errors import Fault, input_error
 from railsim.files.access import TABLE_BYTES, is_file, read_text
 from railsim.text import LONGEST_FILE, shortened
 
@@ -48,7 +48,7 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
     path = Path(path)
     suffix, own = path.suffix.lower(), ".slcs" if kind == "rail" else ".slcw"
     if suffix not in (own, ".csv"):
-        raise _wrong(path, "", f"unknown kind of file '{path.suffix}'", f"{own} or .csv")
+        raise input_error(path, f"unknown kind of file '{path.suffix}'", f"{own} or .csv")
     text = read_text(path, TABLE_BYTES)
     if suffix == ".csv":
         positions, points = _own_list(path, text, kind)
@@ -57,15 +57,11 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
         read = {name: _section(path, name) for name in dict.fromkeys(names)}
         points = [read[name] for name in names]
     if len(positions) < 2 or len(positions) > MOST_SECTIONS:
-        raise _wrong(path, "", f"{len(positions)} sections", f"2 to {MOST_SECTIONS}")
+        raise input_error(path, f"{len(positions)} sections", f"2 to {MOST_SECTIONS}")
     for before, after in pairwise(positions):
         if after <= before:
-            raise _wrong(path, "", f"position {after:g} after {before:g}", "rising positions")
+            raise input_error(path, f"position {after:g} after {before:g}", "rising positions")
     return SectionList(np.array(positions), tuple(points))
-
-
-def _wrong(path: Path, key: str, found: str, allowed: str) -> InputError:
-    return input_error(str(path), found, allowed, key=key)
 
 
 def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str]]:
@@ -87,12 +83,12 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str]]:
                 break
         if len(found) < least or not np.isfinite(found).all():
             shown = shortened(line) if line else "the end of the file"
-            raise _wrong(path, f"line {number}" if number else "", f"'{shown}'", what)
+            raise input_error(path, f"'{shown}'", what, f"line {number}" if number else "")
         return found
 
     offset, scale = numbers("offset and scale of the positions", 2)[:2]
     if scale == 0.0:
-        raise _wrong(path, "", "scale 0", "the scale of the positions, not zero")
+        raise input_error(path, "scale 0", "the scale of the positions, not zero")
     n = int(numbers("the number of sections", 1)[0])
     numbers("the numbers of features, kinks and accelerations", 3)
     numbers("the kind of interpolation", 1)
@@ -102,7 +98,8 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str]]:
         quoted = re.search(r"'([^']*)'", row[1])
         if quoted is None:
             shown = shortened(row[1]) or "the end of the file"
-            raise _wrong(path, f"line {row[0]}", f"'{shown}'", f"position and 'file', {n} times")
+            allowed = f"position and 'file', {n} times"
+            raise input_error(path, f"'{shown}'", allowed, f"line {row[0]}")
         positions.append(unit * scale * (offset + numbers("a position", 1, row)[0]))
         names.append(quoted.group(1))
     return positions, names
@@ -116,7 +113,7 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Float
     listed = {key, "file"} <= {*columns}
     if not listed and not {key, "y", "z"} <= {*columns}:
         allowed = f"{key}, file, or {key}, y, z"
-        raise _wrong(path, "", f"columns {', '.join(columns)}", allowed)
+        raise input_error(path, f"columns {', '.join(columns)}", allowed)
     at, *of = map(columns.index, (key, "file") if listed else (key, "y", "z"))
     found: dict[float, list[list[float]]] = {}
     files: list[tuple[float, str]] = []
@@ -129,7 +126,7 @@ def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Float
         if not np.isfinite([position, *point]).all():
             shown = ", ".join(row)
             allowed = f"{key}, file" if listed else f"numbers {key}, y, z"
-            raise _wrong(path, "", f"row '{shortened(shown)}'", allowed)
+            raise input_error(path, f"row '{shortened(shown)}'", allowed)
         found.setdefault(position, []).append(point)
     if listed:
         return [position for position, _ in files], [_section(path, name) for _, name in files]
@@ -141,7 +138,7 @@ def _section(path: Path, name: str) -> Floats:
     file = path.parent / name
     if not name or not is_file(file):
         shown = shortened(name, LONGEST_FILE)
-        raise _wrong(path, "", f"no file '{shown}'", f"a section beside {path.name}")
+        raise input_error(path, f"no file '{shown}'", f"a section beside {path.name}")
     rows = []
     for number, line in enumerate(read_text(file, TABLE_BYTES).splitlines(), start=1):
         words = re.split(r"[\s,;]+", line.split("%")[0].split("#")[0].strip())
@@ -150,9 +147,9 @@ def _section(path: Path, name: str) -> Floats:
         try:
             rows.append([float(word) for word in words[:2]])
         except ValueError:
-            raise _wrong(file, f"line {number}", f"'{shortened(line)}'", "y, z") from None
+            raise input_error(file, f"'{shortened(line)}'", "y, z", f"line {number}") from None
         if len(rows[-1]) < 2 or not np.isfinite(rows[-1]).all():
-            raise _wrong(file, f"line {number}", f"'{shortened(line)}'", "two numbers y, z")
+            raise input_error(file, f"'{shortened(line)}'", "two numbers y, z", f"line {number}")
     points = np.array(rows).T
     if points.size and np.abs(points).max() > 1.0:
         points = 1e-3 * points
@@ -162,12 +159,12 @@ def _section(path: Path, name: str) -> Floats:
 def _checked(file: Path, points: Floats) -> Floats:
     """Points of a section that can be one [m]."""
     if points.shape[-1] < FEWEST_POINTS:
-        raise _wrong(file, "", f"{points.shape[-1]} points", f"{FEWEST_POINTS} at least")
+        raise input_error(file, f"{points.shape[-1]} points", f"{FEWEST_POINTS} at least")
     width = float(np.ptp(points[0]))
     if not NARROWEST <= width <= WIDEST:
         found = f"a section {1e3 * width:.3g} mm wide"
         allowed = f"{1e3 * NARROWEST:g} to {1e3 * WIDEST:g} mm; y, z in m or mm"
-        raise _wrong(file, "", found, allowed)
+        raise input_error(file, found, allowed)
     return points
 
 

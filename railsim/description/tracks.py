@@ -94,15 +94,15 @@ def _irregularity(part: Irregularity) -> dict[str, Any]:
     """Return an irregularity; of a measured one what its rows hold instead of the rows."""
     data = part.model_dump(exclude_none=True, exclude={"rows"})
     if isinstance(part, Measured) and part.rows is not None:
-        found = largest_between_rows(part)
+        column, at_rows, between, _ = largest_between_rows(part)
         data = {key: value for key, value in data.items() if key not in READING}
         data |= {
             "number": len(part.rows),
             "first": part.rows[0][0] + part.shift,
             "last": part.rows[-1][0] + part.shift,
-            "column": found.column,
-            "largest_at_rows": found.at_rows,
-            "largest_between_rows": found.between,
+            "column": column,
+            "largest_at_rows": at_rows,
+            "largest_between_rows": between,
         }
     return data
 

@@ -185,7 +185,7 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         size = os.fstat(file.fileno()).st_size
         if size > limit:
             found, allowed = f"{size / 1e6:.1f} MB", f"{limit / 1e6:g} MB at most"
-            raise input_error(str(path), found, allowed)
+            raise input_error(path, found, allowed)
         try:
             return file.read(limit)
         except OSError as error:
@@ -203,20 +203,20 @@ def open_regular(path: str | Path) -> BinaryIO:
         resolved = path.resolve()
         system = any(resolved.is_relative_to(folder) for folder in _SYSTEM)
         if system and not resolved.is_relative_to(_SHARED_MEMORY):
-            raise input_error(str(path), "a file of the system", "give one of your own")
+            raise input_error(path, "a file of the system", "give one of your own")
         # a pipe would wait for its writer
         file = open(os.open(path, os.O_RDONLY | _NO_WAITING | _BINARY), "rb")  # noqa: SIM115
     except (OSError, ValueError, RuntimeError) as error:
         raise _unreadable(path, error) from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
-        raise input_error(str(path), "not a regular file", "give a file")
+        raise input_error(path, "not a regular file", "give a file")
     return file
 
 
 def _unreadable(path: Path, error: Exception) -> InputError:
     words = getattr(error, "strerror", None) or str(error)
-    return input_error(str(path), f"cannot be read ({words})")
+    return input_error(path, f"cannot be read ({words})")
 
 
 def read_text(path: str | Path, limit: int) -> str:
@@ -225,7 +225,7 @@ def read_text(path: str | Path, limit: int) -> str:
         return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
         allowed = "convert it, as by `iconv -t utf-8`"
-        raise input_error(str(path), "not UTF-8 text", allowed) from None
+        raise input_error(path, "not UTF-8 text", allowed) from None
 
 
 # writing ------------------------------------------------------------------------------------------

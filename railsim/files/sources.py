@@ -181,7 +181,7 @@ def find_any(name: str | Path) -> Path:
     found = f"'{name}' is a folder" if os.path.isdir(name) else f"no file '{name}'"
     known = [name for kind in FOLDERS for name in shipped_names(kind)]
     hint = nearest(str(name), known).removeprefix("allowed: ")
-    raise input_error(str(name), found, f"a path, or a shipped name: {hint}")
+    raise input_error(name, found, f"a path, or a shipped name: {hint}")
 
 
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
@@ -291,10 +291,10 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
     base_path = find_file(base_name, stated if stated in FOLDERS else kind, beside=path)
     if base_path.resolve() in chain:
         names = " -> ".join(p.name for p in (*chain, base_path))
-        raise input_error(str(path), f"a circle: {names}", "a chain with an end", key="extends")
+        raise input_error(path, f"a circle: {names}", "a chain with an end", key="extends")
     if len(chain) > LONGEST_CHAIN:
         found = f"the {len(chain)}th file in a chain"
-        raise input_error(str(path), found, f"{LONGEST_CHAIN} at most", key="extends")
+        raise input_error(path, found, f"{LONGEST_CHAIN} at most", key="extends")
     base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
     Faults(fault for key in removed for fault in _remove(base, key, str(path))).check()
     _merge(base.data, data, (), base.origin, str(path))

@@ -36,20 +36,16 @@ def pieces(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         found = f"the name ends in '{path.suffix}'"
-        raise input_error(str(path), found, "one of " + ", ".join(_READERS))
+        raise input_error(path, found, "one of " + ", ".join(_READERS))
     open_regular(path).close()
     if path.suffix.lower() in (".csv", ".txt") and any(index for _, index in wanted.values()):
-        raise input_error(str(path), "a table with 'index'", "leave 'index' out")
+        raise input_error(path, "a table with 'index'", "leave 'index' out")
     yield from reader(path, wanted, how)
-
-
-def _fault(path: Path, key: str, found: str, allowed: str = "") -> InputError:
-    return input_error(str(path), found, allowed, key=key)
 
 
 def _unreadable(path: Path, kind: str, error: Exception, allowed: str = "") -> InputError:
     words = str(error).partition("\n")[0][:100]
-    return input_error(str(path), f"cannot be read as {kind} ({words})", allowed)
+    return input_error(path, f"cannot be read as {kind} ({words})", allowed)
 
 
 def _named(path: Path, wanted: Wanted, known: Sequence[str]) -> None:
@@ -67,14 +63,14 @@ def _csv(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
             lines = _lines(text, how.skip)
             _, head = next(lines, (0, ""))
             if not head:
-                raise _fault(path, "", "empty", "names of columns and rows of numbers")
+                raise input_error(path, "empty", "names of columns and rows of numbers")
             delimiter = next((d for d in (";", "\t") if d in head), ",")
             names = [cell.strip().strip('"') for cell in head.split(delimiter)]
             _named(path, wanted, names)
             for theirs, _ in wanted.values():
                 if names.count(theirs) > 1:
                     found = f"{names.count(theirs)} columns '{theirs}'"
-                    raise _fault(path, "columns", found, "a name of its own for each")
+                    raise input_error(path, found, "a name of its own for each", "columns")
             where = {name: names.index(theirs) for name, (theirs, _) in wanted.items()}
             if how.units_row:
                 next(lines, None)
@@ -82,10 +78,10 @@ def _csv(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
                 yield _rows(path, rows, where, delimiter, len(names))
     except LookupError:
         allowed = "a name such as utf-8, latin-1 or utf-16"
-        raise _fault(path, "encoding", f"unknown encoding '{how.encoding}'", allowed) from None
+        raise input_error(path, f"unknown encoding '{how.encoding}'", allowed, "encoding") from None
     except UnicodeDecodeError as error:
         found = f"byte {error.start} is not {error.encoding}"
-        raise _fault(path, "", found, 'its encoding, such as encoding = "latin-1"') from None
+        raise input_error(path, found, 'its encoding, such as encoding = "latin-1"') from None
 
 
 def _lines(text: io.TextIOWrapper, skip: int) -> Iterator[tuple[int, str]]:
@@ -113,12 +109,13 @@ def _rows(
         cells = line.split(delimiter)
         if len(cells) != width:
             found, allowed = f"{len(cells)} values", f"{width} values as in the header"
-            raise _fault(path, f"line {number}", found, allowed)
+            raise input_error(path, found, allowed, f"line {number}")
         try:
             table[k] = [float(cells[p].strip() or "nan") for p in places]
         except ValueError as error:
             found = f"not a number ({error})".replace("could not convert string to float: ", "")
-            raise _fault(path, f"line {number}", found, "numbers, or nothing in a gap") from None
+            allowed = "numbers, or nothing in a gap"
+            raise input_error(path, found, allowed, f"line {number}") from None
     return {name: table[:, places.index(place)] for name, place in where.items()}
 
 
@@ -158,7 +155,7 @@ def _hdf5(
             yield from _slices(path, {n: own[column] for n, (column, _) in wanted.items()}, wanted)
     except OSError as error:
         words = str(error).partition("(")[2].rstrip(")") or str(error)
-        raise _fault(path, "", f"cannot be read as HDF5 ({words})") from None
+        raise input_error(path, f"cannot be read as HDF5 ({words})") from None
 
 
 def _matlab(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
@@ -176,7 +173,7 @@ def _matlab(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]
         _named(path, wanted, list(kinds))
         for name in theirs:
             if kinds[name] not in NUMERIC:
-                raise _fault(path, name, f"a {kinds[name]}", "an array of numbers")
+                raise input_error(path, f"a {kinds[name]}", "an array of numbers", name)
         arrays = matlab.loadmat(path, variable_names=theirs, squeeze_me=False)
     except InputError:
         raise
@@ -192,7 +189,7 @@ def _slices(path: Path, arrays: Mapping[str, Any], wanted: Wanted) -> Iterator[P
         first = next(iter(lengths))
         name = next(name for name in lengths if lengths[name] != lengths[first])
         found = f"{lengths[name]} values, '{wanted[first][0]}' has {lengths[first]}"
-        raise _fault(path, wanted[name][0], found, "arrays of one length")
+        raise input_error(path, found, "arrays of one length", wanted[name][0])
     count = next(iter(lengths.values()))
     for begin in range(0, count, ROWS):
         rows = slice(begin, min(begin + ROWS, count))
@@ -209,13 +206,13 @@ def _length(path: Path, array: Any, column: str, index: tuple[int, ...]) -> int:
     """Return the number of values of a series in an array; refuse what holds none."""
     shape = tuple(array.shape)
     if array.dtype.kind not in "fiub":
-        raise _fault(path, column, "holds no real numbers", "an array of numbers")
+        raise input_error(path, "holds no real numbers", "an array of numbers", column)
     if not index and (len(shape) == 1 or (len(shape) == 2 and 1 in shape)):
         return int(max(shape))
     if len(index) != len(shape) - 1 or any(k >= n for k, n in zip(index, shape[1:], strict=True)):
         sizes = " x ".join(map(str, shape)) or "one number"
         example = ", ".join("0" for _ in shape[1:])
-        raise _fault(path, column, f"an array of {sizes}", f"index = [{example}] or others")
+        raise input_error(path, f"an array of {sizes}", f"index = [{example}] or others", column)
     return int(shape[0])
 
 

@@ -181,7 +181,7 @@ def read_part(file: str | Path) -> Part:
     """
     path = _record_of(Path(file))
     if path is None:
-        raise input_error(str(file), "no record", " or ".join(RECORDS))
+        raise input_error(file, "no record", " or ".join(RECORDS))
     try:
         record = json.loads(read_bytes(path, LARGEST_RECORD))
         if path.name == RECORDS[0]:
@@ -192,7 +192,7 @@ def read_part(file: str | Path) -> Part:
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
         words = f"{type(error).__name__}: {error}"[:100]
         allowed = "the file as its command has written it"
-        raise input_error(str(path), words, allowed) from None
+        raise input_error(path, words, allowed) from None
 
 
 def _pictures(folder: Path, *names: str) -> list[Drawing]:

@@ -55,7 +55,7 @@ def sealed(path: Path) -> bool:
     if not found:
         return False
     if (int(found[1], 16), int(found[2])) != _crc_of(path, size - _SEAL_BYTES):
-        raise input_error(str(path), "its bytes are not those of its seal", REMEDY)
+        raise input_error(path, "its bytes are not those of its seal", REMEDY)
     return True
 
 

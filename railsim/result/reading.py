@@ -72,10 +72,10 @@ def opened(path: Path, *, just_sealed: bool = False) -> Result:
     if not is_file(path):
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
         found = "a folder" if os.path.isdir(path) else found
-        raise input_error(str(path), found, "give a result file (.h5)")
+        raise input_error(path, found, "give a result file (.h5)")
     with _readable(path):
         if path.stat().st_size == 0:
-            raise input_error(str(path), "the file is empty", AS_WRITTEN)
+            raise input_error(path, "the file is empty", AS_WRITTEN)
         stamp = _stamp(os.stat(path))
         whole = just_sealed or sealed(path)
         with h5py.File(path, "r") as file:
@@ -95,12 +95,12 @@ def open_run(path: str | Path) -> Result:
     Faults(Fault(str(path), name, "missing", AS_WRITTEN) for name in missing).check()
     if result.status not in STATES:
         found = f"'{result.status}'"
-        raise input_error(str(path), found, f"allowed: {', '.join(STATES)}", "status")
+        raise input_error(path, found, f"allowed: {', '.join(STATES)}", "status")
     for name in ARRAYS:
         if not np.all(np.isfinite(result[name])):
-            raise input_error(str(path), "holds what is not finite", REMEDY, name)
+            raise input_error(path, "holds what is not finite", REMEDY, name)
     if np.any(np.diff(result["time"]) <= 0.0):
-        raise input_error(str(path), "does not increase", REMEDY, "time")
+        raise input_error(path, "does not increase", REMEDY, "time")
     return result
 
 
@@ -196,7 +196,7 @@ def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None
     Raises InputError: it is another.
     """
     if _stamp(os.fstat(file.id.get_vfd_handle())) != stamp:
-        raise input_error(str(path), "was replaced or changed after it was opened", "open it again")
+        raise input_error(path, "was replaced or changed after it was opened", "open it again")
 
 
 @contextmanager
@@ -215,7 +215,7 @@ def _readable(path: Path, name: str = "") -> Iterator[None]:
         found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
         allowed = "give a result file of railsim (.h5)"
         allowed += "" if is_hdf5 and path.suffix != ".h5" else f"; {REMEDY}"
-        raise input_error(str(path), found, allowed, name) from None
+        raise input_error(path, found, allowed, name) from None
 
 
 class _Dataset(NamedTuple):
@@ -248,7 +248,7 @@ class _Reader:
         self._declared = 0  # bytes that arrays say they have
 
     def fault(self, name: str, found: str, allowed: str = AS_WRITTEN) -> InputError:
-        return input_error(str(self._path), found, allowed, name)
+        return input_error(self._path, found, allowed, name)
 
     def result(self, *, whole: bool) -> Result:
         file = self._file

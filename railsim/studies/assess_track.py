@@ -264,7 +264,7 @@ def recorded(recording: str | Path) -> Track:
     track = load_track(recording)
     if not any(isinstance(part, Measured) for part in track.irregularities):
         allowed = "an irregularity of the type 'measured'"
-        raise input_error(str(recording), "no recording", allowed, key="irregularities")
+        raise input_error(recording, "no recording", allowed, key="irregularities")
     return track
 
 

@@ -214,7 +214,7 @@ def _service(run: RunSpec) -> Service:
     service = _vehicle(run).service
     if service is None:
         allowed = "add [service] with admissible_speed and cant_deficiency"
-        raise input_error(str(run.vehicle), "missing", allowed, "service")
+        raise input_error(run.vehicle, "missing", allowed, "service")
     return service
 
 

@@ -14,10 +14,9 @@ from railsim.files.access import folder_of
 from railsim.result import Result, open_run
 from railsim.result.extremes import run_facts
 from railsim.studies.journal import JOURNAL, Journal, Records
+from railsim.studies.records import Record
 from railsim.studies.summary import read_index
 from railsim.table import Table
-
-Record = dict[str, Any]
 
 
 @dataclass

@@ -215,5 +215,5 @@ class Records(Sequence[Record]):
         except (ValueError, AttributeError) as error:
             found = f"a record that cannot be used ({error})"
             allowed = "remove the journal: existing results are kept"
-            raise input_error(str(self._path), found, allowed, key=entry.name) from None
+            raise input_error(self._path, found, allowed, key=entry.name) from None
         return record

@@ -30,7 +30,7 @@ def read_record(path: Path) -> Record:
     except (ValueError, TypeError, KeyError, RecursionError):
         whole = False
     if not whole:
-        raise input_error(str(path), "the record is damaged")
+        raise input_error(path, "the record is damaged")
     record: Record = stored["record"]
     return record
 

@@ -123,13 +123,13 @@ def read_index(path: Path) -> Index:
     text = read_text(path, INDEX_BYTES)
     # each takes some hundred bytes of memory when it is read
     if max(text.count(","), 5 * text.count("{"), 5 * text.count("[")) > MOST_VALUES:
-        raise input_error(str(path), "too many values", f"{MOST_VALUES} at most")
+        raise input_error(path, "too many values", f"{MOST_VALUES} at most")
     try:
         index: Any = json.loads(text)
     except (ValueError, RecursionError) as error:
         line = f"line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         words = f"broken JSON: {getattr(error, 'msg', error)}"
-        raise input_error(str(path), words, key=line) from None
+        raise input_error(path, words, key=line) from None
     index = index if isinstance(index, dict) else {"format": None}
     if index.get("format") == FORMAT:
         refuse_too_many(index.get("inputs"), str(path))

@@ -90,12 +90,12 @@ def measured_remarks(track: Track) -> list[str]:
     for index, part in enumerate(track.irregularities):
         if not isinstance(part, Measured):
             continue
-        found = largest_between_rows(part)
-        if found.between > BEYOND_ROWS * found.at_rows:
+        column, at_rows, between, s = largest_between_rows(part)
+        if between > BEYOND_ROWS * at_rows:
             remarks.append(
                 f"The rails go further between the rows of irregularities.{index} than at them: "
-                f"{found.column} reaches {1e3 * found.between:.3g} mm at s = {found.s:.1f} m, "
-                f"the largest row is {1e3 * found.at_rows:.3g} mm."
+                f"{column} reaches {1e3 * between:.3g} mm at s = {s:.1f} m, "
+                f"the largest row is {1e3 * at_rows:.3g} mm."
             )
         remarks += _gap_remarks(part, index) + _held_remarks(part, index, track)
     ends = [

@@ -731,10 +731,12 @@ def test_largest_value_between_the_rows_is_reported(tmp_path):
     met = recorded(tmp_path, written(s, 4e-3 * np.sin(2.0 * np.pi * s / 8.0)))
     assert measured_remarks(met) == []
     z = 4e-3 * np.sin(2.0 * np.pi * s / 8.0 + np.pi / 8.0)
-    found = largest_between_rows(recorded(tmp_path, written(s, z)).irregularities[0])
-    assert found.column == "z_left"
-    assert found.at_rows == pytest.approx(4e-3 * np.cos(np.pi / 8.0), rel=1e-6)
-    assert found.between == pytest.approx(4e-3, rel=0.01)
+    column, at_rows, between, _ = largest_between_rows(
+        recorded(tmp_path, written(s, z)).irregularities[0]
+    )
+    assert column == "z_left"
+    assert at_rows == pytest.approx(4e-3 * np.cos(np.pi / 8.0), rel=1e-6)
+    assert between == pytest.approx(4e-3, rel=0.01)
     (remark,) = measured_remarks(recorded(tmp_path, written(s, z)))
     assert "z_left reaches 4 mm" in remark
     assert "the largest row is 3.7 mm" in remark

@@ -1,6 +1,5 @@
 """Irregularities measured or computed elsewhere."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
@@ -152,19 +151,10 @@ def _between(positions: Floats, values: Floats, slopes: Floats) -> Floats:
     return np.asarray(np.stack(ends, axis=-1) @ basis)
 
 
-@dataclass(frozen=True)
-class Between:
-    """Largest displacement of a record at its rows, and of the rails between them [m]."""
-
-    column: str
-    at_rows: float
-    between: float
-    s: float
-
-
-def largest_between_rows(part: Measured) -> Between:
+def largest_between_rows(part: Measured) -> tuple[str, float, float, float]:
     """Return the largest displacement between the rows, of the column where it differs most.
 
+    Returns: column, largest displacement at the rows and between them, and s of the latter [m].
     A record that does not resolve the shortest wave that it holds lets the rails go further than
     any row says.
     """
@@ -175,12 +165,8 @@ def largest_between_rows(part: Measured) -> Between:
     further = np.where(at_rows > 0.0, found.max(axis=1) - at_rows, -np.inf)
     column = int(np.argmax(further))
     index = int(np.argmax(found[column]))
-    return Between(
-        base.COLUMNS[column],
-        float(at_rows[column]),
-        float(found[column, index]),
-        float(inner.ravel()[index]),
-    )
+    at = float(inner.ravel()[index])
+    return base.COLUMNS[column], float(at_rows[column]), float(found[column, index]), at
 
 
 def shape_preserving_slopes(positions: Floats, values: Floats) -> Floats:

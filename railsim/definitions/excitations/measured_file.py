@@ -106,9 +106,9 @@ def read_measured(path: Path, how: Measured) -> tuple[Floats, float | None]:
         raise input_error("", found, allowed, key) from None
     except UnicodeDecodeError as error:
         found = f"byte {error.start} is not {error.encoding}"
-        raise input_error(str(path), found, 'its encoding, such as encoding = "latin-1"') from None
+        raise input_error(path, found, 'its encoding, such as encoding = "latin-1"') from None
     except csv.Error as error:
-        raise input_error(str(path), f"no CSV ({error})", "a header and rows of numbers") from None
+        raise input_error(path, f"no CSV ({error})", "a header and rows of numbers") from None
 
 
 class Column(NamedTuple):
@@ -126,7 +126,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not numbered:
-        raise input_error(str(path), "empty", "a header and rows of numbers")
+        raise input_error(path, "empty", "a header and rows of numbers")
     delimiter = next((d for d in (";", "\t") if d in numbered[0][1]), ",")
     head = [cell.strip() for cell in next(csv.reader([numbered[0][1]], delimiter=delimiter))]
     columns = _mapped(path, head, how.columns) if how.columns else _header(path, head)
@@ -151,7 +151,7 @@ def _rows_of(path: Path, text: str, how: Measured) -> tuple[Floats, float | None
     faults.sort(key=lambda fault: fault[0])
     Faults(counted(Fault(str(path), f"line {n}", *words) for n, *words in faults)).check()
     if len(rows) < 4:
-        raise input_error(str(path), f"{len(rows)} rows", "four rows at least")
+        raise input_error(path, f"{len(rows)} rows", "four rows at least")
     return _filtered(path, rows, how), mileage
 
 
@@ -239,7 +239,7 @@ def _filtered(path: Path, rows: Floats, how: Measured) -> Floats:
     step = equal_step(rows[:, 0])
     if step is None:
         allowed = f"equal steps within 1 % (needed for '{'chord' if how.chord else 'band'}')"
-        raise input_error(str(path), "rows at unequal steps", allowed, "s")
+        raise input_error(path, "rows at unequal steps", allowed, "s")
     values = rows[:, 1:].T
     if how.chord:
         values = from_chord(values, step, how.chord)

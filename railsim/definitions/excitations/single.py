@@ -71,8 +71,6 @@ class Dip(Single):
     rail: Rails = "both"
     """Which rail"""
     shape: Literal["cosine", "triangle"] = "cosine"
-    """`cosine`: one wave of 1 - cos; `triangle`: two straights, kinks rounded over length / 10, of
-    which the middle keeps 95 %"""
 
     def mirrored(self) -> Self:
         """Return the same on the other rail."""

@@ -35,9 +35,8 @@ def alignment_remarks(
 ) -> list[Remark]:
     """Return where plan [1/m], cant [m] and gradient break the rules at a speed [m/s]."""
     return [
-        *_cants(plan, cant, speed),
+        *_curves(plan, cant, speed),
         *_ramps(cant, speed),
-        *_deficiencies(plan, cant, speed),
         *_transitions(plan, cant, speed),
         *_vertical_curves(vertical, speed),
     ]
@@ -51,19 +50,24 @@ def cant_at(cant: Sequence[Section], s: float) -> float:
     return cant[-1].end_value if cant else 0.0
 
 
-def _cants(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> Iterator[Remark]:
+def _curves(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> Iterator[Remark]:
     most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
+    at = f"at {3.6 * speed:.0f} km/h"
     for section in plan:
         if section.type != "CIR":
             continue
-        d = 1e3 * abs(cant_at(cant, 0.5 * (section.begin + section.end)))
-        radius = 1.0 / abs(section.start_value)
-        if d > most * ROUND_OFF:
-            yield Remark(section.key, f"a cant of {d:.0f} mm is more than {most:g} mm")
-        small = 0.5 * (radius - 100.0)
-        if d > max(small, 0.0) * ROUND_OFF:
-            text = f"a cant of {d:.0f} mm is more than (R - 100 m)/2 = {max(small, 0.0):.0f} mm"
-            yield Remark(section.key, text)
+        kappa = section.start_value
+        h = cant_at(cant, 0.5 * (section.begin + section.end))
+        d, small = 1e3 * abs(h), max(0.5 * (1.0 / abs(kappa) - 100.0), 0.0)
+        outwards = 1e3 * math.copysign(1.0, kappa) * cant_deficiency(speed, kappa, h)
+        for found, limit, words, rule in (
+            (d, most, f"a cant of {d:.0f} mm", ""),
+            (d, small, f"a cant of {d:.0f} mm", "(R - 100 m)/2 = "),
+            (outwards, MOST_DEFICIENCY, f"a cant deficiency of {outwards:.0f} mm {at}", ""),
+            (-outwards, MOST_EXCESS, f"a cant excess of {-outwards:.0f} mm {at}", ""),
+        ):
+            if found > limit * ROUND_OFF:
+                yield Remark(section.key, f"{words} is more than {rule}{limit:.0f} mm")
 
 
 def _ramps(cant: Sequence[Section], speed: float) -> Iterator[Remark]:
@@ -74,24 +78,6 @@ def _ramps(cant: Sequence[Section], speed: float) -> Iterator[Remark]:
             rule = f"180/V = {RAMP / V:.2f} mm/m at {V:.0f} km/h"
             beyond = ", and more than 216/V" if slope > RAMP_EXCEPTIONAL / V * ROUND_OFF else ""
             yield Remark(section.key, f"a ramp of {slope:.2f} mm/m is steeper than {rule}{beyond}")
-
-
-def _deficiencies(
-    plan: Sequence[Section], cant: Sequence[Section], speed: float
-) -> Iterator[Remark]:
-    for section in plan:
-        if section.type != "CIR":
-            continue
-        kappa = section.start_value
-        h = cant_at(cant, 0.5 * (section.begin + section.end))
-        outwards = 1e3 * math.copysign(1.0, kappa) * cant_deficiency(speed, kappa, h)
-        at = f"at {3.6 * speed:.0f} km/h"
-        if outwards > MOST_DEFICIENCY * ROUND_OFF:
-            text = f"a cant deficiency of {outwards:.0f} mm {at} is more than {MOST_DEFICIENCY:g}"
-            yield Remark(section.key, f"{text} mm")
-        if -outwards > MOST_EXCESS * ROUND_OFF:
-            text = f"a cant excess of {-outwards:.0f} mm {at} is more than {MOST_EXCESS:g} mm"
-            yield Remark(section.key, text)
 
 
 def _transitions(

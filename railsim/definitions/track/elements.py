@@ -35,11 +35,6 @@ class TrackElement(Definition):
             values = [None if radius is None else 1.0 / radius for radius in values]
         return values[0], values[-1]
 
-    @property
-    def is_ramp(self) -> bool:
-        """Whether its ends may differ."""
-        return len(self.KEYS) == 2
-
     def mirrored(self) -> Self:
         """Return the element with left and right exchanged."""
         values = {key: getattr(self, key) for key in self.KEYS if self.TURNS}

@@ -206,7 +206,7 @@ def _sections(name: str, elements: Sequence[TrackElement]) -> tuple[list[Section
         behind = ends[index + 1][0] if index + 1 < len(elements) else None
         start, end = ends[index]
         key = f"{name}.{index}"
-        if element.is_ramp:
+        if len(element.KEYS) == 2:  # a ramp
             faults += _end_faults(key, element.type, "start", start, before)
             faults += _end_faults(key, element.type, "end", end, behind)
         start, end = before if start is None else start, behind if end is None else end
