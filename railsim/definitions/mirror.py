@@ -4,20 +4,17 @@ A right-hand curve becomes the left-hand one, a lopsided load changes sides.  Mi
 mirrored track gives the mirrored result, which checks all signs.
 """
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from railsim.definitions.base import OTHER_SIDE, Vector
+from railsim.definitions.base import OTHER_SIDE, Definition, Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.track.definition import Track
 from railsim.definitions.vehicle.definition import Vehicle
-from railsim.definitions.vehicle.loads import LoadCase, LoadGroup
-from railsim.definitions.vehicle.tables import Assembly, Axlebox, Body, Placement, Point, Wheelset
 
 SIGNS = (1.0, -1.0, 1.0)
+TABLES = ("bodies", "wheelsets", "axleboxes", "elements", "assemblies", "loads", "sensors")
 
-Group = TypeVar("Group", Vehicle, Assembly)
-Load = TypeVar("Load", LoadCase, LoadGroup)
-Part = TypeVar("Part", Body, Wheelset, Axlebox, Placement, Point)
+Part = TypeVar("Part", bound=Definition)
 Row = tuple[float, float, float]
 
 
@@ -52,68 +49,31 @@ def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:
 
     Its load cases and sensors are mirrored too; signals and what controllers do with them are not.
     """
-    return _mirrored_group(vehicle).model_copy(
-        update={
-            "loads": {name: _mirrored_load(load) for name, load in vehicle.loads.items()},
-            "sensors": {name: _moved(point) for name, point in vehicle.sensors.items()},
-        }
-    )
+    return _mirrored(vehicle)
 
 
-def _mirrored_load(load: Load) -> Load:
-    bodies = {
-        name: body.model_copy(
-            update={"position": None if body.position is None else _across(body.position)}
-        )
-        for name, body in load.bodies.items()
-    }
-    groups = {name: _mirrored_load(group) for name, group in load.assemblies.items()}
-    return load.model_copy(update={"bodies": bodies, "assemblies": groups})
-
-
-def _mirrored_group(group: Group) -> Group:
-    update: dict[str, object] = {
-        "bodies": {name: _moved(body) for name, body in group.bodies.items()},
-        "wheelsets": {
-            name: _moved(w).model_copy(
-                update={
-                    "radius": w.radius[::-1],
-                    "profile": w.profile[::-1],
-                    "out_of_round": {
-                        key: part.model_copy(update={"wheel": OTHER_SIDE[part.wheel]})
-                        for key, part in w.out_of_round.items()
-                    },
-                }
-            )
-            for name, w in group.wheelsets.items()
-        },
-        "axleboxes": {
-            name: box if box.sides == "both" else _moved(box)
-            for name, box in group.axleboxes.items()
-        },
-        "elements": {name: _mirrored_element(e) for name, e in group.elements.items()},
-        "assemblies": {name: _mirrored_group(a) for name, a in group.assemblies.items()},
-    }
-    if isinstance(group, Assembly):
-        update["placements"] = tuple(_moved(placement) for placement in group.placements)
-    return group.model_copy(update=update)
+def _mirrored(part: Part) -> Part:
+    """Return a part of a vehicle, with all parts in it, on the other side."""
+    if getattr(part, "sides", None) == "both":
+        return part
+    update: dict[str, Any] = {}
+    for name, value in part:
+        match name, value:
+            case ("position" | "point", tuple()):
+                update[name] = _across(value)
+            case ("points", tuple()):
+                update[name] = tuple(map(_across, value))
+            case ("radius" | "profile", tuple()):
+                update[name] = value[::-1]
+            case ("wheel", _):
+                update[name] = OTHER_SIDE[value]
+            case ("placements", _):
+                update[name] = tuple(map(_mirrored, value))
+            case (_, dict()) if name in (*TABLES, "out_of_round"):
+                update[name] = {key: _mirrored(inner) for key, inner in value.items()}
+    turned = part.mirrored(SIGNS) if isinstance(part, Element) else part
+    return turned.model_copy(update=update)
 
 
 def _across(point: Vector) -> Vector:
     return (point[0], -point[1], point[2])
-
-
-def _moved(part: Part) -> Part:
-    return part.model_copy(update={"position": _across(part.position)})
-
-
-def _mirrored_element(element: Element) -> Element:
-    if getattr(element, "sides", None) == "both":
-        return element
-    point, points = getattr(element, "point", None), getattr(element, "points", None)
-    update: dict[str, object] = {}
-    if point is not None:
-        update["point"] = _across(point)
-    if points is not None:
-        update["points"] = tuple(_across(end) for end in points)
-    return element.mirrored(SIGNS).model_copy(update=update)
