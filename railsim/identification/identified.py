@@ -17,7 +17,7 @@ from railsim.files.access import check_file, relative, whole_file
 from railsim.identification.parameters import TRACK, Parameter, blended, present, scaled
 from railsim.identification.residuals import banded
 from railsim.profiles import save_profile
-from railsim.profiles.used import used_profiles
+from railsim.profiles.used import exchanged_wheels
 from railsim.table import Column, Table
 
 NORMAL = 1.959964  # of a normal distribution: 95 % within
@@ -287,7 +287,7 @@ class Identified:
             if parameter.of_vehicle != parameter.keys
         ]
         head += [f"# {words}" for words in self.remarks if AT_BOUND in words]
-        wheels = _wheels(self.vehicle, files)
+        wheels = exchanged_wheels(self.vehicle, {n: file for n, (file, _) in files.items()})
         if base is None:
             vehicle = self.fitted.with_values(wheels) if wheels else self.fitted
             return "\n".join([*head, vehicle.to_toml()])
@@ -318,18 +318,6 @@ class Identified:
 def _known(spread: float) -> str:
     """Return a standard deviation in words."""
     return "not shown by the data" if spread > INFINITE else f"+- {100 * spread:.2g} %"
-
-
-def _wheels(vehicle: Vehicle, files: Mapping[str, tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the profiles of both wheels by key, where one of them is replaced."""
-    found: dict[str, list[str]] = {}
-    for key, name, _ in used_profiles(vehicle):
-        found.setdefault(key, []).append(name)
-    return {
-        key: [files[name][0] if name in files else name for name in (names[0], names[-1])]
-        for key, names in found.items()
-        if files.keys() & {*names}
-    }
 
 
 def coloured(channels: Iterable[tuple[str, bool]]) -> str:

@@ -1,6 +1,6 @@
 """The profiles that a vehicle or a track names: whether they are there and of the right kind."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
 
 from railsim.definitions import Track, Vehicle
@@ -20,6 +20,18 @@ def used_profiles(definition: FileDefinition) -> Iterator[tuple[str, str, Kind]]
     elif isinstance(definition, Vehicle):
         for key, name in dict.fromkeys(_wheel_profiles(definition, ())):
             yield key, name, "wheel"
+
+
+def exchanged_wheels(vehicle: Vehicle, names: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return the profiles of both wheels by key, where one of them is replaced by another name."""
+    found: dict[str, list[str]] = {}
+    for key, name, _ in used_profiles(vehicle):
+        found.setdefault(key, []).append(name)
+    return {
+        key: [names.get(name, name) for name in (both[0], both[-1])]
+        for key, both in found.items()
+        if names.keys() & {*both}
+    }
 
 
 def profile_hashes(*definitions: FileDefinition) -> dict[str, str]:

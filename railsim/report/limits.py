@@ -15,8 +15,8 @@ from railsim.assessment.verdict import DERAILED, FAIL, PASS, Verdict
 from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.compare import differing
-from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import InputError, listed
+from railsim.profiles.used import used_profiles
 from railsim.report.document import FAILED, OPEN, PASSED, Cell, Section, Table, of_values
 from railsim.result import Result
 from railsim.result.sensors import sensors
@@ -240,8 +240,8 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
         for name, s in sensors(vehicle).items()
     ]  # fmt: skip
     rows.append(("wheel forces", "Y and Q of every wheel, in the contact"))
-    pairs = {", ".join((*dict.fromkeys(_wheels(runs[n])), *dict.fromkeys(runs[n].track().rail)))
-             for n in one.runs}  # fmt: skip
+    each = ((*used_profiles(runs[n].vehicle()), *used_profiles(runs[n].track())) for n in one.runs)
+    pairs = {", ".join(dict.fromkeys(name for _, name, _ in used)) for used in each}
     rows += [("profiles of wheels and rails", pair) for pair in sorted(pairs)]
     times = [runs[name]["time"] for name in one.runs]
     rows.append(("runs", f"{len(times)}, {sum(float(t[-1] - t[0]) for t in times):.0f} s"))
@@ -264,11 +264,6 @@ def _sources(limits: Any) -> Table:
     ]
     header = ["", "verdict on", "", "limit from"]
     return Table(header, rows, f"Limits of {limits.edition}", range(4))
-
-
-def _wheels(result: Result) -> list[str]:
-    found = flatten(result.vehicle()).of_kind("wheelset")
-    return [name for body in found if body.wheelset for name in body.wheelset.profile]
 
 
 def _origin(source: str, checked: bool) -> str:

@@ -34,6 +34,7 @@ from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
 from railsim.files.access import check_folder, relative
 from railsim.processes import available_cores
 from railsim.profiles import load_profile
+from railsim.profiles.used import exchanged_wheels
 from railsim.result import Result, open_result
 from railsim.result.sensors import sensors
 from railsim.studies.carry_out import carry_out_cases
@@ -284,9 +285,12 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
 
     Raises InputError: what is removed does not exist; a wrong vehicle without it.
     """
+    if condition.wheels:
+        wheels = exchanged_wheels(vehicle, condition.wheels)
+        if not wheels:
+            return None
+        vehicle = vehicle.with_values(wheels)
     data = vehicle.model_dump(mode="json", exclude_none=True)
-    if condition.wheels and not _exchange(data, condition.wheels):
-        return None
     for key in condition.remove:
         *path, last = key.split(".")
         table = data
@@ -298,23 +302,6 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
         del table[last]
     data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
     return checked(Vehicle, data, f"conditions.{name}")
-
-
-def _exchange(node: Any, wheels: dict[str, str]) -> bool:
-    """Exchange wheel profiles in a vehicle's tables; tell whether there was one."""
-    if not isinstance(node, dict):
-        return False
-    found = False
-    for name, table in node.items():
-        if name != "wheelsets":
-            found = _exchange(table, wheels) or found
-            continue
-        for wheelset in table.values():
-            pair = wheelset["profile"]
-            names = [pair] if isinstance(pair, str) else list(pair)
-            found = found or any(profile in wheels for profile in names)
-            wheelset["profile"] = [wheels.get(profile, profile) for profile in names]
-    return found
 
 
 def fitted_curves(

@@ -29,6 +29,7 @@ from railsim.definitions.vehicle.flatten import flatten
 from railsim.errors import Faults, ModelError, RailsimError, input_error
 from railsim.linear.circle import circle
 from railsim.profiles import Profile, load_profile
+from railsim.profiles.used import used_profiles
 from railsim.result import Result
 from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
@@ -280,16 +281,11 @@ def row(distance: float, worn: Profile, lost: Floats) -> dict[str, float | None]
 
 
 def _profile_name(vehicle: Vehicle) -> str:
-    names = _wheels(vehicle)
+    names = {name for _, name, _ in used_profiles(vehicle)}
     if len(names) != 1:
         found = f"{len(names)} wheel profiles"
         raise input_error("vehicle", found, "the same for all wheels", key="profile")
     return names.pop()
-
-
-def _wheels(vehicle: Vehicle) -> set[str]:
-    """Names of its wheel profiles."""
-    return {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
 
 
 def _check(wearing: Wearing, how: Loop) -> None:
@@ -327,7 +323,8 @@ def _file_name(
 
 def _others(wearing: Wearing, run: Run) -> list[Profile]:
     """Profiles of a run that do not wear."""
-    names = _wheels(run.vehicle) | {*run.track.rail}
+    both = (*used_profiles(run.vehicle), *used_profiles(run.track))
+    names = {name for _, name, _ in both}
     return [load_profile(name) for name in names - {*wearing.names.values()}]
 
 

@@ -16,13 +16,14 @@ from selection import points
 import railsim
 from railsim.identification.derivatives import Derivative, Sensitivity, _central, _forward
 from railsim.identification.fit import _counting, _solved
-from railsim.identification.identified import Channel, _wheels
+from railsim.identification.identified import Channel
 from railsim.identification.parameters import Parameter
 from railsim.identification.problem import Problem, Workers
 from railsim.identification.residuals import Form, whiteness
 from railsim.identification.runs import Prepared
 from railsim.plot import validation as plots
 from railsim.profiles import save_profile
+from railsim.profiles.used import exchanged_wheels
 
 N, STEP, SPEED, BAND = 1200, 0.01, 20.0, (0.5, 8.0)
 FILE = SimpleNamespace(to_toml=lambda: "")
@@ -365,11 +366,11 @@ def test_an_identified_profile_is_that_of_the_wheels_that_had_it():
     """Left and right wheel; a wheelset whose profile is not sought keeps its own."""
     axle = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
     coach = railsim.load_vehicle("coach_manchester")
-    files = {"cone_1in20": ("found.csv", "")}
+    files = {"cone_1in20": "found.csv"}
     for pair, expected in (
         (["cone_1in20", "S1002"], ["found.csv", "S1002"]),
         (["S1002", "cone_1in20"], ["S1002", "found.csv"]),
         (["cone_1in20", "cone_1in20"], ["found.csv", "found.csv"]),
     ):
-        assert _wheels(coach.with_values({axle: pair}), files) == {axle: expected}
-    assert _wheels(coach, files) == {}
+        assert exchanged_wheels(coach.with_values({axle: pair}), files) == {axle: expected}
+    assert exchanged_wheels(coach, files) == {}
