@@ -119,13 +119,17 @@ class FrozenDict(dict[Any, Any]):
         return FrozenDict, (dict(self),)
 
 
-def kept(definition: "Definition", name: str, make: Callable[[], Any]) -> Any:
+T = TypeVar("T")
+
+
+def kept(definition: "Definition", name: str, make: Callable[[], T]) -> T:
     """Return what follows from a definition alone, made once; a copy of it has it no more."""
     stored = definition.__dict__
     if name not in stored:
         value = make()
         stored[name] = lambda: value  # equal to itself alone: arrays have no truth value
-    return stored[name]()
+    found: T = stored[name]()
+    return found
 
 
 class Definition(BaseModel):
@@ -220,7 +224,6 @@ def rising(rows: Sequence[Sequence[float]]) -> bool:
     return all(after[0] > before[0] for before, after in pairwise(rows))
 
 
-T = TypeVar("T")
 SidedRows = Annotated[
     tuple[tuple[Finite, T, T], ...],
     Field(min_length=1),

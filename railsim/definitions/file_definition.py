@@ -75,7 +75,7 @@ class FileDefinition(Definition):
     def to_toml(self) -> str:
         """Return the whole definition as TOML text, defaults included, `extends` resolved."""
         # a study asks for it once for every run
-        return str(kept(self, "_toml", lambda: tomli_w.dumps(self.model_dump(exclude_none=True))))
+        return kept(self, "_toml", lambda: tomli_w.dumps(self.model_dump(exclude_none=True)))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the definition as a file, which appears when it is whole.

@@ -66,14 +66,6 @@ def parsed(text: bytes) -> Any:
 def json_bytes(data: Any) -> bytes:
     """Return data as one line of JSON; infinite and undefined numbers become null."""
     try:
-        return json.dumps(data, allow_nan=False).encode()
-    except ValueError:
-        return json.dumps(plain(data)).encode()
-
-
-def compact_json(data: Any) -> bytes:
-    """Return data as JSON without spaces, faster than `json_bytes`; its numbers are the same."""
-    try:
         return orjson.dumps(data)
     except TypeError:  # names of files that are no UTF-8
         return json.dumps(plain(data), separators=(",", ":")).encode()

@@ -103,8 +103,7 @@ def alignment_of(track: Track) -> Alignment:
 
     Raises InputError: elements that do not fit together.
     """
-    alignment: Alignment = kept(track, "_alignment", lambda: Alignment(track))
-    return alignment
+    return kept(track, "_alignment", lambda: Alignment(track))
 
 
 def _magnitudes(sections: Sequence[Section]) -> list[Section]:

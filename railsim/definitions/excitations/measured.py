@@ -141,14 +141,14 @@ class Measured(base.Irregular):
 
 def _between(positions: Floats, values: Floats, slopes: Floats) -> Floats:
     """Cubic Hermite interpolation at seven positions within every interval between the rows."""
-    h = np.diff(positions)
-    t = _INNER
-    rest = 1.0 - t
-    basis = np.stack(
-        ((1.0 + 2.0 * t) * rest**2, t * rest**2, t**2 * (3.0 - 2.0 * t), -(t**2) * rest)
-    )
-    ends = (values[..., :-1], h * slopes[..., :-1], values[..., 1:], h * slopes[..., 1:])
-    return np.asarray(np.stack(ends, axis=-1) @ basis)
+    from scipy.interpolate import CubicHermiteSpline
+
+    spline = CubicHermiteSpline(positions, values, slopes, axis=-1)
+    return np.asarray(spline(_inner(positions)))
+
+
+def _inner(positions: Floats) -> Floats:
+    return positions[:-1, None] + np.diff(positions)[:, None] * _INNER
 
 
 def largest_between_rows(part: Measured) -> tuple[str, float, float, float]:
@@ -160,12 +160,11 @@ def largest_between_rows(part: Measured) -> tuple[str, float, float, float]:
     """
     positions, values, slopes = part.interpolation()
     found = np.abs(_between(positions, values, slopes)).reshape(4, -1)
-    inner = positions[:-1, None] + np.diff(positions)[:, None] * _INNER
     at_rows = np.abs(values).max(axis=1)
     further = np.where(at_rows > 0.0, found.max(axis=1) - at_rows, -np.inf)
     column = int(np.argmax(further))
     index = int(np.argmax(found[column]))
-    at = float(inner.ravel()[index])
+    at = float(_inner(positions).ravel()[index])
     return base.COLUMNS[column], float(at_rows[column]), float(found[column, index]), at
 
 

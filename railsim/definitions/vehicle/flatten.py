@@ -161,8 +161,7 @@ def flatten(vehicle: "Vehicle") -> FlatVehicle:
     """
     if getattr(vehicle, "KIND", "") != "vehicle":
         raise TypeError(wrong_type("vehicle", vehicle))
-    flat: FlatVehicle = kept(vehicle, "_flattened", lambda: _checked_and_flat(vehicle))
-    return flat
+    return kept(vehicle, "_flattened", lambda: _checked_and_flat(vehicle))
 
 
 def _checked_and_flat(vehicle: "Vehicle") -> FlatVehicle:
