@@ -15,8 +15,8 @@ from railsim.cant import cant_deficiency
 from railsim.definitions.limits import RunningLimits, Zone, up_to
 from railsim.definitions.own_sections import SHORTEST, OwnSection
 from railsim.definitions.track.definition import Track
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections
-from railsim.definitions.track.section import Section
 from railsim.definitions.vehicle.tables import Service
 from railsim.notation import SIDES
 from railsim.table import beside, beside_ends

@@ -16,7 +16,7 @@ from railsim.cli.progress import progress_bar
 from railsim.cli.terminal import echo, print_json, show
 from railsim.errors import Fault, Faults, changed_faults, input_error
 from railsim.files import access
-from railsim.files.sources import OVERRIDE, find_file, library_files, read_source, shipped_names
+from railsim.files.sources import OVERRIDE, find_file, library_files, read_source
 from railsim.text import plain
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
     """Return what completes an argument in a shell: names of shipped files, or a file."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
-        names = [name for name in shipped_names(kind) if name.startswith(incomplete)]
+        names = [name for name in library_files(kind) if name.startswith(incomplete)]
         return [*map(CompletionItem, names)] or [CompletionItem(incomplete, type="file")]
 
     return complete

@@ -189,14 +189,14 @@ def load_study(path: str | Path, overrides: Overrides = ()) -> "Study":
     return load(Study, path, overrides)
 
 
-def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:
+def load_vehicle_text(text: str) -> Vehicle:
     """Load a vehicle from the text of a file, for instance that kept in a result."""
-    return loaded(Vehicle, sources.text_source(text, file, "vehicle"), ())
+    return loaded(Vehicle, sources.text_source(text, "vehicle_toml", "vehicle"), ())
 
 
-def load_track_text(text: str, file: str = "track_toml") -> Track:
+def load_track_text(text: str) -> Track:
     """Load a track from the text of a file, for instance that kept in a result."""
-    return loaded(Track, sources.text_source(text, file, "track"), ())
+    return loaded(Track, sources.text_source(text, "track_toml", "track"), ())
 
 
 def load_settings_json(text: str, file: str = "settings_json") -> Settings:

@@ -8,8 +8,8 @@ from railsim.definitions import Track
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.excitations.measured import READING, Measured, largest_between_rows
 from railsim.definitions.track.alignment_rules import cant_at
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections, gradient_sections
-from railsim.definitions.track.section import Section
 from railsim.description.values import Description, Parts, either, short
 from railsim.errors import argument_error
 from railsim.table import Column, Table

@@ -132,11 +132,6 @@ def library_files(kind: str) -> dict[str, Path]:
     return dict(sorted(files.items()))
 
 
-def shipped_names(kind: str) -> list[str]:
-    """Return the bare names of the vehicles or tracks in the libraries."""
-    return list(library_files(kind))
-
-
 def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     """Return the file that a path or a bare name means; a path wins over a name.
 
@@ -176,22 +171,22 @@ def find_any(name: str | Path) -> Path:
     if is_file(name):
         return Path(name)
     for kind in FOLDERS:
-        if str(name) in shipped_names(kind):
+        if str(name) in library_files(kind):
             return find_file(name, kind)
     found = f"'{name}' is a folder" if os.path.isdir(name) else f"no file '{name}'"
-    known = [name for kind in FOLDERS for name in shipped_names(kind)]
+    known = [name for kind in FOLDERS for name in library_files(kind)]
     hint = nearest(str(name), known).removeprefix("allowed: ")
     raise input_error(name, found, f"a path, or a shipped name: {hint}")
 
 
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
     found = f"'{name}' is a folder" if os.path.isdir(path) else f"no file '{name}'"
-    others = (one for one in FOLDERS if one != kind and str(name) in shipped_names(one))
+    others = (one for one in FOLDERS if one != kind and str(name) in library_files(one))
     if beside is None and (other := next(others, None)):
         found = f"'{name}' is a shipped {other}"
     allowed = "a path"
     if kind in FOLDERS:
-        names = nearest(str(name), shipped_names(kind))
+        names = nearest(str(name), library_files(kind))
         allowed = f"a path, or the name of a shipped {kind}: {names.removeprefix('allowed: ')}"
     if beside is not None:
         return Fault(str(beside), "extends", found, allowed)

@@ -10,7 +10,7 @@ import tomli_w
 from scipy.optimize import nnls
 
 from railsim.arrays import Floats
-from railsim.definitions.mechanism.definition import MECHANISM_FORMAT, Mechanism
+from railsim.definitions.mechanism.definition import Mechanism
 from railsim.design_checks import ROUNDING
 from railsim.errors import InputError
 from railsim.files.key_paths import key_path
@@ -182,7 +182,7 @@ def optimised_text(base: str, optimum: Optimum, changes: Sequence[str], case: st
     provenance = data.setdefault("provenance", {})
     provenance["set"] = [name for name in dict.fromkeys(changed) if name not in best]
     provenance["optimised"] = best
-    head = {"format": MECHANISM_FORMAT, "extends": base, "name": f"{definition.name}, optimised"}
+    head = {"format": definition.format, "extends": base, "name": f"{definition.name}, optimised"}
     count = len(optimum.starts)
     lead = (
         f"# Found by {count} starts with seed {optimum.seed}: objective {optimum.objective:.6g}"

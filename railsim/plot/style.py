@@ -24,7 +24,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation
 
 from railsim.arrays import Floats
-from railsim.definitions.track.section import Section
+from railsim.definitions.track.elements import Section
 from railsim.files.access import PICTURES, check_file, whole_file
 from railsim.text import unformatted
 

@@ -17,7 +17,7 @@ from scipy.integrate import cumulative_simpson
 from railsim.arrays import Floats
 from railsim.definitions.track import layout
 from railsim.definitions.track.definition import Track
-from railsim.definitions.track.section import Section
+from railsim.definitions.track.elements import Section
 from railsim.laws.permission import refused
 from railsim.plot import style
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, key, note, shade, spans, styled

@@ -8,7 +8,7 @@ import numpy as np
 
 from railsim.definitions.loading import load, load_track, load_vehicle
 from railsim.definitions.published import Published, PublishedValue
-from railsim.files.sources import shipped_names
+from railsim.files.sources import library_files
 from railsim.notation import SIDES
 from railsim.result import Result
 
@@ -39,7 +39,7 @@ def beside_published(results: Mapping[str, Result]) -> list[Beside]:
     A run is compared if vehicle and speed are those of the publication and its track differs at
     most in the support of the rails, which publications rarely specify.
     """
-    studies = [load(Published, name) for name in shipped_names("published")]
+    studies = [load(Published, name) for name in library_files("published")]
     return [row for study in studies for row in _of_study(study, results)]
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from railsim.arrays import Floats, first_largest
 from railsim.definitions.track.definition import Track
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import curvature_sections
-from railsim.definitions.track.section import Section
 from railsim.notation import Quantity
 from railsim.result.data import Result
 from railsim.result.filters import even_step, low_passed, outward_quotient

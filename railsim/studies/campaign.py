@@ -32,6 +32,7 @@ from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 from railsim.errors import Fault, Faults, InputError, RailsimError, input_error
 from railsim.files.access import check_folder, relative
+from railsim.files.key_paths import descend, key_path
 from railsim.processes import available_cores
 from railsim.profiles import load_profile
 from railsim.profiles.used import exchanged_wheels
@@ -292,14 +293,12 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
         vehicle = vehicle.with_values(wheels)
     data = vehicle.model_dump(mode="json", exclude_none=True)
     for key in condition.remove:
-        *path, last = key.split(".")
-        table = data
-        for part in path:
-            table = table.get(part, {})
-        if last not in table:
+        try:
+            table, last = descend(data, key_path(key))
+            del table[last]
+        except KeyError:
             allowed = "a key of the vehicle's file"
-            raise input_error(f"conditions.{name}", key, allowed, key="remove")
-        del table[last]
+            raise input_error(f"conditions.{name}", key, allowed, key="remove") from None
     data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
     return checked(Vehicle, data, f"conditions.{name}")
 

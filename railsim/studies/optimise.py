@@ -40,7 +40,7 @@ from railsim.studies.designs import (
     with_unit,
 )
 from railsim.studies.plan import ROUGH_DURATION, check_number, check_study, faults_of_file
-from railsim.studies.search import Task, knee, non_dominated, search
+from railsim.studies.search import METHODS, Task, knee, non_dominated
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 from railsim.studies.spec import Execution, checked
 from railsim.studies.summary import unit_of
@@ -216,7 +216,8 @@ def optimise(
     evaluation = Evaluation(definition, wanted, folder, execution)
     sizes = len(wanted.variables), len(wanted.objectives), len(wanted.constraints)
     number = wanted.evaluations
-    search(wanted.method, Task(evaluation, *sizes, number, min(wanted.batch, number), wanted.seed))
+    task = Task(evaluation, *sizes, number, min(wanted.batch, number), wanted.seed)
+    METHODS[wanted.method](task)
     return _concluded(evaluation, choose)
 
 

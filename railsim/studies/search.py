@@ -56,11 +56,6 @@ class Task:
     seed: int
 
 
-def search(method: str, task: Task) -> None:
-    """Search by one of `METHODS` until the required number of designs is evaluated."""
-    METHODS[method](task)
-
-
 def _surrogate(task: Task) -> None:
     """Fit radial basis functions to the known designs, and evaluate the most promising ones.
 

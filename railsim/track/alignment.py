@@ -21,8 +21,8 @@ from railsim.constants import CANT_BASE
 from railsim.definitions import Track
 from railsim.definitions.base import kept
 from railsim.definitions.track import layout
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.rounded_profile import RoundedProfile
-from railsim.definitions.track.section import Section
 from railsim.errors import Fault, InputError
 
 

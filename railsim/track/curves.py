@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from railsim.cant import cant_deficiency, curve_speed
 from railsim.definitions import Track
 from railsim.definitions.track.alignment_rules import cant_at
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections
-from railsim.definitions.track.section import Section
 
 # Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
 USUAL_CANT_DEFICIENCY = 0.150

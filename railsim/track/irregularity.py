@@ -13,9 +13,9 @@ from railsim.definitions import Track
 from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.excitations.law import ByLaw
 from railsim.definitions.excitations.measured import RECORDED, Measured, largest_between_rows
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.layout import cant_sections, curvature_sections
 from railsim.definitions.track.rounded_profile import RoundedProfile
-from railsim.definitions.track.section import Section
 from railsim.errors import input_error, nearest
 from railsim.laws.binding import EXCITATION, bind
 from railsim.laws.permission import permitted_part

@@ -12,7 +12,7 @@ from railsim.cli import main
 from railsim.definitions.loading import load_vehicle
 from railsim.definitions.track.definition import Track
 from railsim.errors import InputError
-from railsim.files.sources import shipped_names
+from railsim.files.sources import library_files
 
 
 def test_list_names_what_is_there(capsys):
@@ -49,7 +49,7 @@ def test_limits_have_letters_of_their_own(capsys):
 
 def test_what_is_offered_as_a_measurement_is_one():
     """Not the track beside it, which `railsim identify` then refuses."""
-    for name in shipped_names("measurement"):
+    for name in library_files("measurement"):
         assert railsim.load_measurement(name).name
 
 

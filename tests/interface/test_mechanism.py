@@ -14,7 +14,7 @@ from PIL import Image, ImageSequence
 
 from railsim import cli
 from railsim.definitions.loading import load_mechanism
-from railsim.files.sources import find_file, shipped_names
+from railsim.files.sources import find_file, library_files
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.optimum import optimised_text
 from railsim.plot.mechanisms import angles_figure
@@ -101,7 +101,7 @@ def refused(capsys, *arguments):
 
 
 def test_every_shipped_mechanism_is_valid_and_listed(capsys):
-    names = shipped_names("mechanism")
+    names = library_files("mechanism")
     wanted = {"atr95", *(f"atr95_lift_{i}" for i in range(1, 7)), "tilting_one_spring",
               "tilting_two_springs", "watt_axlebox_guide"}  # fmt: skip
     assert wanted <= set(names)

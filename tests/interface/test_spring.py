@@ -9,7 +9,7 @@ import pytest
 from railsim import cli
 from railsim.definitions.loading import load_spring, load_vehicle
 from railsim.definitions.vehicle.flatten import flatten
-from railsim.files.sources import shipped_names
+from railsim.files.sources import library_files
 from railsim.report.springs import collected, page
 
 MINIMAL = """
@@ -358,7 +358,7 @@ def test_coach_flexicoil_is_what_the_tool_writes(tmp_path, capsys):
     assert written.reference == shipped.reference
 
 
-@pytest.mark.parametrize("name", shipped_names("spring"))
+@pytest.mark.parametrize("name", library_files("spring"))
 def test_shipped_springs_are_sound(name, capsys):
     assert cli.main(["validate", name]) == 0
     assert capsys.readouterr().out == f"{name}: spring, no faults\n"

@@ -16,7 +16,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"assess.md", "vehicle_file.md", "track_file.md", "settings.md"}
 schema_of = functools.cache(json_schema)
 MENDED_BY = "python docs/generate.py keys"
-SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.shipped_names(kind)]
+SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.library_files(kind)]
 
 
 @pytest.mark.parametrize("format_name", FORMATS)

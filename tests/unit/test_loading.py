@@ -88,8 +88,8 @@ def test_path_wins_over_a_shipped_name(write, monkeypatch, tmp_path):
 def test_shipped_files_are_found_from_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert load_track("curve_r250").length == 980.0
-    assert {"coach_manchester", "benchmark_vehicle1"} <= set(sources.shipped_names("vehicle"))
-    assert {"curve_r250", "curve_r500", "straight"} <= set(sources.shipped_names("track"))
+    assert {"coach_manchester", "benchmark_vehicle1"} <= set(sources.library_files("vehicle"))
+    assert {"curve_r250", "curve_r500", "straight"} <= set(sources.library_files("track"))
 
 
 def test_shipped_files_come_from_the_package_once_installed(tmp_path, monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial.distance import cdist
 
-from railsim.studies.search import Surrogate, Task, Values, knee, non_dominated, search
+from railsim.studies.search import METHODS, Surrogate, Task, Values, knee, non_dominated
 from railsim.studies.sensitivity import sensitivities
 
 
@@ -34,7 +34,7 @@ def searched(problem, method, *, number, batch=8, seed=0, constraint=None, varia
 
     m = problem(np.full((1, variables), 0.5)).shape[1]
     task = Task(evaluate, variables, m, 0 if constraint is None else 1, number, batch, seed)
-    search(method, task)
+    METHODS[method](task)
     designs = np.vstack(asked)
     return problem(designs), designs
 
@@ -81,7 +81,7 @@ def test_evolution_prefers_feasible_designs_to_infeasible_ones_of_lower_objectiv
         x = np.array(points)
         return Values(np.where(x > 0.9, 3.0 + x, 4.0 * x - 5.0)[:, None], (0.9 - x)[:, None])
 
-    search("differential_evolution", Task(evaluate, 2, 1, 1, 400, 8, seed))
+    METHODS["differential_evolution"](Task(evaluate, 2, 1, 1, 400, 8, seed))
     # members that are feasible contract on the optimum at the limit
     assert min(x for x in points if x > 0.9) == pytest.approx(0.9, abs=1e-5)
 

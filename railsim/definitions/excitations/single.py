@@ -7,8 +7,8 @@ import numpy as np
 from railsim.arrays import Floats
 from railsim.definitions.base import OTHER_SIDE, Finite, Positive
 from railsim.definitions.excitations.base import Amplitude, Displacement, Irregular
+from railsim.definitions.track.elements import Section
 from railsim.definitions.track.rounded_profile import RoundedProfile
-from railsim.definitions.track.section import Section
 
 Rails = Literal["left", "right", "both"]
 MOVED = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}

@@ -17,8 +17,6 @@ from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism import parts
 from railsim.errors import Fault, argument_error, nearest
 
-MECHANISM_FORMAT = "railsim-mechanism/1"
-
 
 class Driver(base.Definition):
     """The coordinate that moves the mechanism: an angle, a length or a coordinate."""

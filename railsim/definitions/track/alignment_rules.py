@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.base import Remark
-from railsim.definitions.track.section import Section
+from railsim.definitions.track.elements import Section
 
 HIGH_SPEED = 230.0  # km/h: the cant of high-speed lines from here on
 MOST_CANT, MOST_CANT_HIGH_SPEED = 160.0, 180.0  # mm

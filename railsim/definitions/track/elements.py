@@ -1,5 +1,6 @@
-"""Elements of the plan, the cant and the vertical profile of a track file."""
+"""Elements of the plan, the cant and the vertical profile: of a track file, and over arc length."""
 
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
@@ -113,3 +114,29 @@ class GradientRamp(TrackElement):
 PlanElement = Annotated[Straight | Clothoid | Circle, Field(discriminator="type")]
 CantElement = Annotated[ConstantCant | CantRamp, Field(discriminator="type")]
 VerticalElement = Annotated[ConstantGradient | GradientRamp, Field(discriminator="type")]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One element of a list with its values at both ends: curvature, cant or gradient."""
+
+    key: str  # in the file, e.g. ``plan.2``
+    type: str  # as written; a circle of infinite radius is STR
+    begin: float  # arc length [m]
+    end: float  # arc length [m]
+    start_value: float  # [1/m], [m] or [1]
+    end_value: float
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return self.end - self.begin
+
+    @property
+    def slope(self) -> float:
+        """Change of the value per metre."""
+        return (self.end_value - self.start_value) / self.length
+
+    def value(self, s: float) -> float:
+        """Value at the arc length `s` within the section."""
+        return self.start_value + self.slope * (s - self.begin)

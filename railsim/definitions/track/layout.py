@@ -13,8 +13,7 @@ from railsim.constants import CANT_BASE, NORMAL_GAUGE, WIDENED
 from railsim.definitions.base import Remark
 from railsim.definitions.excitations.measured import Measured
 from railsim.definitions.track.alignment_rules import alignment_remarks, cant_at
-from railsim.definitions.track.elements import TrackElement
-from railsim.definitions.track.section import Section
+from railsim.definitions.track.elements import Section, TrackElement
 from railsim.errors import Fault
 
 if TYPE_CHECKING:

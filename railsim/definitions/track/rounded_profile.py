@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from railsim.arrays import Floats
-from railsim.definitions.track.section import Section
+from railsim.definitions.track.elements import Section
 
 
 def _running(parts: Floats) -> Floats:

@@ -36,10 +36,6 @@ class Group:
     scope: Scope  # names of the placements that lead to it
     path: tuple[str, ...]  # keys that lead to its table in the file
 
-    def table(self, key: str) -> dict[str, Mapping[str, Any]]:
-        """Return the well-formed members of one of its tables."""
-        return _members(self.parts, key)
-
     def full(self, *names: str) -> str:
         """Return the full name of a part of this group."""
         return ".".join((*self.scope, *names))
@@ -53,6 +49,7 @@ class Group:
 
 
 def _members(parts: Mapping[str, Any], key: str) -> dict[str, Mapping[str, Any]]:
+    """Return the well-formed members of one of the tables of a group."""
     table = parts.get(key)
     if not isinstance(table, Mapping):
         return {}
@@ -125,7 +122,7 @@ def body_names(parts: Mapping[str, Any]) -> tuple[dict[str, str], list[Fault]]:
     faults: list[Fault] = []
     for group in groups(parts):
         for table, kind in KINDS.items():
-            for name, part in group.table(table).items():
+            for name, part in _members(group.parts, table).items():
                 key = ".".join((*group.path, table, name))
                 for sided, _ in sided_names(name, part.get("sides")):
                     full = group.full(sided)
@@ -179,10 +176,10 @@ def _wrong_names(parts: Mapping[str, Any], known: Mapping[str, str]) -> Iterator
     yield from _wrong_references(parts, known)
     used: set[str] = set()
     for group in groups(parts):
-        for name, axlebox in group.table("axleboxes").items():
+        for name, axlebox in _members(group.parts, "axleboxes").items():
             key = ".".join((*group.path, "axleboxes", name, "wheelset"))
             yield from group.unknown(axlebox.get("wheelset"), None, wheelsets, key, "wheelset")
-        for name, element in group.table("elements").items():
+        for name, element in _members(group.parts, "elements").items():
             key = ".".join((*group.path, "elements", name))
             for sided, side in sided_names(name, element.get("sides")):
                 yield from _wrong_ends(element, group, side, known, f"{key}.bodies")
