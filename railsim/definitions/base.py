@@ -120,6 +120,7 @@ class FrozenDict(dict[Any, Any]):
 
 
 T = TypeVar("T")
+S = TypeVar("S")
 
 
 def kept(definition: "Definition", name: str, make: Callable[[], T]) -> T:
@@ -224,6 +225,7 @@ def rising(rows: Sequence[Sequence[float]]) -> bool:
     return all(after[0] > before[0] for before, after in pairwise(rows))
 
 
+RisingRows = Annotated[tuple[tuple[S, T], ...], Field(min_length=1), rises("first column")]
 SidedRows = Annotated[
     tuple[tuple[Finite, T, T], ...],
     Field(min_length=1),

@@ -20,9 +20,7 @@ from railsim.definitions.vehicle.definition import Vehicle
 from railsim.definitions.vehicle.flatten import flatten
 from railsim.definitions.vehicle.tables import Service
 
-Rows = Annotated[
-    tuple[tuple[base.Positive, base.Positive], ...], Field(min_length=1), base.rises("first column")
-]
+Rows = base.RisingRows[base.Positive, base.Positive]
 Probability = Annotated[float, Field(strict=True, ge=0.5, lt=1.0)]
 ZoneName = Annotated[str, Field(pattern="^[1-4]$")]
 

@@ -10,9 +10,6 @@ from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.vehicle.laws import Law, LawUse, OwnOutput, with_sources
 from railsim.errors import Fault
 
-SpeedRows = Annotated[
-    tuple[tuple[base.Finite, base.Speed], ...], Field(min_length=1), base.rises("first column")
-]
 Step = Annotated[base.Finite, Field(ge=1e-6, le=0.1)]
 Rate = Annotated[base.Finite, Field(ge=1e-3, le=1e5)]
 Spacing = Annotated[base.Finite, Field(ge=1e-3, le=1e5)]
@@ -26,11 +23,6 @@ AdhesionRows = Annotated[
     base.holds(
         lambda r: r[0] == (0.0, 0.0), "the first row must be [0.0, 0.0]: no creepage, no force"
     ),
-    base.rises("first column"),
-]
-TractionRows = Annotated[
-    tuple[tuple[base.NonNegative, base.Finite], ...],
-    Field(min_length=1),
     base.rises("first column"),
 ]
 
@@ -70,9 +62,9 @@ class Drive(base.Definition):
     mode: Literal["constant", "table", "free"] = "constant"
     """`constant`: the speed of the run; `table`: after `speed_table`; `free`: the run's speed at
     the start, then by traction and resistance"""
-    speed_table: SpeedRows | None = None
+    speed_table: base.RisingRows[base.Finite, base.Speed] | None = None
     """Rows [arc length m, speed m/s], linear in between, constant beyond"""
-    traction_table: TractionRows | None = None
+    traction_table: base.RisingRows[base.NonNegative, base.Finite] | None = None
     """Rows [speed m/s, force N] on the reference body, braking negative, constant beyond"""
     resistance: tuple[base.NonNegative, base.NonNegative, base.NonNegative] = (0.0, 0.0, 0.0)
     """Running resistance a + b V + c V^2 on the reference body [N, N s/m, N s2/m2]"""

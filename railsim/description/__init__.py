@@ -18,8 +18,6 @@ from railsim.description.vehicles import describe_vehicle
 from railsim.table import Table
 
 if TYPE_CHECKING:
-    from railsim.definitions.mechanism.definition import Mechanism
-    from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.study.definition import Study
     from railsim.result import Result
 
@@ -44,14 +42,10 @@ def describe(item: "FileDefinition | Result", speeds: Sequence[float | str] = ()
     if isinstance(item, Vehicle):
         return describe_vehicle(item)
     data = {"kind": item.KIND, **item.model_dump()}
-    if item.KIND == "spring":
-        from railsim.description.design_files import spring_parts
+    if item.KIND in ("spring", "mechanism"):
+        from railsim.description.design_files import PARTS
 
-        return Description(data, spring_parts(cast("TrailingArmSuspension", item)))
-    if item.KIND == "mechanism":
-        from railsim.description.design_files import mechanism_parts
-
-        return Description(data, mechanism_parts(cast("Mechanism", item)))
+        return Description(data, PARTS[item.KIND](item))
     if item.KIND == "study":
         study = cast("Study", item)
         data = {"kind": "study", "runs": study.runs, **study.model_dump(exclude_none=True)}

@@ -1,5 +1,8 @@
 """What spring and mechanism files hold."""
 
+from collections.abc import Callable
+from typing import Any
+
 from railsim.definitions.mechanism.definition import Mechanism
 from railsim.definitions.mechanism.values import parameter_values
 from railsim.definitions.spring import TrailingArmSuspension
@@ -67,3 +70,6 @@ def spring_parts(suspension: TrailingArmSuspension) -> Parts:
     others = ("fatigue", "search", "tolerances", "vehicle")
     present = [name for name in others if getattr(suspension, name) is not None]
     return [*parts, "", f"tables besides: {', '.join(present) or 'none'}"]
+
+
+PARTS: dict[str, Callable[[Any], Parts]] = {"spring": spring_parts, "mechanism": mechanism_parts}

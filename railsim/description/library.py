@@ -43,7 +43,10 @@ def library_entries(kind: str) -> list[dict[str, Any]]:
         for name, path in library_files(word).items():
             # limits explain letters of their own, beside the source of each value
             letters = "" if word == "limits" else trust(text_with_bases(path, word))
-            rows.append((name, _title(_text_and_data(path)[1]), letters, str(path)))
+            data = _text_and_data(path)[1]
+            # of limits the edition of the standard that they follow
+            title = str(data.get("name", data.get("edition", "")))
+            rows.append((name, title, letters, str(path)))
     names = ("name", "title", "trust", "file")
     return [{"kind": kind, **dict(zip(names, row, strict=True))} for row in rows]
 
@@ -55,11 +58,6 @@ def _first_line(path: Path) -> str:
     except (SyntaxError, ValueError) as error:
         return f"no Python: {error}"
     return (words or "").partition("\n")[0]
-
-
-def _title(data: dict[str, Any]) -> str:
-    """Name of a definition, or the edition of the standard that it follows."""
-    return str(data.get("name", data.get("edition", "")))
 
 
 @cache

@@ -79,12 +79,7 @@ def series(result: Result, selection: str) -> Floats:
     name, *labels = selection.split(":")
     if name not in result:
         raise KeyError(f"no quantity '{name}'; {nearest(name, result)}")
-    dims = result.quantities[name].dims[1:]
-    given: dict[str, str | int] = {}
-    for dim, label in zip(dims, labels, strict=True):
-        numbered = dim == "wheelset" and label.isdecimal() and label not in result.wheelsets
-        given[dim] = int(label) - 1 if numbered else label
-    return result.series(name, **given)
+    return result.series(name, **dict(zip(result.quantities[name].dims[1:], labels, strict=True)))
 
 
 def amplifier(channel: Channel, f: Floats) -> Complexes:
