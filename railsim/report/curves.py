@@ -9,7 +9,6 @@ a quantity.
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,17 +26,9 @@ MISSING = 65535  # code for no value
 STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
 
 
-@dataclass(frozen=True)
-class Group:
-    """Runs over the same alignment."""
-
-    track: str  # name of the track
-    results: dict[str, Result]  # results by the names of their runs
-
-
-def groups(results: Mapping[str, Result]) -> list[Group]:
-    """Group results by alignment; runs without instants are omitted."""
-    found: dict[tuple[Any, ...], Group] = {}
+def groups(results: Mapping[str, Result]) -> list[dict[str, Result]]:
+    """Group results, by the names of their runs, by alignment; omit runs without instants."""
+    found: dict[tuple[Any, ...], dict[str, Result]] = {}
     for name, result in results.items():
         if len(result["time"]) < 2:
             continue
@@ -46,16 +37,15 @@ def groups(results: Mapping[str, Result]) -> list[Group]:
             track.name,
             *((s.type, s.begin, s.end, s.start_value) for s in curvature_sections(track)),
         )
-        found.setdefault(key, Group(track.name, {})).results[name] = result
+        found.setdefault(key, {})[name] = result
     return list(found.values())
 
 
-def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
-    """Return the curves of a group as plain data for the page.
+def curve_data(results: Mapping[str, Result], cells: int = CELLS) -> dict[str, Any]:
+    """Return the curves of runs over the same alignment as plain data for the page.
 
     `cells`: Number of cells of the horizontal axis.
     """
-    results = group.results
     moved = (np.ptp(result["distance"][[0, -1]]) > STANDS_STILL for result in results.values())
     over = "distance" if all(moved) else "time"
     low = min(float(result[over][0]) for result in results.values())
@@ -67,7 +57,7 @@ def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
     quantities = [_quantity(results, name, over, edges, len(wheelsets)) for name in STUDY]
     first = next(iter(results.values()))
     return {
-        "track": printable(group.track),
+        "track": printable(first.track().name),
         "axis": "Distance along the track s (m)" if over == "distance" else "Time t (s)",
         "runs": [printable(f"{name}{result.end_words}") for name, result in results.items()],
         "wheelsets": [printable(name) for name in wheelsets], "low": low, "high": high,
@@ -162,10 +152,10 @@ def coded(values: Floats) -> tuple[float, float, str]:
     return low, high, b64encode(codes.tobytes()).decode()
 
 
-def cells_of(found: Sequence[Group]) -> int:
+def cells_of(found: Sequence[Mapping[str, Result]]) -> int:
     """Return the number of cells of all curves for which the page stays small."""
     lines = sum(
-        len(group.results) * max(len(r.wheelsets) for r in group.results.values()) * 9
-        for group in found
+        len(results) * max(len(result.wheelsets) for result in results.values()) * 9
+        for results in found
     )
     return max(50, min(CELLS, MOST_VALUES // max(1, 2 * lines)))

@@ -553,7 +553,7 @@ def test_coded_values_are_right_to_half_a_step():
 def test_runs_over_other_tracks_are_drawn_apart():
     one = example_result()
     found = groups({"a": one, "b": example_result(gain=2.0)})
-    assert [list(group.results) for group in found] == [["a", "b"]]
+    assert [list(group) for group in found] == [["a", "b"]]
     data = curve_data(found[0])
     (q,) = [q for q in data["quantities"] if q["name"] == "dQ_over_Q0"]
     assert q["high"] == pytest.approx(200.0 * one.dQ_over_Q0.max())

@@ -78,11 +78,8 @@ class SpringDamper(base.FreeLength, base.SidedElement):
         damps = self.damping > 0.0 or self.damper_table is not None
         if self.series_stiffness > 0.0 and damps:
             parameter = (self.damping, self.series_stiffness, 0.0)
-            state = (
-                State("maxwell", parameter)
-                if self.damper_table is None
-                else State("maxwell_curve", parameter, self.damper_table)
-            )
+            table = self.damper_table
+            state = State("maxwell_curve" if table else "maxwell", parameter, table)
         return [
             Link(
                 stiffness=self.stiffness,
