@@ -356,10 +356,10 @@ def test_pictures_name_their_run_and_lines_differ_in_black_and_white():
 
 
 def test_a_stretch_of_more_than_a_metre_in_a_kilometre_is_said(monkeypatch):
-    monkeypatch.setitem(globals(), "PLACES", [(0.8, 1.1e-3), (-1.1, -0.9e-3)])
+    monkeypatch.setitem(globals(), "PLACES", [(0.8, 1.3e-3), (-1.1, -0.9e-3)])
     found = identified(runs(np.random.default_rng(7), 0.1), [Parameter(n, (n,)) for n in TRUE])
     (said,) = [remark for remark in found.remarks if "stretched" in remark]
-    assert said.startswith("run 0: its arc length is stretched by +1.10 m/km")
+    assert said.startswith("run 0: its arc length is stretched by +1.30 m/km")
 
 
 def test_an_identified_profile_is_that_of_the_wheels_that_had_it():
