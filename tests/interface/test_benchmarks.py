@@ -11,8 +11,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from runpy import run_path
 
+import numpy as np
 import pytest
 from selection import points
+
+import railsim
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 KEPT = json.loads((BENCHMARKS / "results" / "irregular.json").read_text(encoding="utf-8"))
@@ -33,10 +36,28 @@ SMALL = {
 }  # fmt: skip
 # the threads of a process, its memory, another program's solvers
 OWN_PROCESS = {"growth.py", "peers.py", "study_cost.py"}
+COMPILES = {"whole.py"}
 IMPORTED = {"commands.py", "cores.py", "exudyn_coach.py", "exudyn_contact.py",
             "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py",
             "timed_runs.py"}  # fmt: skip
 WRITES_THE_MANUAL = {"tables.py"}  # from the figures in `benchmarks/results`
+# all parts of a step and FASTSIM over its grid, evaluated once each without compilation
+PLAIN_PARTS = """
+import json, sys
+from types import SimpleNamespace
+import numpy as np
+import parts
+from railsim import load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.model.assembly import assemble
+model = assemble(load_vehicle("coach_manchester"), load_track("curve_r250"), Settings())
+prepared = SimpleNamespace(model=model, steps=SimpleNamespace(at=lambda speed: (1e-4, None)))
+parts.CALLS = 1
+parts.state_at = lambda *place: (prepared, np.load(sys.argv[1]))
+found = {"parts": parts.right_hand_side_parts(repetitions=1)}
+found["fastsim"] = parts.fastsim_grids(parts.GRIDS[:2], repetitions=1)
+print(json.dumps(found))
+"""
 STUDY = """
 format = "railsim-study/1"
 name = "two designs, one second"
@@ -73,14 +94,42 @@ def test_figures_of_the_manual_are_those_of_the_results(monkeypatch, tmp_path):
     assert f"{smooth} times faster than real time through that curve, {rough} times on" in readme
 
 
-@pytest.mark.parametrize("script", sorted({*SMALL} - OWN_PROCESS))
-def test_script_runs_in_its_small_form(script, tmp_path, monkeypatch, capsys):
+def runs_in_its_small_form(script, tmp_path, monkeypatch, capsys):
     (tmp_path / "small.toml").write_text(STUDY)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [script, *SMALL[script]])
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     run_path(str(BENCHMARKS / script), run_name="__main__")
-    assert capsys.readouterr().out
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("script", sorted({*SMALL} - OWN_PROCESS - COMPILES))
+def test_script_runs_in_its_small_form(script, tmp_path, monkeypatch, capsys):
+    assert runs_in_its_small_form(script, tmp_path, monkeypatch, capsys)
+
+
+def test_all_of_railsim_is_measured_in_a_small_form(tmp_path, monkeypatch, capsys):
+    """With the parts of a step uncompiled: to compile the loops over them takes a minute."""
+    result = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250"), speed=20.0,
+        until=5.0,
+    )  # fmt: skip
+    np.save(tmp_path / "state.npy", result.groups["state"]["end"])
+    done = subprocess.run(
+        [sys.executable, "-c", PLAIN_PARTS, str(tmp_path / "state.npy")],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1",
+             "PYTHONPATH": os.pathsep.join([str(BENCHMARKS), str(BENCHMARKS.parent)])},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    plain = json.loads(done.stdout)
+    assert plain["parts"]["patches"] == 8
+    assert [row["grid"] for row in plain["fastsim"]] == [5, 10]
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    parts = import_module("parts")
+    monkeypatch.setattr(parts, "right_hand_side_parts", lambda **_: plain["parts"])
+    monkeypatch.setattr(parts, "fastsim_grids", lambda *_, **__: plain["fastsim"])
+    shown = runs_in_its_small_form("whole.py", tmp_path, monkeypatch, capsys)
+    assert all(name in shown for name in (*parts.PARTS, "step of the fast scheme", "10 x 10"))
 
 
 @pytest.mark.parametrize("script", sorted(OWN_PROCESS))
