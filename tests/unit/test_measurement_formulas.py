@@ -8,14 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, freqs
+from scipy.spatial.transform import Rotation
 
+from railsim import load_vehicle
 from railsim.errors import InputError
 from railsim.measurement.alignment import shift_of
 from railsim.measurement.clock import bridged, clock_of, delayed
 from railsim.measurement.columns import _length
-from railsim.measurement.counterpart import amplified
+from railsim.measurement.counterpart import amplified, check_channels, outputs_for
+from railsim.measurement.data import Measurement
 from railsim.measurement.likeness import Likeness, likeness
 from railsim.measurement.position import position
+from railsim.measurement.reading import _clipped, _implausible, _mounted
 
 
 def signal(s, shortest=4.0, seed=1, count=40):
@@ -332,3 +336,120 @@ def test_a_channel_is_looked_for_within_a_second(late, found):
     one = likeness(signal(time - late, 0.5), signal(time, 0.5), 0.02)
     assert (one.lag == pytest.approx(late, abs=0.021) and one.correlation > 0.9) is found
     assert abs(one.lag) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("end", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("value", "lengths", "clipped"),
+    [
+        (5.0, [3, 3, 3], True), (0.9, [3, 3, 1, 7], True), (0.9, [2, 2, 2, 2, 2], False),
+        (5.0, [3, 9], False), (0.0, [3, 3, 3], False), (1.0, [4, 4, 4], True),
+    ],
+)  # fmt: skip
+def test_a_signal_is_clipped_that_rests_thrice_for_three_values_at_its_end(
+    value, lengths, clipped, end
+):
+    """Not at zero: it stands still there."""
+    x = [part for n in lengths for part in (*np.full(n, end * value), end * (value - 1.0))]
+    said = _clipped(np.array([*x, np.nan, *np.full(20, end * (value - 0.5))]))
+    word = "largest" if end > 0.0 else "smallest"
+    times = f"rests {len(lengths)} times at its {word} value {end * value:g} and looks clipped"
+    assert said == (times if clipped else "")
+    assert _clipped(np.array(x[:1] * 30)) == _clipped(np.array(x[:19])) == ""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("quantity", "least", "most"),
+    [
+        ("Q:1:left", 500.0, 1e6), ("Y:1:left", 0.0, 1e6), ("sum_Y:1", 0.0, 2e6),
+        ("sum_abs_Y:1", 0.0, 2e6), ("Y_over_Q:1:left", 0.0, 10.0), ("speed", 0.1, 170.0),
+        ("curvature", 0.0, 0.2), ("yaw_rate", 0.0, 10.0), ("sensor_acceleration:p:z", 0.0, 5e3),
+        ("sensor_absolute_acceleration:p:z", 0.0, 5e3), ("sensor_displacement:p:z", 0.0, 1.0),
+        ("sensor_velocity:p:z", 0.0, 50.0), ("sensor_roll_rate:p", 0.0, 20.0),
+        ("wheelset_lateral:1", 0.0, 0.2), ("element_deflection:e:z", 0.0, 2.0),
+    ],
+)  # fmt: skip
+def test_a_channel_is_refused_outside_of_what_vehicles_do(quantity, least, most, sign):
+    """Its largest amount counts, gaps and zeros do not."""
+
+    def faults(largest):
+        x = sign * largest * np.array([0.1, np.nan, 1.0])
+        return _implausible(how, "a", x)
+
+    channels = {"a": SimpleNamespace(quantity=quantity)}
+    how = SimpleNamespace(channels=channels, file=("made.csv",))
+    assert faults(most) == faults(max(least, 1e-12)) == faults(0.0) == faults(np.nan) == []
+    (fault,) = faults(1.01 * most)
+    assert f"{most:g}" in fault.allowed
+    assert f"{1.01 * most:.4g}" in fault.found
+    assert (len(faults(0.99 * least)) == 1) == (least > 0.0)
+
+
+@pytest.mark.parametrize("angles", np.vstack([np.eye(3), [[0.5, -1.0, 0.7]]]))
+@pytest.mark.parametrize("measured", ["xyz", "xz", "y"])
+def test_turned_sensors_are_turned_back_as_the_rotation_says(angles, measured):
+    """To first order of the angles; axes that nobody measured count as standing still."""
+    true = np.random.default_rng(3).normal(size=(50, 3)) * [axis in measured for axis in "xyz"]
+    small = 1e-5 * angles
+    gravity = np.array([0.0, 0.0, 9.81])
+    read = Rotation.from_rotvec(small).inv().apply(true - gravity) + gravity
+    channels = {
+        f"channel {axis}": SimpleNamespace(quantity=f"sensor_acceleration:p:{axis}", high_pass=None)
+        for axis in measured
+    }
+    values = {f"channel {axis}": read[:, "xyz".index(axis)] for axis in measured}
+    how = SimpleNamespace(channels=channels, mounting={"p": tuple(small)})
+    remarks = []
+    found = _mounted("made", how, values, remarks)
+    for axis in measured:
+        error = found[f"channel {axis}"] - true[:, "xyz".index(axis)]
+        assert np.abs(error).max() < 1e-4 * np.abs(small).max() * 9.81 + 3e-10
+    missing = [axis for axis in "xyz" if axis not in measured]
+    said = f"p: {', '.join(missing)} is not measured, taken as zero."
+    assert remarks == ([said] if missing else [])
+
+
+def test_a_part_holds_the_first_and_not_the_last_of_its_places():
+    s = 0.5 * np.arange(40.0)
+    how = SimpleNamespace(channels={"a": SimpleNamespace(quantity="Q:1:left")}, name="run")
+    run = Measurement(how, s / 20.0 + 3.0, s + 7.0, np.full(40, 20.0), {"a": s**2})
+    part = run.part(10.0, 20.0)
+    assert part.distance == pytest.approx(np.arange(10.0, 20.0, 0.5))
+    assert part["a"] == pytest.approx((part.distance - 7.0) ** 2)
+    assert part.time == pytest.approx((part.distance - 7.0) / 20.0 + 3.0)
+    assert run.rate == pytest.approx(40.0) == part.rate
+    moved = run.moved(4.0, 0.1)
+    assert moved.distance == pytest.approx(11.0 + 1.1 * s)
+    assert moved.speed == pytest.approx(np.gradient(moved.distance, moved.time))
+    with pytest.raises(KeyError, match="no channel 'b'"):
+        run["b"]
+
+
+@pytest.mark.parametrize(
+    ("quantities", "outputs"),
+    [
+        (["Q:1:left", "Y:2:right"], {"quantities": ["Q", "Y"]}),
+        (["element_force:damper:z", "element_power:a", "Q:1:left"],
+         {"elements": ["a", "damper"], "quantities": ["Q"]}),
+        (["sensor_acceleration:p:z"], {"sensors": "readings", "quantities": ["distance"]}),
+        (["sensor_acceleration:p:z", "sensor_roll_rate:p"],
+         {"sensors": "readings", "quantities": ["distance"]}),
+        (["sensor_acceleration:p:z", "sensor_displacement:p:z"],
+         {"sensors": True, "quantities": ["distance"]}),
+    ],
+)  # fmt: skip
+def test_a_run_has_to_output_what_was_measured(quantities, outputs):
+    assert outputs_for(quantities) == outputs
+
+
+def test_channels_of_what_a_vehicle_does_not_have_are_refused_together():
+    channels = {
+        "a": "Q:5:left", "b": "Q:4:right", "c": "sensor_acceleration:nowhere:z", "d": "speed",
+        "e": "element_force:nothing:z", "f": "Q:1:middle",
+    }  # fmt: skip
+    coach = load_vehicle("coach_manchester")
+    with pytest.raises(InputError) as refused:
+        check_channels("m.toml", SimpleNamespace(quantities=channels), coach)
+    keys = [fault.key.split(".")[1] for fault in refused.value.faults]
+    assert keys == ["a", "c", "e", "f"]
