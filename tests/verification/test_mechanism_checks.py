@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_mechanism
+from railsim.definitions.mechanism.parts import Cylinder, GasSpring, TorsionSpring
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.cams import transitions
-from railsim.mechanisms.checks import _gas_spring, checks
+from railsim.mechanisms.checks import _forces, _gas_spring, checks
 from railsim.mechanisms.dynamics import law_of
 from railsim.mechanisms.forces import Rates, generalised_force
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
-from railsim.mechanisms.remarks import remarks
+from railsim.mechanisms.remarks import _gas_springs, _torsion_springs, remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.summary import analysis_data
 from railsim.mechanisms.tables import sentences
@@ -243,15 +244,6 @@ def test_it_is_said_that_a_torsion_spring_is_wound_by_a_turn_too_many(tmp_path, 
     assert len(said) == abs(turns)
 
 
-@pytest.mark.parametrize(("value", "limit", "sense"), [(-5, -30, "above"), (40, 80, "below")])
-def test_a_gas_spring_is_checked_against_the_nearer_end_of_its_range(value, limit, sense):
-    spring = SimpleNamespace(temperature=value, service=(-30, 80), rod_end=None)
-    result = SimpleNamespace(model=SimpleNamespace(number=float))
-    (found,) = _gas_spring(result, "flap", spring)
-    assert (found.name, found.value, found.limit) == ("flap_temperature", value, limit)
-    assert found.sense == sense
-
-
 def test_it_is_said_that_what_is_let_go_leaves_the_travel(tmp_path):
     """Without friction the arm swings as high on the other side, -pi - 1."""
     path = tmp_path / "arm.toml"
@@ -271,3 +263,119 @@ def test_it_is_said_that_a_height_is_reached_again(tmp_path):
     at = np.degrees(np.arcsin(0.25 / 0.3))
     words = "the output reaches zone.{} again; results are those at {:.4f} deg"
     assert found == [words.format(name, at) for name in ("work", "high")]
+
+
+UNDER, OVER = np.nextafter(20e5, 0.0), np.nextafter(250e5, 3e7)
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "rod_end", "drop", "words"),
+    [
+        (20e5, 250e5, None, 0.0, []), (UNDER, 250e5, None, 0.0, ["usual 20 to 250 bar"]),
+        (20e5, OVER, None, 0.0, ["20.0 to 250.0 bar, usual"]),
+        (11e5, 262e5, None, 0.0, ["11.0 to 262.0 bar, usual"]),
+        (None, None, None, 0.01, ["rod at ground.foot, the lower end"]),
+        (None, None, None, -0.01, ["rod at arm.pin, the lower end"]),
+        (None, None, "arm.pin", 0.01, []), (11e5, 90e5, None, 0.01, ["11.0 to 90.0", "rod at"]),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_gas_spring(monkeypatch, least, most, rod_end, drop, words):
+    """Makers fill them to 20 to 250 bar; the oil lies at the rod's end where that is below."""
+    monkeypatch.setattr("railsim.mechanisms.remarks.rod_drop", lambda *_: drop)
+    spring = GasSpring.model_construct(gas_spring=("ground.foot", "arm.pin"), rod_end=rod_end)
+    result = SimpleNamespace(
+        definition=SimpleNamespace(elements={"other": None, "flap": spring}),
+        output={} if least is None else {"flap_pressure": None},
+        extremes=lambda name: SimpleNamespace(least=least, most=most),
+    )
+    found = _gas_springs(result)
+    assert len(found) == len(words)
+    assert all("'flap'" in said and word in said for word, said in zip(words, found, strict=True))
+
+
+@pytest.mark.parametrize("value", [-30.0, 24.9, 25.1, 80.0])
+@pytest.mark.parametrize(("rod_end", "sign"), [("ground.foot", 1.0), ("arm.pin", -1.0)])
+def test_a_gas_spring_is_checked_against_temperature_and_the_end_of_its_rod(
+    monkeypatch, value, rod_end, sign
+):
+    """The second end is 0.1 m over the first: a rod at the first one points down."""
+    monkeypatch.setattr("railsim.mechanisms.checks.rod_drop", lambda *_: 0.1)
+    spring = SimpleNamespace(
+        temperature=value, service=(-30, 80), gas_spring=("ground.foot", "arm.pin"), rod_end=rod_end
+    )
+    warm, down = _gas_spring(SimpleNamespace(model=SimpleNamespace(number=float)), "flap", spring)
+    assert (warm.limit, warm.sense) == ((-30.0, "above") if value < 25.0 else (80.0, "below"))
+    assert warm.ok
+    assert (down.value, down.limit, down.sense, down.ok) == (0.1 * sign, 0.0, "above", sign > 0.0)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize("turned", [179.9, 180.1])
+def test_a_torsion_spring_is_remarked_from_half_a_turn_on(turned, sense):
+    """Angle of the first body less that of the second, less the free one."""
+    at = np.radians([20.0, 20.0 + sense * turned])
+    q = np.zeros((2, 3, 3))
+    q[:, 1, 2], q[:, 2, 2] = at + 0.4, 0.4
+    coil = TorsionSpring.model_construct(torsion_spring=("arm", "rod"), free_angle=at[0])
+    table = TorsionSpring.model_construct(torsion_spring=("arm", "rod"), free_angle=None)
+    result = SimpleNamespace(
+        definition=SimpleNamespace(elements={"other": None, "table": table, "coil": coil}),
+        motion=SimpleNamespace(q=q),
+        model=SimpleNamespace(bodies={"arm": 1, "rod": 2}, number=float),
+    )
+    found = _torsion_springs(result)
+    assert len(found) == (turned > 180.0)
+    assert all(f"'coil' is wound by up to {turned:.1f} deg" in said for said in found)
+
+
+def forces(kind, least, most, back=None, turns=1.0, sense=1, optimise=None, **part):
+    """Checks of an unknown force between `least` and `most` [N], `back` on the way back."""
+    values = {"force": (least, most)} | ({"force_back": back} if back else {})
+    amounts = [abs(x) for pair in values.values() for x in pair]
+    result = SimpleNamespace(
+        model=SimpleNamespace(number=float, sense=sense), output=values, motion=None,
+        definition=SimpleNamespace(
+            optimise=optimise, solve=SimpleNamespace(unknown="lift"),
+            actuators={"lift": None},
+        ),
+        extremes=lambda name: SimpleNamespace(least=values[name][0], most=values[name][1]),
+        peak_force=max(amounts),
+    )  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("railsim.mechanisms.checks.unit_work", lambda *_: np.array([turns]))
+        patch.setattr(
+            "railsim.mechanisms.checks.chamber_area",
+            lambda model, part, acting: {"push": 0.02, "pull": 0.015}[acting],
+        )
+        result.definition.actuators["lift"] = unknown = kind.model_construct(**part)
+        return {one.name: (one.value, one.limit, one.sense) for one in _forces(result, unknown)}
+
+
+@pytest.mark.parametrize(("acts", "least", "most"), [
+    ("push", -200.0, 9e3), ("pull", -200.0, 9e3), ("both", -7e3, 9e3), ("both", 100.0, 900.0),
+    ("both", -900.0, -100.0), ("push", -1e-9, 9e3),
+])  # fmt: skip
+@pytest.mark.parametrize("wanted", [None, 8e3])
+@pytest.mark.parametrize("along", [1.0, -1.0])
+def test_a_cylinder_has_the_force_of_its_chambers(acts, least, most, wanted, along):
+    """6 bar on 200 cm2, with the rod 150 cm2; on the way back up to 100 N more or less."""
+    optimise = None if wanted is None else SimpleNamespace(available_force=wanted)
+    back = least - 100.0, most + 100.0
+    low, high = back if least != -1e-9 else (least, most)
+    found = forces(
+        Cylinder, least, most, back if low < least else None, turns=along, optimise=optimise,
+        acts=acts, supply_pressure=6e5,
+    )  # fmt: skip
+    chamber = {"push": 12e3, "both": 12e3, "pull": 9e3}[acts]
+    limit = min(chamber, wanted or np.inf)
+    ahead = least if along > 0.0 else -most
+    expected = {
+        "available_force": (max(high, 0.0), limit, "below"),
+        "runs_ahead": (0.0 if ahead == -1e-9 else ahead, 0.0, "above"),
+    }
+    if acts == "both":
+        expected["available_pull"] = max(-low, 0.0), min(9e3, wanted or np.inf), "below"
+    else:
+        name = "pulls" if acts == "push" else "pushes"
+        expected[name] = 0.0 if low == -1e-9 else low, 0.0, "above"
+    assert found == expected
