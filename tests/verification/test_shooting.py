@@ -1,0 +1,166 @@
+"""Periodic motions by shooting against an amplitude equation whose motions are known.
+
+r' = 4 r (l + X - X^2), angle' = 12 (1 + X/10), X = r^2, l = (v - 50)/20, besides z' = -3 z: motions
+with l = X^2 - X turn back at 45 m/s, X = 1/2, last 2 pi over the rate of the angle, and have the
+multipliers exp(4 (2 X - 4 X^2) T) and exp(-3 T) (Guckenheimer and Holmes 1983, section 3.4).
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from railsim.errors import ModelError
+from railsim.stability.periodic import PeriodicMotion, Shooting
+
+A0, RATE, OMEGA, DECAY = 4e-3, 4.0, 12.0, 3.0
+SCALE = np.full(3, 1e-3)
+
+
+class AmplitudeEquation:
+    """States (x, y, z) [m], moved by Runge's and Kutta's fourth order along the logarithm of r."""
+
+    def after(self, states, durations, speeds):
+        x, y, z = states.T
+        u, angle = np.log(np.hypot(x, y) / A0), np.arctan2(y, x)
+        step, excess = durations / 60, (speeds - 50.0) / 20.0
+
+        def rates(u):
+            X = np.exp(2.0 * u)
+            return RATE * (excess + X - X * X), OMEGA * (1.0 + 0.1 * X)
+
+        for _ in range(60):
+            k1 = rates(u)
+            k2 = rates(u + 0.5 * step * k1[0])
+            k3 = rates(u + 0.5 * step * k2[0])
+            k4 = rates(u + step * k3[0])
+            du, turn = (a + 2 * b + 2 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
+            u, angle = u + step / 6 * du, angle + step / 6 * turn
+        r = A0 * np.exp(u)
+        return np.stack([r * np.cos(angle), r * np.sin(angle), z * np.exp(-DECAY * durations)], 1)
+
+    def amplitude(self, state, duration, speed):
+        return float(np.hypot(state[0], state[1]))
+
+
+def is_known(motion):
+    X = (motion.amplitude / A0) ** 2
+    period = 2.0 * np.pi / (OMEGA * (1.0 + 0.1 * X))
+    assert motion.speed == pytest.approx(50.0 + 20.0 * (X * X - X), abs=1e-4)
+    assert motion.period == pytest.approx(period, rel=1e-5) == 1.0 / motion.frequency
+    known = np.exp([RATE * (2.0 * X - 4.0 * X * X) * period, -DECAY * period])
+    found = np.sort(np.real(motion.multipliers))[::-1]
+    assert found == pytest.approx(np.sort(known)[::-1], abs=1e-3)
+    assert motion.is_stable == (found[0] < 1.001)
+    assert np.linalg.norm(motion.tangent) == pytest.approx(1.0)
+    assert np.linalg.norm(motion.along) == pytest.approx(1.0)
+    # perpendicular to the radius
+    assert abs(motion.along[:2] @ motion.state[:2]) < 1e-3 * np.linalg.norm(motion.state)
+    return X
+
+
+@pytest.fixture(scope="module")
+def branch():
+    """Shooting, and the motions from the loss of stability at 50 m/s through the fold."""
+    shooting = Shooting(AmplitudeEquation(), SCALE, period_scale=0.02, speed_scale=1.0)
+    shape = np.array([1.0, -1.0j, 0.0]) * 5.0
+    start = shooting.beginning(1e-12 * np.ones(3), shape, OMEGA / 2.0 / np.pi, 50.0)
+    return shooting, start, list(shooting.followed(start, 0.5, lambda motion: motion.speed < 52.0))
+
+
+def test_a_branch_has_motions_periods_and_multipliers_of_the_closed_form(branch):
+    _, start, motions = branch
+    assert start.tangent == pytest.approx([1.0, 0.0, 0.0, 0.0, 0.0])
+    assert start.along == pytest.approx([0.0, 1.0, 0.0])
+    assert start.period == pytest.approx(2.0 * np.pi / OMEGA)
+    X = [is_known(motion) for motion in motions]
+    assert np.all(np.diff(X) > 0.0)
+    assert motions[-1].speed > 52.0 > motions[-2].speed
+    for share, motion in zip(X, motions, strict=True):
+        assert motion.is_stable == (share > 0.5)
+        assert (motion.tangent[-1] > 0.0) == (share > 0.5)
+    scale = np.array([*SCALE, 0.02, 1.0])
+    u = [np.array([*m.state, m.period, m.speed]) / scale for m in (start, *motions)]
+    for before, one, other in zip([start, *motions], u, u[1:], strict=False):
+        assert before.tangent @ (other - one) == pytest.approx(0.5, abs=1e-6)
+        assert abs(before.along @ (other - one)[:3]) < 1e-6
+
+
+def test_the_fold_is_where_the_closed_form_turns_back(branch):
+    shooting, _, motions = branch
+    (k,) = (k for k, m in enumerate(motions[1:]) if motions[k].tangent[-1] < 0.0 < m.tangent[-1])
+    fold = shooting.fold(motions[k], motions[k + 1], 0.5)
+    assert fold.speed == pytest.approx(45.0, abs=1e-4)
+    assert is_known(fold) == pytest.approx(0.5, abs=2e-3)
+    # two motions on one side of it have none between them
+    assert shooting.fold(motions[k + 1], motions[k + 2], 0.5) is motions[k + 2]
+
+
+@pytest.mark.parametrize(("speed", "share"), [(46.0, 0.723607), (48.0, 0.887298), (48.0, 0.112702)])
+@pytest.mark.parametrize("phase", [0.0, 2.0, 4.0])
+def test_the_motion_nearest_to_that_of_a_run_is_found_from_any_phase(branch, speed, share, phase):
+    """X = (1 +- sqrt(1 + 4 l))/2; the run is 5 % larger and its period 2 % longer."""
+    shooting, *_ = branch
+    r = 1.05 * A0 * np.sqrt(share)
+    run = np.array([r * np.cos(phase), r * np.sin(phase), 0.0])
+    period = 1.02 * 2.0 * np.pi / (OMEGA * (1.0 + 0.1 * share))
+    found = shooting.nearest(run, period, speed)
+    assert found.speed == pytest.approx(speed)
+    assert is_known(found) == pytest.approx(share, abs=1e-5)
+    ahead = np.array([-np.sin(phase), np.cos(phase), 0.0])
+    assert abs(ahead @ found.state) < 0.02 * found.amplitude
+    assert run @ found.state > 0.0
+    near = shooting.at_speed(found, speed + 0.5)
+    assert near.speed == pytest.approx(speed + 0.5)
+    is_known(near)
+
+
+def test_below_the_fold_no_motion_is_found(branch):
+    shooting, _, motions = branch
+    with pytest.raises(ModelError, match="does not converge"):
+        shooting.nearest(np.array([0.7 * A0, 0.0, 0.0]), 0.5, 43.0)
+    assert all(motion.speed > 44.99 for motion in motions)
+
+
+@pytest.mark.parametrize(
+    ("fails", "quick", "tried"),
+    [
+        (lambda k, length: False, 8, [1, 1, 1, 1]),
+        (lambda k, length: k == 0, 8, [1, 1 / 2, 3 / 4, 1, 1]),
+        (lambda k, length: k == 0, 9, [1, 1 / 2, 1 / 2, 1 / 2, 1 / 2]),
+        (lambda k, length: length > 0.2, 9, [1, 1 / 2, 1 / 4, 1 / 8, 1 / 8, 1 / 8, 1 / 8]),
+        (lambda k, length: True, 8, [2.0**-n for n in range(9)]),
+    ],
+)  # fmt: skip
+def test_steps_that_fail_are_halved_and_grow_by_a_half_where_few_iterations_were_needed(
+    monkeypatch, branch, fails, quick, tried
+):
+    shooting, *_ = branch
+    lengths = []
+
+    def ahead(now, length):
+        lengths.append(length / 0.8)
+        if fails(len(lengths) - 1, length / 0.8):
+            raise ModelError("made to fail")
+        return SimpleNamespace(count=now.count + 1), quick
+
+    monkeypatch.setattr(shooting, "ahead", ahead)
+    begin = SimpleNamespace(count=0)
+    followed = shooting.followed(begin, 0.8, lambda motion: motion.count < 4)
+    if fails(99, 1e-3):
+        with pytest.raises(ModelError, match="made to fail"):
+            list(followed)
+    else:
+        assert [motion.count for motion in followed] == [1, 2, 3, 4]
+    assert lengths == pytest.approx(tried)
+
+
+@pytest.mark.parametrize(("sizes", "stable"), [
+    ([0.5, 1.0009], True), ([0.5, -1.0009], True), ([0.5, 1.0011], False), ([0.8 + 0.7j], False),
+])  # fmt: skip
+def test_a_motion_is_stable_whose_multipliers_lie_within_the_unit_circle(sizes, stable):
+    """To a thousandth, the error of difference quotients."""
+    nothing = np.zeros(1)
+    motion = PeriodicMotion(nothing, 0.5, 40.0, 1e-3, np.array(sizes), nothing, nothing)
+    assert motion.is_stable == stable
+    assert motion.frequency == 2.0
