@@ -1,8 +1,12 @@
 """Equivalent conicity where it is known in closed form."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import brentq
 
 from railsim.contact import equivalent_conicity
 from railsim.errors import ModelError
@@ -97,3 +101,47 @@ def test_nonsense_is_refused():
         equivalent_conicity([0.0], [0.0], [0.1])
     with pytest.raises(ModelError, match="positive"):
         equivalent_conicity([0.0, 1.0], [0.0, 1.0], [-0.1])
+
+
+def wavelength_integral(y, delta_r, low, high):
+    """I over an oscillation between two places, by Gauss and Kronrod between its nodes.
+
+    y = middle - amplitude cos(t) takes the singularities of the ends away.
+    """
+    middle, amplitude = 0.5 * (low + high), 0.5 * (high - low)
+    knots = np.unique(np.clip(y, low, high))
+    potential = make_interp_spline(y, delta_r, k=1).antiderivative()
+    top = float(potential(high))
+
+    def integrand(t):
+        at = middle - amplitude * np.cos(t)
+        return amplitude * np.sin(t) / np.sqrt(2.0 * max(top - float(potential(at)), 1e-300))
+
+    ends = np.arccos(np.clip((middle - knots) / amplitude, -1.0, 1.0))
+    return sum(quad(integrand, a, b, epsrel=1e-9)[0] for a, b in pairwise(ends))
+
+
+FALLING = np.array([-1.9, -1.2, -0.3, 0.5, 0.4, -0.1, -0.4, 0.3, 1.4, 2.0]) * 1e-3
+JUMPS = np.array([-1.9, -1.8, -0.3, -0.25, -0.2, 0.1, 0.15, 1.4, 1.5, 3.0]) * 1e-3
+"""Radius differences that fall between rising flanks, as of worn wheels, and in steps."""
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+@pytest.mark.parametrize(("delta_r", "amplitude"), [
+    (FALLING, 5.2e-3), (FALLING, 6.4e-3), (JUMPS, 0.8e-3), (JUMPS, 3.1e-3), (JUMPS, 6.4e-3),
+])  # fmt: skip
+@pytest.mark.parametrize(("width", "height"), [(1.0, 1.0), (2.5, 0.3)])
+def test_conicity_is_that_of_the_wavelength_by_quadrature(delta_r, amplitude, turn, width, height):
+    """In the mirror the same; of a wider and lower function less by the ratio of both."""
+    y = 1e-3 * np.array([-8.0, -6.5, -4.0, -2.0, -0.7, 0.9, 2.2, 3.7, 6.2, 8.0])
+    potential = make_interp_spline(y, delta_r, k=1).antiderivative()
+
+    def excess(centre):
+        return float(potential(centre + amplitude) - potential(centre - amplitude))
+
+    centre = brentq(excess, y[0] + amplitude, y[-1] - amplitude, xtol=1e-15)
+    whole = wavelength_integral(y, delta_r, centre - amplitude, centre + amplitude)
+    seen = (width * y, height * delta_r)
+    seen = seen if turn > 0.0 else tuple(-values[::-1] for values in seen)
+    (found,) = equivalent_conicity(*seen, [width * amplitude])
+    assert found == pytest.approx(0.5 * np.pi**2 / whole**2 * height / width, rel=1e-6)
