@@ -3,12 +3,15 @@
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
+from railsim.model.assembly import assemble
+from railsim.model.work import level_track_with_friction
 from railsim.simulation import step_choice
 from railsim.simulation.preparation import prepare
 
@@ -176,3 +179,23 @@ def test_other_end_of_a_class_has_its_highest_speed_and_lowest_friction(monkeypa
     track = track.replace(friction=(0.0, 0.3001))
     prepare(load_vehicle("coach_manchester"), track, Settings(), 20.0, duration=1.0).steps.at(20.0)
     assert asked[-1] == ("end of class", *(pytest.approx(x) for x in (1.2**17, 0.0, 0.3)))
+
+
+def test_steps_are_judged_on_a_line_with_the_largest_friction_of_each_rail():
+    """The line is s along the track, long enough for all bodies; loads are left out."""
+    system = assemble(load_vehicle("coach_manchester"), load_track("curve_r250"), Settings()).system
+    rail = system.track.rail.copy()
+    rail[:, MU_LEFT, 0] = np.linspace(0.2, 0.5, len(rail))
+    rail[:, MU_RIGHT, 0] = np.linspace(0.7, 0.1, len(rail))
+    level = level_track_with_friction(system._replace(track=system.track._replace(rail=rail)))
+    friction = level.track.rail[:, [MU_LEFT, MU_RIGHT]]
+    assert np.all(friction == np.array([[0.5, 0, 0, 0], [0.7, 0, 0, 0]]))
+    line, ds = level.track.coefficients, level.track.ds
+    assert line[:, 0, 0] == pytest.approx(level.track.s_start + ds * np.arange(len(line)))
+    assert np.all(line[:, 0, 1] == 1.0)
+    assert np.count_nonzero(line) == np.count_nonzero(line[:, 0, :2])
+    ends = level.track.s_start, level.track.s_start + ds * len(line)
+    assert ends[0] < np.min(system.frame_offset) - 50.0
+    assert ends[1] > np.max(system.frame_offset) + 50.0
+    assert not level.track.has_irregularity
+    assert len(level.loads.body) == len(level.drives.body) == 0
