@@ -251,3 +251,9 @@ def test_a_vehicle_file_says_which_spring_it_leaves_out():
     assert f"# {remark}\n" in vehicle_text(own, part)
     vertical = part.elements["coil_nest"]["stiffness"][2]
     assert vertical == pytest.approx(78.48e9 * 0.041**4 / (8.0 * 3.6 * 0.23**3), rel=1e-6)
+
+
+def test_wires_are_the_bars_of_the_standard():
+    """EN 10060:2003, hot rolled round bars for general purposes, 10 to 60 mm."""
+    printed = "10 12 13 14 15 16 18 19 20 22 24 25 26 27 28 30 32 35 36 38 40 42 45 48 50 52 55 60"
+    assert [round(1e3 * d, 9) for d in nests.EN_10060] == [float(d) for d in printed.split()]
