@@ -220,6 +220,8 @@ def test_mounting_takes_gravity_back(tmp_path, gravity, high_pass):
         'z = { quantity = "sensor_acceleration:floor_front:z" }\n'
     )
     run = railsim.load_measurement(tmp_path / "m.toml")
+    assert run.time == pytest.approx(t)  # of the rate
+    assert run.distance == pytest.approx(50.0 * t)
     assert run["y"] == pytest.approx(y, abs=1.5 * p**2 * 15.0)
     assert run["z"] == pytest.approx(z, abs=1.5 * p**2 * 15.0)
 
