@@ -1,5 +1,7 @@
 """A run that begins in a curve in its steady state: what a long run-in comes to."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from dynamics import load_vehicle
@@ -203,3 +205,16 @@ def test_on_straight_track_wheels_begin_on_the_rails_as_they_are_supported(rows)
     )
     np.testing.assert_allclose(run.Q, np.broadcast_to(run.Q0, run.Q.shape), rtol=2e-2)
     np.testing.assert_allclose(run.Q[0], run.Q0, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("curvature", "cant", "asked"), [
+    (0.0, 0.0, False), (2e-3, 0.0, True), (0.0, 0.1, True), (-2e-3, -0.1, True),
+])  # fmt: skip
+def test_friction_elements_begin_with_a_run_in_on_curve_or_cant_alone(
+    monkeypatch, curvature, cant, asked
+):
+    monkeypatch.setattr(run_in, "_curve", lambda track, s: (curvature, cant))
+    internal = SimpleNamespace(kind=np.array([run_in.PAD]))
+    model, said = SimpleNamespace(system=SimpleNamespace(internal=internal)), []
+    assert run_in._steady(model, None, None, 100.0, said.append) is None
+    assert len(said) == asked
