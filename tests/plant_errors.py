@@ -7,6 +7,7 @@ in the working copy, the module's own examples and the test files that name what
 until one fails, then the file is put back.  The list holds place, change, and the first test that
 failed, or `survived`; what stands in a list is not tried again.  `--kernels` limits the errors in
 kernels, each of which compiles for minutes: further errors of the seed elsewhere take their place.
+`--rooms springs,stability,wear` takes as many of each folder, or of files with this in their name.
 Run it in a clone of its own: it changes sources.
 
 Mutation operators after DeMillo, Lipton and Sayward (1978), "Hints on test data selection".
@@ -137,17 +138,35 @@ def first_failure(planted: Planted, files: int) -> str:
     return failed[0] if failed else "no test could start"
 
 
+def of_rooms(rooms: list[str], seed: int, count: int) -> list[Planted]:
+    """`count` errors, as many in each room: a folder of the package, or a part of files' names."""
+    draw, package = random.Random(seed), ROOT / "railsim"
+    chosen: list[Planted] = []
+    for room in rooms:
+        folder = package / room
+        files = folder.rglob("*.py") if folder.is_dir() else package.rglob(f"*{room}*.py")
+        possible = [planted for path in sorted(files) for planted in changes(path)]
+        chosen += draw.sample(possible, min(count // len(rooms), len(possible)))
+    return chosen
+
+
 def main() -> None:
     """Choose the errors by the seed, plant one after the other, write the list as it grows."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--kernels", type=int, help="at most so many in railsim/kernels")
+    parser.add_argument("--rooms", type=lambda text: text.split(","), help="of these alone")
     parser.add_argument("--files", type=int, default=10, help="test files for each error")
     parser.add_argument("--list", type=Path, default=ROOT / "build" / "planted.csv")
     options = parser.parse_args()
-    possible = [c for path in sorted((ROOT / "railsim").rglob("*.py")) for c in changes(path)]
-    chosen = random.Random(options.seed).sample(possible, min(10 * options.count, len(possible)))
+    if options.rooms:
+        chosen = of_rooms(options.rooms, options.seed, options.count)
+    else:
+        files = sorted((ROOT / "railsim").rglob("*.py"))
+        possible = [planted for path in files for planted in changes(path)]
+        most = min(10 * options.count, len(possible))
+        chosen = random.Random(options.seed).sample(possible, most)
     kernels = [planted for planted in chosen if planted.path.startswith("railsim/kernels/")]
     left_out = set() if options.kernels is None else set(kernels[options.kernels :])
     chosen = [planted for planted in chosen if planted not in left_out][: options.count]
