@@ -94,6 +94,13 @@ def test_amplitude_beyond_the_function_is_not_invented():
     assert np.isnan(equivalent_conicity(Y, 0.1 * Y, [0.009])[0])
 
 
+@pytest.mark.parametrize("middle", [2e-3, -2e-3])
+def test_an_oscillation_that_leaves_the_function_on_one_side_has_no_conicity(middle):
+    found = equivalent_conicity(Y, 2 * (Y - middle) / 20, [5.9e-3, 6.1e-3])
+    assert found[0] == pytest.approx(0.05)
+    assert np.isnan(found[1])
+
+
 def test_nonsense_is_refused():
     with pytest.raises(ModelError, match="increasing"):
         equivalent_conicity([0.0, 0.0, 1.0], [0.0, 1.0, 2.0], [0.1])
