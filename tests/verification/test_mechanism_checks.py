@@ -10,15 +10,22 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.mechanism.parts import Cylinder, GasSpring, TorsionSpring
+from railsim.definitions.mechanism.parts import (
+    Cylinder,
+    GasSpring,
+    HandForce,
+    HandTorque,
+    TorsionSpring,
+)
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.cams import transitions
-from railsim.mechanisms.checks import _forces, _gas_spring, checks
+from railsim.mechanisms.checks import _forces, _gas_spring, checks, rod_drop
 from railsim.mechanisms.dynamics import law_of
 from railsim.mechanisms.forces import Rates, generalised_force
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
+from railsim.mechanisms.remarks import _forces as held_back
 from railsim.mechanisms.remarks import _gas_springs, _torsion_springs, remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.summary import analysis_data
@@ -379,3 +386,28 @@ def test_a_cylinder_has_the_force_of_its_chambers(acts, least, most, wanted, alo
         name = "pulls" if acts == "push" else "pushes"
         expected[name] = 0.0 if low == -1e-9 else low, 0.0, "above"
     assert found == expected
+
+
+@pytest.mark.parametrize("kind", [HandForce, HandTorque, Cylinder])
+@pytest.mark.parametrize("least", [-12.345, -1e-9, 0.0, 3.0])
+def test_a_hand_that_has_to_hold_back_is_remarked(monkeypatch, kind, least):
+    """A cylinder is not, its check `runs_ahead` says so; a torque has its own unit."""
+    monkeypatch.setattr("railsim.mechanisms.remarks.runs_ahead", lambda _: least)
+    definition = SimpleNamespace(
+        solve=SimpleNamespace(unknown="grip"), actuators={"grip": kind.model_construct()}
+    )
+    found = held_back(SimpleNamespace(definition=definition))
+    unit = "N m" if kind is HandTorque else "N"
+    said = f"'grip' holds back with up to {-least:.2f} {unit}: the load runs ahead"
+    assert found == ([said] if kind is not Cylinder and least < 0.0 else [])
+
+
+def test_ends_of_a_gas_spring_are_compared_where_it_is_shortest():
+    """Its ends by hand: A on the ground, E on the plate 74 mm from the pivot."""
+    result = analyse(load_mechanism("tilting_one_spring"))
+    angle = np.linspace(result.model.start, result.model.end, 20_001)
+    foot = 0.250 * np.exp(-0.9365244779983853j)
+    end = 0.074 * np.exp(1j * (np.radians(-150.0) + angle))
+    shortest = np.argmin(np.abs(end - foot))
+    drop = end[shortest].imag - foot.imag
+    assert rod_drop(result, "front") == pytest.approx(drop, abs=1e-5)

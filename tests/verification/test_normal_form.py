@@ -46,9 +46,20 @@ def hunting(speed):
     return A0 * math.sqrt(0.5 * (1.0 + root)), A0 * math.sqrt(max(0.0, 0.5 * (1.0 - root)))
 
 
+SHARES = []
+
+
 @pytest.fixture(scope="module")
 def branches():
-    return diagram(NormalForm(), [43.0, 44.0, 46.0, 48.0, 49.0, 51.0, 53.0])
+    SHARES.clear()
+    return diagram(NormalForm(), [43.0, 44.0, 46.0, 48.0, 49.0, 51.0, 53.0], SHARES.append)
+
+
+def test_progress_rises_to_the_whole(branches):
+    assert np.all(np.diff(SHARES) > -1e-9)
+    assert SHARES[:7] == pytest.approx(0.25 * np.arange(1, 8) / 7.0)
+    assert SHARES[7:14] == pytest.approx(0.25 + 0.25 * np.arange(1, 8) / 7.0)
+    assert SHARES[-1] == 1.0
 
 
 def test_branches_are_those_of_the_closed_form(branches):
