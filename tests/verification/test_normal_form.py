@@ -75,6 +75,15 @@ def test_branches_are_those_of_the_closed_form(branches):
     assert lowest_of(branches).speed == pytest.approx(FOLD, abs=0.15)
 
 
+def test_the_way_down_begins_with_the_largest_disturbance_at_the_highest_speed(monkeypatch):
+    disturbed, rest = [], NormalForm.rest
+    monkeypatch.setattr(NormalForm, "rest", lambda *a: (disturbed.append(a[1:]), rest(*a))[1])
+    diagram(NormalForm(), [46.0, 51.0, 53.0])
+    # upwards only what rests is disturbed, by 10 um
+    assert next(row for row in disturbed if row[1] > 1e-5) == (53.0, 11e-3)
+    assert {speed for speed, size in disturbed if size <= 1e-5} == {46.0, 51.0}
+
+
 def test_unstable_motions_lie_on_the_branch_between(branches):
     (between,) = [branch for branch in branches if branch.direction == "threshold"]
     assert between.points

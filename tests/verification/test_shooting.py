@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from railsim.errors import ModelError
+from railsim.stability.motion import LeftRange
 from railsim.stability.periodic import PeriodicMotion, Shooting
+from railsim.stability.vehicle_flow import VehicleFlow
 
 A0, RATE, OMEGA, DECAY = 4e-3, 4.0, 12.0, 3.0
 SCALE = np.full(3, 1e-3)
@@ -164,3 +166,78 @@ def test_a_motion_is_stable_whose_multipliers_lie_within_the_unit_circle(sizes, 
     motion = PeriodicMotion(nothing, 0.5, 40.0, 1e-3, np.array(sizes), nothing, nothing)
     assert motion.is_stable == stable
     assert motion.frequency == 2.0
+
+
+class Turning:
+    """A time loop in which members 0 and 1 swing by 3 mm and 2 mm at 2 Hz and the wheel spins."""
+
+    def __init__(self):
+        self.asked = []
+
+    def advance(self, system, state, step, chunk):
+        self.asked.append((step, chunk.first, chunk.steps, chunk.every, state[-3:].tolist()))
+        if state[0] > 50e-3:
+            raise LeftRange("it derailed")
+        self.time = step * np.arange(chunk.first, chunk.steps + 1, min(chunk.every, 10**6))
+        state[:2] += self.at(step * chunk.steps)
+        return len(self.time)
+
+    def at(self, t):
+        late = np.array([0.0, 1.0])
+        waves = 4.0 * np.pi * np.asarray(t)[..., None]
+        return np.array([3e-3, 2e-3]) * (np.cos(waves + late) - np.cos(late))
+
+    def lateral(self, rows):
+        aside = np.array([0.0, 0.1])  # the second one stands 100 mm
+        return self.at(self.time)[:rows] + aside
+
+    def records(self, rows):
+        values = np.zeros((rows, 9))
+        values[:, :2], values[:, 5], values[:, -1] = self.lateral(rows), -50.0, 25.0
+        return values
+
+
+@pytest.fixture
+def turning():
+    flow = VehicleFlow.__new__(VehicleFlow)
+    flow._motion, flow._system, flow._step = Turning(), None, 1e-3
+    flow._rest = np.arange(9.0)
+    flow._indices, flow._floors = np.array([0, 1, 5]), np.array([1e-4, 1e-4, 0.2])
+    flow._spins, flow._per_speed = np.array([5]), np.array([-2.0])
+    return flow
+
+
+def test_what_moves_is_taken_from_a_state_and_put_back_with_spins_less_those_of_rolling(turning):
+    state = np.array([0.1, 0.2, 7.0, 7.0, 7.0, -50.3, 7.0, 7.0, 25.0])
+    reduced = turning.reduced(state)
+    assert reduced == pytest.approx([0.1, 0.2, -0.3])
+    found = turning.full(reduced, 30.0)
+    assert found[:6] == pytest.approx([0.1, 0.2, 2.0, 3.0, 4.0, -60.3])
+    assert found[-1] == 30.0
+    assert turning.reduced(found) == pytest.approx(reduced)
+
+
+@pytest.mark.parametrize(("duration", "steps"), [(0.5, 500), (0.4996, 500), (0.003, 8)])
+def test_periods_have_whole_steps_about_as_long_as_those_of_runs(turning, duration, steps):
+    """All motions those of the first, eight at least; one that derails has no end."""
+    states = np.array([[0.0, 0.0, 0.1], [60e-3, 0.0, 0.1], [1e-3, 2e-3, 0.3]])
+    durations, speeds = np.array([duration, 0.5, 0.25]), np.array([20.0, 21.0, 22.0])
+    ends = turning.after(states, durations, speeds)
+    assert np.isnan(ends[1]).all()
+    for k in (0, 2):
+        moved = np.append(turning._motion.at(durations[k]), 0.0)
+        assert ends[k] == pytest.approx(states[k] + moved, abs=1e-12)
+    asked = turning._motion.asked
+    assert [row[2] for row in asked] == [steps] * 3
+    assert [row[0] for row in asked] == pytest.approx(durations / steps)
+    assert [row[4][-1] for row in asked] == [20.0, 21.0, 22.0]
+
+
+def test_an_amplitude_is_half_the_largest_travel_of_a_wheelset_within_a_period(turning):
+    """A scale is the travel of each component in a motion of a millimetre, or its least size."""
+    found = turning.amplitude(np.array([0.0, 0.0, 0.1]), 0.5, 25.0)
+    assert found == pytest.approx(3e-3, rel=5e-3)
+    ((step, first, steps, every, _),) = turning._motion.asked
+    assert (step, first, steps, every) == (1e-3, 0, 480, 12)  # 40 records
+    scale = turning.scale(np.array([0.0, 0.0, 0.1]), 0.5, 25.0, 3e-3)
+    assert scale == pytest.approx([1e-3, 2e-3 / 3.0, 0.2], rel=1e-2)
