@@ -453,3 +453,17 @@ def test_channels_of_what_a_vehicle_does_not_have_are_refused_together():
         check_channels("m.toml", SimpleNamespace(quantities=channels), coach)
     keys = [fault.key.split(".")[1] for fault in refused.value.faults]
     assert keys == ["a", "c", "e", "f"]
+
+
+@pytest.mark.parametrize(("known", "fine"), [([0, 40], True), ([7], False), ([], False)])
+def test_a_speed_is_a_line_through_two_values_at_least(known, fine):
+    how = SimpleNamespace(speed=None, start=0.0)
+    written = np.full(len(TIME), np.nan)
+    written[known] = 20.0 + 0.5 * TIME[known]
+    if not fine:
+        with pytest.raises(InputError, match="no values; a channel with values"):
+            position("made", how, TIME, {"speed": written}, None)
+        return
+    _, speed, _ = position("made", how, TIME, {"speed": written}, None)
+    last = TIME[known[-1]]
+    assert speed == pytest.approx(20.0 + 0.5 * np.minimum(TIME, last))
