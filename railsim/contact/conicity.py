@@ -17,16 +17,17 @@ no step size enters, and jumps, dead zones and turning points need no special ca
 Source: EN 15302:2008+A1, annex B and C; J. Klingel (1883).
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from railsim.arrays import Floats
 from railsim.errors import ModelError
 
 
-def equivalent_conicity(
-    y: ArrayLike, delta_r: ArrayLike, amplitudes: ArrayLike, track: float = 1.5
-) -> Floats:
+def equivalent_conicity(y: ArrayLike, delta_r: ArrayLike, amplitudes: ArrayLike) -> Floats:
     """Equivalent conicity of a rolling radius difference function.
 
     Parameters
@@ -37,9 +38,6 @@ def equivalent_conicity(
         Rolling radius difference, right minus left, growing with y for a stable wheelset [m].
     amplitudes : ndarray, shape (n_amplitude,)
         Amplitudes of the oscillation, > 0 [m].
-    track : float
-        Distance of the contact points [m].  It cancels out of the linear motion and is here for
-        the record only.
 
     Returns
     -------
@@ -67,8 +65,8 @@ def equivalent_conicity(
         raise ModelError("a rolling radius difference needs two or more points (y, delta_r)")
     if not (np.all(np.isfinite(y)) and np.all(np.isfinite(delta_r)) and np.all(np.diff(y) > 0)):
         raise ModelError("a rolling radius difference needs finite values and increasing y")
-    if not (np.all(wanted > 0) and track > 0):
-        raise ModelError("amplitudes and track must be positive")
+    if not np.all(wanted > 0):
+        raise ModelError("amplitudes must be positive")
     potential = np.concatenate(([0.0], np.cumsum(0.5 * (delta_r[1:] + delta_r[:-1]) * np.diff(y))))
     return np.array([_conicity(y, delta_r, potential, float(a)) for a in wanted])
 
@@ -87,9 +85,9 @@ def _orbit_centre(y: Floats, delta_r: Floats, potential: Floats, amplitude: floa
     if lower > upper + 1e-12:
         return None
 
-    def excess(centre: Floats | float) -> Floats:
+    def excess(centre: Floats | float) -> Any:
         low, high = (_value(y, delta_r, potential, centre + a)[1] for a in (-amplitude, amplitude))
-        return np.asarray(high - low)
+        return high - low
 
     # sign changes where the function starts falling to the left of the wheelset's middle
     grid = np.linspace(lower, upper, 401) if upper > lower else np.array([lower])
@@ -100,14 +98,7 @@ def _orbit_centre(y: Floats, delta_r: Floats, potential: Floats, amplitude: floa
         flat = np.flatnonzero(np.abs(values) <= 1e-9 * scale)
         return float(grid[flat[np.argmin(np.abs(grid[flat]))]]) if flat.size else None
     i = int(rising[np.argmin(np.abs(grid[rising]))])
-    a, b = float(grid[i]), float(grid[i + 1])
-    for _ in range(60):
-        middle = 0.5 * (a + b)
-        if excess(middle) <= 0.0:
-            a = middle
-        else:
-            b = middle
-    return 0.5 * (a + b)
+    return float(brentq(excess, grid[i], grid[i + 1], xtol=1e-15))
 
 
 def _conicity(y: Floats, delta_r: Floats, potential: Floats, amplitude: float) -> float:

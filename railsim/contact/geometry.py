@@ -76,10 +76,10 @@ class ContactGeometry:
         difference: Floats = self.rolling_radius[:, 1] - self.rolling_radius[:, 0]
         return difference
 
-    def equivalent_conicity(self, amplitudes: ArrayLike, track: float = 1.5) -> Floats:
+    def equivalent_conicity(self, amplitudes: ArrayLike) -> Floats:
         """Equivalent conicity by EN 15302, see `railsim.contact.equivalent_conicity`."""
         known = np.isfinite(self.delta_r)
-        return equivalent_conicity(self.lateral[known], self.delta_r[known], amplitudes, track)
+        return equivalent_conicity(self.lateral[known], self.delta_r[known], amplitudes)
 
     def jumps(self, least: float = 1e-3) -> list[tuple[float, str]]:
         """Displacements at which a contact jumps on its wheel by more than `least` [m].
