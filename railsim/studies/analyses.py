@@ -155,8 +155,7 @@ def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result 
     if found.linear is not None:
         numbers = {"linear": found.linear.speed, "frequency": found.linear.frequency}
     else:
-        unstable = any(remark.startswith("unstable at") for remark in found.remarks)
-        numbers = {"linear": analysis.low if unstable else analysis.high}
+        numbers = {"linear": analysis.low if found.unstable_at_low else analysis.high}
     for method, point in found.nonlinear.items():
         numbers[method] = analysis.high if point is None else point.speed
     return numbers, found.remarks
