@@ -98,10 +98,18 @@ def _stated(met: bool) -> str:
     return MET if met else NOT_MET
 
 
+def _compared(
+    name: str, place: str, found: str, rule: Sourced | None, required: str, *, met: bool
+) -> Condition:
+    """Condition of a rule of the limits file; not checked where that has none."""
+    if rule is None:
+        return Condition(name, place, NOT_CHECKED, found, "no value in the limits file")
+    return Condition(name, place, _stated(met), found, required, rule.source, rule.checked)
+
+
 def _number(place: str, found: str, wanted: Zone, *, met: bool) -> Condition:
     least = f"{wanted.sections} at least"
-    about = "number of sections", place, _stated(met), found, least
-    return Condition(*about, wanted.source, wanted.checked)
+    return _compared("number of sections", place, found, wanted, least, met=met)
 
 
 def missing_zones(
@@ -139,7 +147,6 @@ def zone_conditions(
 ) -> list[Condition]:
     """Conditions of a zone; `rows` are its sections that count."""
     wanted, place, n = limits.zones[report.zone], report.title, len(report.values)
-    source, checked = wanted.source, wanted.checked
     outside = sum(bool(value.section.reason) for value in report.values)  # taken all the same
     enough = n >= wanted.sections and not outside
     words = f"{n}, {outside} of them outside the conditions of the zone" if outside else str(n)
@@ -154,12 +161,12 @@ def zone_conditions(
         words = f"{len(odd)} of {n} have {' to '.join(span)} m"
         standard = sorted({section_length(wanted, speed) for _, speed in lengths})
         required = " or ".join(f"{length:g} m" for length in standard)
-        about = "lengths of the sections", place, NOT_MET, words, required
-        found.append(Condition(*about, source, checked))
+        about = "lengths of the sections", place, words, wanted, required
+        found.append(_compared(*about, met=False))
     if (ends := wanted.mean_radius) is not None:
         met, wide = ends[0] <= report.radius <= ends[1], f"{ends[0]:.0f} to {ends[1]:.0f} m"
-        about = "mean radius", place, _stated(met), f"{beside_ends(report.radius, ends)} m", wide
-        found.append(Condition(*about, source, checked))
+        radius = f"{beside_ends(report.radius, ends)} m"
+        found.append(_compared("mean radius", place, radius, wanted, wide, met=met))
     if wanted.radius is not None:
         right = sum(value.section.turn > 0 for value in report.values)
         words = f"{right} sections to the right, {n - right} to the left"
@@ -207,8 +214,7 @@ def _quality(
         return Condition("track quality", place, NOT_CHECKED, found, "no target in the limits file")
     met = ends[0] <= alignment <= ends[1] and ends[2] <= level <= ends[3]
     required = f"{low_a:.2f} to {high_a:.2f} mm and {low_l:.2f} to {high_l:.2f} mm"
-    about = "track quality", place, _stated(met), found, required
-    return Condition(*about, target.source, target.checked)
+    return _compared("track quality", place, found, target, required, met=met)
 
 
 def vehicle_conditions(
@@ -231,7 +237,7 @@ def vehicle_conditions(
     words = " to ".join(dict.fromkeys(both))
     required = f"{least.value:g} at least" if least else ""
     met = bool(least and lowest >= least.value)
-    found.append(_compared("friction", words, least, required, met=met))
+    found.append(_compared("friction", "", words, least, required, met=met))
     found.append(_gauge([run.track().gauge for run in runs], limits.gauge))
     return found
 
@@ -242,15 +248,7 @@ def _gauge(gauges: Sequence[float], nominal: Value | None) -> Condition:
     words = " to ".join(dict.fromkeys(f"{1e3 * gauge:.4g} mm" for gauge in ends))
     required = f"{1e3 * nominal.value:.4g} mm, for which the limits hold" if nominal else ""
     met = bool(nominal and all(abs(end - nominal.value) <= WIDENED for end in ends))
-    return _compared("gauge", words, nominal, required, met=met)
-
-
-def _compared(
-    name: str, found: str, rule: Sourced | None, required: str, *, met: bool
-) -> Condition:
-    if rule is None:
-        return Condition(name, "", NOT_CHECKED, found, "no value in the limits file")
-    return Condition(name, "", _stated(met), found, required, rule.source, rule.checked)
+    return _compared("gauge", "", words, nominal, required, met=met)
 
 
 def _conicity(
@@ -270,7 +268,7 @@ def _conicity(
     )
     met = bool(known.min() <= classes.low), bool(known.max() >= high)
     each = zip(names, required, met, strict=True)
-    return [_compared(name, found, classes, words, met=ok) for name, words, ok in each]
+    return [_compared(name, "", found, classes, words, met=ok) for name, words, ok in each]
 
 
 def _loads(reports: Sequence[ZoneReport]) -> Condition:

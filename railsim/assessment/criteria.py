@@ -45,16 +45,14 @@ Values = dict[str, list[float]]
 
 
 def ends(x: Floats, sign: int) -> list[float]:
-    """Percentile of a signed quantity towards `sign`; both, upwards, where that is zero."""
+    """Percentile of a signed quantity towards `sign`; both, upwards, where that is zero.
+
+    Towards the turn of a section: of an acceleration to the outside of the curve.
+    """
     if sign:
         return [float(np.percentile(sign * x, HIGH))]
     low, high = np.percentile(x, (LOW, HIGH))
     return [float(-low), float(high)]
-
-
-def outside(x: Floats, turn: int) -> list[float]:
-    """Percentile of an acceleration to the outside of the curve."""
-    return ends(x, turn)
 
 
 def outside_force(x: Floats, turn: int) -> list[float]:
@@ -252,13 +250,13 @@ _ROWS = (
               meaning="quasi-static guiding force on the outer rail, by the mean radius of the "
               "sections"),
     Criterion("body_y_safety", "lateral body acceleration, 6 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.body_lateral, (None, 6.0), outside), SIMPLIFIED,
+              Measured(of.body_lateral, (None, 6.0), ends), SIMPLIFIED,
               "lateral acceleration of the body, safety"),
     Criterion("body_z_safety", "vertical body acceleration, 0.4 to 4 Hz", "m/s2", SAFETY, "safety",
               Measured(of.body_vertical, (0.4, 4.0), both_ends), SIMPLIFIED,
               "vertical acceleration of the body, safety"),
     Criterion("frame_y", "lateral bogie frame acceleration, 10 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.frame_lateral, (None, 10.0), outside), SIMPLIFIED,
+              Measured(of.frame_lateral, (None, 10.0), ends), SIMPLIFIED,
               "lateral acceleration of the bogie frame, by its mass"),
     Criterion("frame_instability", "rms of bogie frame acceleration, 100 m", "m/s2", SAFETY,
               "largest", Instability(of.frame_lateral), SIMPLIFIED,

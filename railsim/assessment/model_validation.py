@@ -203,12 +203,8 @@ class _Channel:
     unknown: Flags  # gaps of the measurement
 
 
-@dataclass(eq=False)
-class _Place:
-    """A quantity at one place of the vehicle: what it is formed of, measured and simulated."""
-
-    channels: list[_Channel]
-    both: list[Signal]
+_Place = tuple[list[_Channel], list[Signal]]
+"""A quantity at one place of the vehicle: what it is formed of; measured and simulated."""
 
 
 @dataclass(eq=False)
@@ -337,19 +333,20 @@ class _Run:
             sources = [[c.measured for c in used], [c.simulated for c in used]]
             formed = [_formed(quantity, self.measurement.rate, x, side) for x in sources]
             both = [Signal(x[:, None], s[:, None], [(label, side)]) for x in formed]
-            found.append(_Place(used, both))
+            found.append((used, both))
         return found
 
     def _in_section(self, quantity: Compared, section: TestSection, place: _Place) -> list[Pair]:
         """Return the values of a quantity at a place in a section."""
-        ((label, side),) = place.both[0].places
+        channels, both = place
+        ((label, side),) = both[0].places
         wheel = section.wheel(side)
-        inside = slice(*np.searchsorted(place.both[0].s[:, 0], [section.begin, section.end]))
-        gaps = (np.mean(channel.unknown[inside]) for channel in place.channels)
+        inside = slice(*np.searchsorted(both[0].s[:, 0], [section.begin, section.end]))
+        gaps = (np.mean(channel.unknown[inside]) for channel in channels)
         if (wheel == "inner" and quantity.base != "Q") or any(gap > UNKNOWN for gap in gaps):
             return []
         outwards, values = RIGHT.get(quantity.base, 0) * section.turn or 1.0, []
-        for signal in place.both:
+        for signal in both:
             x = outwards * signal.in_section(0, section, quantity.window)
             values.append(quantity.value(x, section.turn) if len(x) else [])
         names_of = quantity.name, self.measurement.name, f"{label} {wheel}".rstrip()

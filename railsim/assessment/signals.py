@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -191,16 +191,11 @@ def _acceleration(signals: Signals, band: Band | None, axis: int, *, frames: boo
     return Signal(values, s, [(names[k], None) for k in columns])
 
 
-def body_lateral(signals: Signals, band: Band | None) -> Signal | None:
-    """Lateral acceleration on the floor of the body [m/s2]."""
-    return _acceleration(signals, band, 1, frames=False)
+body_lateral = partial(_acceleration, axis=1, frames=False)
+"""Lateral acceleration on the floor of the body [m/s2]."""
 
+body_vertical = partial(_acceleration, axis=2, frames=False)
+"""Vertical acceleration on the floor of the body [m/s2]."""
 
-def body_vertical(signals: Signals, band: Band | None) -> Signal | None:
-    """Vertical acceleration on the floor of the body [m/s2]."""
-    return _acceleration(signals, band, 2, frames=False)
-
-
-def frame_lateral(signals: Signals, band: Band | None) -> Signal | None:
-    """Lateral acceleration of the bogie frames above the wheelsets [m/s2]."""
-    return _acceleration(signals, band, 1, frames=True)
+frame_lateral = partial(_acceleration, axis=1, frames=True)
+"""Lateral acceleration of the bogie frames above the wheelsets [m/s2]."""

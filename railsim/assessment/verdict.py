@@ -53,7 +53,8 @@ def all_verdicts(
 ) -> dict[str, Verdict]:
     """Return the verdicts by criterion, on all runs, also those that did not reach their end."""
     derailed = [status_words(n, r) for n, r in runs.items() if r.status == "derailed"]
-    stopped = [f"{status_words(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
+    others = {n: r for n, r in runs.items() if r.status not in ("complete", "derailed")}
+    stopped = [f"{status_words(n, r)}: not assessed" for n, r in others.items()]
     missing = sentences([condition for condition in conditions if condition.state != MET])
     found = {}
     for name in VERDICTS:
@@ -79,10 +80,6 @@ def all_verdicts(
             value = INCOMPLETE if incomplete or derailed else PASS
         found[name] = Verdict(value, tuple(dict.fromkeys([*derailed, *exceeded, *incomplete])))
     return found
-
-
-def _stopped(result: Result) -> bool:
-    return result.status not in ("complete", "derailed")
 
 
 def status_words(name: str, result: Result) -> str:
