@@ -8,7 +8,6 @@ side a dashed line.  A bogie has a marker, too, for print in black and white.
 import warnings
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -100,9 +99,9 @@ def single(
 
 
 @contextmanager
-def styled() -> Iterator[None]:
-    """Use the style of railsim's pictures within the block."""
-    with matplotlib.rc_context(STYLE):
+def styled(changes: Any = None) -> Iterator[None]:
+    """Use the style of railsim's pictures within the block, with `changes`."""
+    with matplotlib.rc_context(STYLE | (changes or {})):
         yield
 
 
@@ -123,13 +122,8 @@ def wheelset_looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     return looks
 
 
-@dataclass(frozen=True)
-class Span:
-    """A section of the track on the axis of a picture, in the axis's unit."""
-
-    section: Section
-    low: float
-    high: float
+Span = tuple[Section, float, float]
+"""A section of the track, its begin and end on the axis of a picture, in the axis's unit."""
 
 
 def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[Span]:
@@ -144,7 +138,7 @@ def spans(sections: Sequence[Section], distance: Floats, axis: Floats) -> list[S
         start, end = np.clip([section.begin, section.end], distance[0], distance[-1])
         if section.type in SHADES and start < end:
             low, high = np.interp([start, end], distance, axis)
-            found.append(Span(section, float(low), float(high)))
+            found.append((section, float(low), float(high)))
     return found
 
 
@@ -153,17 +147,17 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
 
     Where there is no room for all names, those of curves come first.
     """
-    for span in shown:
-        axes.axvspan(span.low, span.high, color=SHADES[span.section.type], lw=0, zorder=0)
+    for section, begin, end in shown:
+        axes.axvspan(begin, end, color=SHADES[section.type], lw=0, zorder=0)
     if not named or not shown:
         return
     low, high = axes.get_xlim()
     letter = LETTER * (high - low) / (72.0 * axes.bbox.width / axes.figure.dpi)
     names: list[tuple[float, float, str]] = []  # middle, half of the width, words
-    for span in sorted(shown, key=lambda span: span.section.type):  # CIR before CLO
-        words = "CLO" if span.section.type == "CLO" else f"R {1.0 / span.section.start_value:.6g}"
-        middle, half = 0.5 * (span.low + span.high), 0.5 * letter * len(words)
-        if span.high - span.low < (2.0 * half if words == "CLO" else 0.5 * letter):
+    for section, begin, end in sorted(shown, key=lambda span: span[0].type):  # CIR before CLO
+        words = "CLO" if section.type == "CLO" else f"R {1.0 / section.start_value:.6g}"
+        middle, half = 0.5 * (begin + end), 0.5 * letter * len(words)
+        if end - begin < (2.0 * half if words == "CLO" else 0.5 * letter):
             continue
         if all(abs(middle - other) >= half + reach for other, reach, _ in names):
             names.append((middle, half, words.replace("-", "−")))

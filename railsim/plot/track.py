@@ -5,7 +5,6 @@ they are not constant.  Constants stand in the line under the title.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +29,8 @@ RESOLUTION = 16000
 MOST_REMARKS = 8
 
 
-@dataclass(frozen=True)
-class _Row:
-    """One pair of axes over the distance: curves by their names; a single one needs no name."""
-
-    title: str
-    label: str
-    curves: dict[str, Floats]
+_Row = tuple[str, str, dict[str, Floats]]
+"""One pair of axes over the distance: title, label, curves by name; a single one needs none."""
 
 
 @styled()
@@ -79,17 +73,18 @@ def track_figure(track: Track, title: str = "") -> Figure:
 
 
 def _draw(axes: Axes, row: _Row, s: Floats) -> None:
-    for k, (name, values) in enumerate(row.curves.items()):
+    title, label, curves = row
+    for k, (name, values) in enumerate(curves.items()):
         line = SIDE_LINES["right" if k else "left"]  # the second shows where both agree
         axes.plot(s, values, color=DISTINCT[k], ls=line, label=name)
-    if any(values.min() < 0.0 for values in row.curves.values()):
+    if any(values.min() < 0.0 for values in curves.values()):
         axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
-    if len(row.curves) > 1:
+    if len(curves) > 1:
         corner = (1.0, 0.93)  # beside the title
-        axes.legend(loc="lower right", bbox_to_anchor=corner, ncols=len(row.curves))
-    axes.set(title=row.title, ylabel=row.label)
+        axes.legend(loc="lower right", bbox_to_anchor=corner, ncols=len(curves))
+    axes.set(title=title, ylabel=label)
     axes.margins(x=0.0)
-    if all(np.ptp(values) == 0.0 for values in row.curves.values()):
+    if all(np.ptp(values) == 0.0 for values in curves.values()):
         axes.set_ylim(min(axes.get_ylim()[0], -1.0), max(axes.get_ylim()[1], 1.0))
 
 
@@ -97,12 +92,12 @@ def _alignment_rows(track: Track, alignment: Alignment, s: Floats) -> list[_Row]
     curvature = {"curvature": 1e3 * alignment.curvature(s)}
     cant = {"cant": 1e3 * alignment.cant(s)}
     rows = [
-        _Row("Curvature, positive to the right", r"$\kappa$ (1/km)", curvature),
-        _Row("Cant, positive with the left rail higher", "$h$ (mm)", cant),
+        ("Curvature, positive to the right", r"$\kappa$ (1/km)", curvature),
+        ("Cant, positive with the left rail higher", "$h$ (mm)", cant),
     ]
     if track.vertical:
         gradient = {"gradient": 1e3 * alignment.gradient(s)}
-        rows.append(_Row("Gradient, positive uphill", "$i$ (‰)", gradient))
+        rows.append(("Gradient, positive uphill", "$i$ (‰)", gradient))
     return rows
 
 
@@ -120,11 +115,11 @@ def _rail_rows(track: Track, s: Floats) -> list[_Row]:
         across, down = {"left": y_left, "right": y_right}, {"left": z_left, "right": z_right}
         words = "displacement of the rails, positive"
         rows = [
-            _Row(f"Lateral {words} to the right{without}", "$y$ (mm)", across),
-            _Row(f"Vertical {words} downwards{without}", "$z$ (mm)", down),
+            (f"Lateral {words} to the right{without}", "$y$ (mm)", across),
+            (f"Vertical {words} downwards{without}", "$z$ (mm)", down),
         ]
     if np.ptp(gauge) > 1e-6:
-        rows.append(_Row("Gauge", "(mm)", {"gauge": gauge}))
+        rows.append(("Gauge", "(mm)", {"gauge": gauge}))
     return rows
 
 
@@ -140,7 +135,7 @@ def _table_rows(track: Track, s: Floats) -> list[_Row]:
         if table is not None:
             at, *columns = np.array(table).T
             curves = {n: np.interp(s, at, v) for n, v in zip(names, columns, strict=True)}
-            rows.append(_Row(title, label, curves))
+            rows.append((title, label, curves))
     return rows
 
 

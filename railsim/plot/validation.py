@@ -17,6 +17,7 @@ MOST = 12  # channels of a picture
 LONGEST = 20_000  # values of a line
 BOTH = {"measured": ("k", "-"), "simulated": (DISTINCT[1], "-")}
 LIMITS = "dashed: limit of the mean; dotted: twice that of the standard deviation"
+SMALL = {"axes.labelsize": "small", "axes.titlesize": "small"}  # of pictures with many axes
 NEAR = 200.0  # m to both sides of the middle of a run, of which channels are drawn
 
 
@@ -29,7 +30,7 @@ def _written(unit: str) -> str:
     return unit.replace("s2", "s²")
 
 
-@styled()
+@styled(SMALL)
 def scatter(validation: ModelValidation) -> Figure:
     """Draw simulated over measured section values with the bands of the mean and the deviation."""
     shown = validation.comparisons
@@ -45,15 +46,14 @@ def scatter(validation: ModelValidation) -> Figure:
             for sign in (-1.0, 1.0):
                 axes.plot(ends, ends + sign * scale * limit, style, color="0.6", linewidth=0.8)
         axes.plot(*both, ".", color=LIMIT if one.verdict == "fail" else DISTINCT[0])
-        axes.set(xlim=ends, ylim=ends)
+        title = broken(f"{one.quantity.words}: {one.verdict}", 2.3)
         unit = f" ({_written(one.quantity.column.unit)})" if one.quantity.column.unit else ""
-        axes.set_title(broken(f"{one.quantity.words}: {one.verdict}", 2.3), fontsize="small")
-        axes.set_xlabel(f"measured{unit}", fontsize="small")
-        axes.set_ylabel(f"simulated{unit}", fontsize="small")
+        axes.set(title=title, xlabel=f"measured{unit}", ylabel=f"simulated{unit}")
+        axes.set(xlim=ends, ylim=ends)
     return figure
 
 
-@styled()
+@styled(SMALL)
 def differences(validation: ModelValidation) -> Figure:
     """Draw the distribution of the differences over the limit of their standard deviation."""
     shown = validation.comparisons
@@ -66,9 +66,8 @@ def differences(validation: ModelValidation) -> Figure:
         for limit in (-2 / 3, 2 / 3):
             axes.axvline(limit, color="0.5", linewidth=0.8, linestyle="--")
         axes.axvline(one.mean / one.limit, color="k", linewidth=1.0)
-        axes.set_title(broken(one.quantity.words, 1.7), fontsize="small")
-        axes.set_xlabel("difference / limit", fontsize="small")
-        axes.set_ylabel("number", fontsize="small")
+        words = broken(one.quantity.words, 1.7)
+        axes.set(title=words, xlabel="difference / limit", ylabel="number")
     return figure
 
 
@@ -104,7 +103,7 @@ def _over_arc(
     return figure
 
 
-@styled()
+@styled(SMALL)
 def spectra(validation: ModelValidation) -> Figure:
     """Draw power spectral densities of measured and simulated channels of the first run."""
     shown = _first(validation.overlays)
@@ -114,9 +113,7 @@ def spectra(validation: ModelValidation) -> Figure:
         for name, (colour, _) in BOTH.items():
             density = _density(one, scale * getattr(one, name))
             axes.loglog(*density, color=colour, lw=0.9, label=name)
-        axes.set_title(one.name, fontsize="small")
-        axes.set_xlabel("frequency (Hz)", fontsize="small")
-        axes.set_ylabel(f"PSD (({unit})²/Hz)", fontsize="small")
+        axes.set(title=one.name, xlabel="frequency (Hz)", ylabel=f"PSD (({unit})²/Hz)")
     grid[0].legend(fontsize="small")
     return figure
 
@@ -142,7 +139,7 @@ def fits(found: Identified) -> Figure:
     return _over_arc(_first(found.channels), part, lines, 0.8)
 
 
-@styled()
+@styled(SMALL)
 def residual_spectra(found: Identified) -> Figure:
     """Draw the cumulative periodograms of the residuals: a straight line where they are white."""
     shown = _first(found.channels)
@@ -157,9 +154,8 @@ def residual_spectra(found: Identified) -> Figure:
         axes.plot([low, high], [0.0, 1.0], color="0.6", linewidth=0.8)
         axes.plot(f[inside], summed, color=DISTINCT[0] if one.is_white else LIMIT)
         white = "white" if one.is_white else "not white"
-        axes.set_title(f"{one.name}: {white}", fontsize="small")
-        axes.set_ylabel("share of the power", fontsize="small")
-        axes.set_xlabel("frequency (Hz)", fontsize="small")
+        axes.set(title=f"{one.name}: {white}")
+        axes.set(xlabel="frequency (Hz)", ylabel="share of the power")
     return figure
 
 

@@ -90,15 +90,14 @@ def nest(
     suspension: TrailingArmSuspension,
     springs: Sequence[tuple[Values, Values, Values]],
     start: Values,
-    seats: Sequence[float] | None = None,
 ) -> Arm:
     """Return the arm of a file with springs (K_V, D, H0), the first one deflected by `start`.
 
-    The second begins to work at the file's engagement; the seats are the file's by default.
+    The second begins to work at the file's engagement.
     """
     arm, nu = suspension.arm, poisson_ratio(suspension)
     starts = (start, start - suspension.engagement)[: len(springs)]
-    each = zip(springs, seats or suspension.seat_heights, starts, strict=True)
+    each = zip(springs, suspension.seat_heights, starts, strict=True)
     coils = tuple(Coil(*spring, seat, begin) for spring, seat, begin in each)
     return Arm(arm.length, arm.bush_torsional_stiffness, nu, coils, arm.equilibrium)
 

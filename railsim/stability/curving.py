@@ -172,15 +172,9 @@ class Curving(Plottable):
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset`; needs xarray."""
         xarray = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
-        coords = {
-            **{name: getattr(self, name) for name in self.DIMS},
-            "wheelset": list(self.wheelsets),
-            "side": ["left", "right"],
-            "bogie": list(self.bogies),
-        }
-        variables: dict[str, Any] = {
-            name: ((*self.DIMS, *dims), getattr(self, name)) for name, dims in self.VALUES.items()
-        }
+        record = self.record()
+        coords = {name: record[name] for name in (*self.DIMS, "wheelset", "side", "bogie")}
+        variables = {name: (dims, getattr(self, name)) for name, dims in record["dims"].items()}
         variables["speed"] = (self.DIMS[:2], self.speed)
         variables["converged"] = (self.DIMS, self.converged)
         return xarray.Dataset(variables, coords, {"cant": self.cant})
