@@ -62,8 +62,7 @@ def command(
     name = vehicle or how.vehicle
     if name is None:
         raise input_error("--vehicle", "not given", "the vehicle that measured")
-    case = getattr(how, "load", None)
-    load = [f"load={case}"] if case else []
+    load = [f"load={how.load}"] if how.load else []
     coach, rails = load_vehicle(name, load), load_track(track or how.track or "straight")
     with output.progress(measurement.name) as progress:
         more: Any = {"assumed": assumed, "simulations": simulations, "progress": progress}

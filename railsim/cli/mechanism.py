@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -81,7 +81,13 @@ def command(
                         before.result(name)
                 optimum = optimise(chosen, workers=cores, **search)
             results.append(optimum.after if optimum else analyse(mechanism, case))
-            at_values.append(_values_at(results[-1], wanted))
+            at_values.append(
+                [
+                    {"where": words, **one}
+                    for words, name, value in wanted
+                    for one in results[-1].everywhere(name, value)
+                ]
+            )
             if len(results) == 1 and mechanism.cases and case is None and not searched:
                 cases = {name: _of_case(mechanism, name) for name in mechanism.cases}
                 cases = {"base": results[0], **cases}
@@ -122,12 +128,3 @@ def _wanted(at: Sequence[str]) -> list[Wanted]:
             raise input_error("--at", f"'{assignment}'", "NAME=VALUE, in SI units")
         found.append((assignment, name.strip(), value))
     return found
-
-
-def _values_at(result: "Analysis", wanted: Sequence[Wanted]) -> list[dict[str, Any]]:
-    """Results where one of them has a value."""
-    return [
-        {"where": words, **one}
-        for words, name, value in wanted
-        for one in result.everywhere(name, value)
-    ]

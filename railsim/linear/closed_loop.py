@@ -76,16 +76,16 @@ def closed_loop(
 
 def _commanded(free: FreeVehicle) -> Floats:
     """How the rates follow the commands: B, float64[n, m]."""
-    which, memory = free.system.actuators.which, free.work.memory
-    columns = []
-    for command in which[:, acts.COMMAND]:
-        rates = []
-        for value in (COMMAND_STEP, -COMMAND_STEP):
-            memory[command] = value
-            rates.append(free.rate(free.x))
-        memory[command] = 0.0
-        columns.append((rates[0] - rates[1]) / (2.0 * COMMAND_STEP))
-    return np.array(columns).T.reshape(len(free.x), -1)
+    where, memory = free.system.actuators.which[:, acts.COMMAND], free.work.memory
+
+    def rate(commands: Floats) -> Floats:
+        memory[where] = commands
+        return free.rate(free.x)
+
+    none = np.zeros(len(where))
+    found = jacobian(lambda rows: np.array([rate(row) for row in rows]), none, none + COMMAND_STEP)
+    memory[where] = none
+    return found.reshape(len(free.x), -1)
 
 
 def _loop(

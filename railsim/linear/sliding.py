@@ -8,7 +8,6 @@ speed is that at rest.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,12 +22,8 @@ from railsim.model.assembly import Model
 SMALLEST = 1.0 / 256.0  # part of the way between two states at which a path ends
 
 
-@dataclass(frozen=True)
-class Grip:
-    """Deflections of all pads in a state [m], and the forces that they have there [N]."""
-
-    deflection: Floats
-    force: Floats
+Grip = tuple[Floats, Floats]
+"""Deflections of all pads in a state [m], and the forces that they have there [N]."""
 
 
 class Sliding(SteadyRolling):
@@ -56,8 +51,9 @@ class Sliding(SteadyRolling):
             derivative[:] = super()._evaluated(state[None])
             if self._since is not None and len(self._pads):
                 stiffness = self.system.internal.parameter[self._pads, 0]
-                moved = self.deflection() - self._since.deflection
-                state[self._first + self._pads] = self._since.force + stiffness * moved
+                deflection, force = self._since
+                moved = self.deflection() - deflection
+                state[self._first + self._pads] = force + stiffness * moved
                 settle_limits(
                     self.system.internal, self.system.curves, self._first, self.work.drive, state
                 )
@@ -76,7 +72,7 @@ class Sliding(SteadyRolling):
     def grip(self, state: Floats) -> Grip:
         """Deflections and forces of the pads in a state."""
         self.evaluate(state)
-        return Grip(self.deflection(), state[self._first + self._pads].copy())
+        return self.deflection(), state[self._first + self._pads].copy()
 
 
 Placed = Callable[[float, Floats], tuple[System, Floats]]

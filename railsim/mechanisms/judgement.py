@@ -240,8 +240,7 @@ class Judge:
             return ratio[..., zone], force[..., zone]
         r, _, _ = motion.point(self.output)
         k = model.axis
-        first = motion.point(self.output)[0][..., :1, k]
-        drift = np.imag(r[..., zone, k] - first)
+        drift = np.imag(r[..., zone, k] - r[..., :1, k])
         if not np.any(drift):
             return ratio[..., zone], force[..., zone]
         real = solve(model, np.real(motion.s[0, zone]))

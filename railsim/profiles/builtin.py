@@ -149,11 +149,12 @@ def cone(taper: float) -> Profile:
         end = arc_y + arc_radius / apart * (centre_y - arc_y)
     start = centre_y - radius * taper / np.hypot(taper, 1.0)
 
+    fillet = _circle(float(centre_y), float(centre_z), -radius)
+
     def height(y: Floats) -> Floats:
-        fillet = centre_z - np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
         # S1002's own fillet ends farther down: its flank goes on along the same line
         flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
-        return np.where(y > start, -taper * y, np.where(y > end, fillet, flange))
+        return np.where(y > start, -taper * y, np.where(y > end, fillet(y), flange))
 
     ratio = f"1:{float(f'{1.0 / taper:.3g}'):g}"  # 1:3.33, 1:1000
     source = f"cone of {ratio}, flank, tip and back of S1002, fillet of 13 mm"

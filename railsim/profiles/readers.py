@@ -159,7 +159,7 @@ def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], fl
     if found:
         return min(found), units[names[min(found)[0]]]
     allowed = "the header is y_mm,z_mm for millimetres or y,z for metres"
-    raise input_error(file, f"unknown columns {_shown(names)}", allowed, key=f"line {line}")
+    raise _fault(file, line, f"unknown columns {_shown(names)}", allowed)
 
 
 def _simpack(file: str, lines: list[str]) -> Points:
@@ -191,15 +191,13 @@ def _simpack(file: str, lines: list[str]) -> Points:
     if inside or not rows:
         allowed = "SIMPACK files hold them from point.begin to point.end"
         raise input_error(file, "no point.end: cut off" if inside else "no points", allowed)
-    per_metre = values.get("units.len.f", 1.0)
-    if per_metre <= 0.0:
-        allowed = "units per metre, 1000 for millimetres"
-        raise input_error(file, f"{per_metre:g}", allowed, key="units.len.f")
-    per_radian = values.get("units.ang.f", 1.0)
-    if per_radian <= 0.0:
-        allowed = "units per radian, 57.2958 for degrees"
-        raise input_error(file, f"{per_radian:g}", allowed, key="units.ang.f")
-    found = _points(file, rows, unit=1.0 / per_metre, name=title)
+    for key, allowed in (
+        ("units.len.f", "units per metre, 1000 for millimetres"),
+        ("units.ang.f", "units per radian, 57.2958 for degrees"),
+    ):
+        if values.get(key, 1.0) <= 0.0:
+            raise input_error(file, f"{values[key]:g}", allowed, key=key)
+    found = _points(file, rows, unit=1.0 / values.get("units.len.f", 1.0), name=title)
     if kind_flag is not None:
         found.kind = "wheel" if kind_flag == 1.0 else "rail"
     _process_simpack(found, values)
