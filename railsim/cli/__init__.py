@@ -168,12 +168,10 @@ def _status(given: Sequence[str] | None) -> int:
             for line in fault_lines(faults):
                 echo(line, err=True)
             return _failed(arguments, WRONG_INPUT, {"faults": [asdict(fault) for fault in faults]})
-        except ModelError as error:
-            echo(f"railsim: {error}", err=True)
-            return _failed(arguments, WRONG_INPUT, {"error": str(error)})
         except RailsimError as error:
             echo(f"railsim: {error}", err=True)
-            return _failed(arguments, FAILED, {"error": str(error)})
+            status = WRONG_INPUT if isinstance(error, ModelError) else FAILED
+            return _failed(arguments, status, {"error": str(error)})
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
             remove_partial_files()  # of one just created no block has taken care yet

@@ -138,10 +138,9 @@ class RunLines:
         self._number += 1
         name, status = record["name"], record["status"]
         self._remarks += [(name, str(remark)) for remark in record.get("remarks", ())]
-        if status != "complete":
-            _print(f"{name}  {status} ({record['status_reason']})", *self._values([record]))
-        elif self._number <= self.EACH:
-            _print(f"{name}  {status}", *self._values([record]))
+        why = "" if status == "complete" else f" ({record['status_reason']})"
+        if why or self._number <= self.EACH:
+            _print(f"{name}  {status}{why}", *self._values([record]))
         if self._number > self.EACH:
             self._last.append(record)
         if len(self._last) == 10:

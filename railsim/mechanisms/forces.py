@@ -20,7 +20,7 @@ from railsim.definitions.mechanism import parts
 from railsim.definitions.mechanism.values import body_name, points_of
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms import components
-from railsim.mechanisms.kinematics import Motion, driver_words
+from railsim.mechanisms.kinematics import Motion, dot, driver_words
 from railsim.mechanisms.model import Model, real
 
 STROKE_EDGE = 1e-4  # share of a gas spring's stroke by which rounding may take it beyond its ends
@@ -96,10 +96,8 @@ def inertia(motion: Motion) -> tuple[Any, Any]:
     mass, slope = 0.0 * motion.s, 0.0 * motion.s
     for m, (_, r1, r2), rotary, k in masses(motion):
         w, w1 = motion.q1[..., k, 2], motion.q2[..., k, 2]
-        mass = mass + m * (r1[..., 0] ** 2 + r1[..., 1] ** 2) + rotary * w * w
-        slope = slope + 2.0 * (
-            m * (r1[..., 0] * r2[..., 0] + r1[..., 1] * r2[..., 1]) + rotary * w * w1
-        )
+        mass = mass + m * dot(r1, r1) + rotary * w * w
+        slope = slope + 2.0 * (m * dot(r1, r2) + rotary * w * w1)
     return mass, slope
 
 

@@ -266,16 +266,15 @@ class Judge:
     def _objective(self, height: Any, ratio: Any, force: Any, whole: Any) -> tuple[Any, Any]:
         """Residuals, shape (lane, residual); amounts whose largest is added to their squares."""
         parts, peaks = [], np.zeros((len(ratio), 1), dtype=complex)
-        number_of = self.values
         for kind, weight in self.weights.items():
             root = np.sqrt(weight * (1.0 if kind == "peak_force" else self.every))
             if kind == "follow":
                 parts.append(root * (ratio - self.positions.ratio))
             elif kind in ("constant", "linear"):
                 assert self.wanted.target is not None
-                target = number(self.wanted.target, number_of)
+                target = number(self.wanted.target, self.values)
                 if kind == "linear":
-                    slope = number(self.wanted.slope, number_of)
+                    slope = number(self.wanted.slope, self.values)
                     target = target + slope * height
                 parts.append(root * (ratio - target))
             elif kind == "constant_force":

@@ -142,8 +142,6 @@ def _draw(
         # the leading wheelset stays visible
         look = {"ls": style.SIDE_LINES[side], "zorder": above, "markevery": marked, **look}
         axes.plot(horizontal, values, ms=3.5, **look)
-    if quantity.name != "mileage":  # whose zero is far away
-        axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = capitalised(quantity)
     drawn = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
     if by == "wheelset" and len(drawn) == 1:
@@ -158,14 +156,19 @@ def _draw(
         axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
     elif names and names[0]:
         heading = f"{heading}: {names[0]}"
-    axes.set(title=heading, ylabel=unit_label(quantity))
-    axes.margins(x=0.0)
     draw_limit(axes, quantity, [result])
-    widen(axes, quantity)
+    frame(axes, quantity, heading)
 
 
-def widen(axes: Axes, quantity: Quantity) -> None:
-    """Let a vertical axis show two of the last digits of printed values at least, not noise."""
+def frame(axes: Axes, quantity: Quantity, heading: str) -> None:
+    """Give axes over time or distance their title, the unit and a line at zero.
+
+    They show two of the last digits of printed values at least, not noise.
+    """
+    axes.set(title=heading, ylabel=unit_label(quantity))
+    if quantity.name != "mileage":  # whose zero is far away
+        axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+    axes.margins(x=0.0)
     low, high = axes.get_ylim()
     if high - low < 2.0 * quantity.least:
         middle = 0.5 * (low + high)

@@ -9,15 +9,13 @@ from matplotlib.figure import Figure
 
 from railsim.compare import Difference
 from railsim.definitions.track.layout import curvature_sections
-from railsim.notation import Quantity
 from railsim.plot import style
 from railsim.plot.histories import (
     capitalised,
     check_not_empty,
     draw_limit,
+    frame,
     short_names,
-    unit_label,
-    widen,
 )  # fmt: skip
 from railsim.plot.selection import STUDY, Panel, panels
 from railsim.result import Result
@@ -65,7 +63,7 @@ def overlay(
         held = [panel for panel in same if panel is not None]
         quantity = held[0].quantity
         draw_limit(axes, quantity, results.values())
-        _label(axes, quantity, _heading(held, places))
+        frame(axes, quantity, _heading(held, places))
         style.shade(axes, shown, named=same_radii and number < across)
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]
     labels = [f"{label}{result.end_words}" for label, result in results.items()]
@@ -122,7 +120,7 @@ def difference_figure(found: Sequence[Difference], first: str) -> Figure:
             colour = style.distinct(1 + labels.index(one.result))
             line = style.SIDE_LINES[one.labels.get("side", "left")]
             axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=line)
-        _label(axes, own[0].quantity, capitalised(own[0].quantity))
+        frame(axes, own[0].quantity, capitalised(own[0].quantity))
     _legend(figure, labels, {one.labels.get("side") for one in found}, 1)
     return figure
 
@@ -161,10 +159,3 @@ def _heading(held: Sequence[Panel], names: Mapping[str, str]) -> str:
         place = labels.pop()
         places[unformatted(names.get(place, place))] = None
     return f"{capitalised(quantity)}: {' / '.join(places)}"
-
-
-def _label(axes: Axes, quantity: Quantity, heading: str) -> None:
-    axes.set(title=heading, ylabel=unit_label(quantity))
-    axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
-    axes.margins(x=0.0)
-    widen(axes, quantity)

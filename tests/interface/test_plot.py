@@ -20,7 +20,7 @@ from railsim.errors import InputError
 from railsim.files.sources import read_source
 from railsim.notation import QUANTITIES
 from railsim.plot.curving import _parted, curving_figure
-from railsim.plot.histories import STUDY, histories, widen
+from railsim.plot.histories import STUDY, frame, histories
 from railsim.plot.overlay import overlay
 from railsim.plot.recording import recording_figure
 from railsim.plot.style import (
@@ -195,12 +195,12 @@ def test_sides_and_wheelsets_are_told_apart(result):
 def test_axes_of_rounding_errors_show_the_last_digit_of_tables():
     axes = Figure().subplots()
     axes.plot([0.0, 1.0], [-3e-13, 2e-13])
-    widen(axes, QUANTITIES["sum_Y"])
+    frame(axes, QUANTITIES["sum_Y"], "sum Y")
     np.testing.assert_allclose(axes.get_ylim(), (-0.01, 0.01), rtol=1e-9)  # kN
     axes.plot([0.0, 1.0], [0.0, 5.0])
     axes.autoscale()
     before = axes.get_ylim()
-    widen(axes, QUANTITIES["sum_Y"])
+    frame(axes, QUANTITIES["sum_Y"], "sum Y")
     assert axes.get_ylim() == before
 
 
