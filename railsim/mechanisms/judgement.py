@@ -162,7 +162,10 @@ class Judge:
         moved = self.model(x, choice)
         model = moved.real()
         grid = self.grid(model, extra)
-        s = self._zone_drivers(model)
+        if self.by_share:
+            s = model.start + (model.end - model.start) * self.positions.share
+        else:
+            s = drivers_at_heights(model, self.positions.height, self.positions.s)
         both = np.concatenate((grid, s))
         later = np.repeat((0, 1), (len(grid), len(s)))
         at_height = (later == 1) & (not self.by_share)  # whatever the ends of the range are
@@ -172,12 +175,6 @@ class Judge:
         motion = tangents(solve(model, both[order]), moved, drift=drift[..., order], second=False)
         rank = np.argsort(order, kind="stable")
         return self._judged(motion, model, rank[: len(grid)], rank[len(grid) :])
-
-    def _zone_drivers(self, model: Model) -> Floats:
-        """Values of the driver at the positions of the objective."""
-        if self.by_share:
-            return model.start + (model.end - model.start) * self.positions.share
-        return drivers_at_heights(model, self.positions.height, self.positions.s)
 
     def least(
         self, x: Floats, choice: dict[str, float], near: float = 0.02

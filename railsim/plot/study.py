@@ -5,7 +5,7 @@ optimisation and what its values depend on; a wheel that wears; limits over a tr
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -339,7 +339,7 @@ def wear_figure(
     """
     figure = Picture(8.6, 7.6, title)
     outline, depth, conicity = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 0.8])
-    _worn(outline, depth, wheels, _km)
+    _worn(outline, depth, wheels, 1e-3, "km")
     depth.set_xlim(1e3 * PROFILE[0], 1e3 * PROFILE[1])
     depth.set(xlabel="y from the nominal rolling circle, flange negative (mm)")
     values = [row["equivalent_conicity"] for row in rows]
@@ -361,23 +361,21 @@ def rail_wear_figure(rails: Mapping[str, Sequence[tuple[float, "Profile"]]], tit
     figure = Picture(9.8, 5.6, title)
     axes = figure.subplots(2, 2, height_ratios=[1.0, 1.2], sharey="row")
     for (outline, depth), (side, steps) in zip(axes.T, rails.items(), strict=True):
-        _worn(outline, depth, steps, lambda tonnage: f"{1e-9 * tonnage:g} Mt")
+        _worn(outline, depth, steps, 1e-9, "Mt")
         outline.set_title(f"{side} rail")
         depth.set(xlabel="y from the middle of the rail, gauge side negative (mm)")
     return figure
 
 
 def _worn(
-    outline: Axes,
-    depth: Axes,
-    steps: Sequence[tuple[float, "Profile"]],
-    told: Callable[[float], str],
+    outline: Axes, depth: Axes, steps: Sequence[tuple[float, "Profile"]], scale: float, unit: str
 ) -> None:
-    """Draw the new and the last profile, and the depth of wear after each step."""
+    """Draw the new and the last profile, and the depth of wear after each step, in a unit."""
     new, last = steps[0][1], steps[-1][1]
     depth.sharex(outline)
     outline.plot(1e3 * new.y, 1e3 * new.z, color="0.2", lw=1.2, label="new")
-    outline.plot(1e3 * last.y, 1e3 * last.z, color="C3", lw=1.0, label=told(steps[-1][0]))
+    words = f"{scale * steps[-1][0]:g} {unit}"
+    outline.plot(1e3 * last.y, 1e3 * last.z, color="C3", lw=1.0, label=words)
     if not outline.yaxis_inverted():
         outline.invert_yaxis()
     outline.set_ylabel("z (mm)")
@@ -385,15 +383,11 @@ def _worn(
     for number, (amount, worn) in enumerate(steps[1:], start=1):
         lost = 1e3 * np.abs(np.asarray(new.z) - np.asarray(worn.z))
         share = 0.25 + 0.75 * number / (len(steps) - 1)
-        label = told(amount) if number in (1, len(steps) - 1) else None
+        label = f"{scale * amount:g} {unit}" if number in (1, len(steps) - 1) else None
         depth.plot(1e3 * new.y, lost, color="C3", alpha=share, lw=1.0, label=label)
     depth.set_ylim(bottom=0.0)
     depth.set_ylabel("depth of wear in z (mm)")
     depth.legend()
-
-
-def _km(distance: float) -> str:
-    return f"{1e-3 * distance:g} km"
 
 
 LABELS = {"Y_over_Q": "Y/Q", "sum_Y": "sum Y", "body_y": "floor y", "body_z": "floor z"}
