@@ -44,30 +44,15 @@ Values = dict[str, list[float]]
 """By place: one value of a section, or both percentiles on straight track [SI]."""
 
 
-def ends(x: Floats, sign: int) -> list[float]:
-    """Percentile of a signed quantity towards `sign`; both, upwards, where that is zero.
-
-    Towards the turn of a section: of an acceleration to the outside of the curve.
-    """
-    if sign:
-        return [float(np.percentile(sign * x, HIGH))]
+def both_ends(x: Floats, _: int) -> list[float]:
+    """Both percentiles, upwards, also in curves."""
     low, high = np.percentile(x, (LOW, HIGH))
     return [float(-low), float(high)]
 
 
-def outside_force(x: Floats, turn: int) -> list[float]:
-    """Percentile of a force on the rails to the outside of the curve."""
-    return ends(x, -turn)
-
-
-def both_ends(x: Floats, _: int) -> list[float]:
-    """Both percentiles, also in curves."""
-    return ends(x, 0)
-
-
-def both_ends_outside(x: Floats, turn: int) -> list[float]:
-    """Both percentiles of a lateral acceleration, in curves the outward one as that upwards."""
-    return ends(turn * x if turn else x, 0)
+def outer_end(x: Floats, turn: int) -> list[float]:
+    """Percentile to the outside of a curve; both on straight track."""
+    return high(x, turn) if turn else both_ends(x, turn)
 
 
 def high(x: Floats, _: int) -> list[float]:
@@ -85,11 +70,6 @@ def middle(x: Floats, _: int) -> list[float]:
     return [float(np.median(x))]
 
 
-def middle_outside(x: Floats, turn: int) -> list[float]:
-    """50 % value to the outside of the curve."""
-    return [float(np.median(turn * x))]
-
-
 def mean_of_known(x: Floats, _: int) -> list[float]:
     """Mean where there is a value."""
     known = x[~np.isnan(x)]
@@ -103,7 +83,7 @@ def rms(x: Floats, _: int) -> list[float]:
 
 def transferred(x: Floats, turn: int) -> list[float]:
     """99.85 % value of what has moved outwards, on straight track to either side."""
-    return high(turn * x if turn else np.abs(x), turn)
+    return high(x if turn else np.abs(x), turn)
 
 
 @dataclass(frozen=True)
@@ -113,11 +93,13 @@ class Measured:
     # of the filtered quantities, see `railsim.assessment.signals`
     signal: Callable[[Signals, Band | None], Signal | None]
     band: Band | None  # filter [Hz]
-    # of a section: from the values over time and its turn (1 right, -1 left, 0 straight)
+    # of a section: from the values over time, outwards positive where the signal has a sense, and
+    # its turn (1 right, -1 left, 0 straight)
     value: Callable[[Floats, int], list[float]]
     window: float = 0.0  # means over this length are taken before [m]; 0: none
     wheels: tuple[str, ...] = OUTER  # wheels that are assessed
     curves: bool = False  # in curves only
+    outwards: int = 0  # sense that is outwards in right-hand curves: -1 of forces on the rails
 
     def __call__(self, signals: Signals, section: TestSection) -> Values:
         """Values of a section by place."""
@@ -130,9 +112,13 @@ class Measured:
             if side is not None and wheel not in self.wheels:
                 continue
             values = signal.in_section(k, section, self.window)
-            if len(values) and (value := self.value(values, section.turn)):
+            if len(values) and (value := self.evaluated(values, section.turn)):
                 found[f"{label} {wheel}".rstrip()] = value
         return found
+
+    def evaluated(self, x: Floats, turn: int) -> list[float]:
+        """Value of a section from those of its signal over time."""
+        return self.value((self.outwards * turn or 1) * x, turn)
 
 
 @dataclass(frozen=True)
@@ -231,7 +217,7 @@ BOTH = ("normal", "simplified")
 SIMPLIFIED = ("simplified",)
 _ROWS = (
     Criterion("sum_Y", "track shift force, 2 m", "kN", SAFETY, "safety",
-              Measured(of.track_shifting_force, FORCES, outside_force, window=2.0),
+              Measured(of.track_shifting_force, FORCES, outer_end, window=2.0, outwards=-1),
               meaning="shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static axle load "
               "(Prud'homme)"),
     Criterion("Y_over_Q", "derailment quotient, 2 m", "-", SAFETY, "safety",
@@ -250,19 +236,19 @@ _ROWS = (
               meaning="quasi-static guiding force on the outer rail, by the mean radius of the "
               "sections"),
     Criterion("body_y_safety", "lateral body acceleration, 6 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.body_lateral, (None, 6.0), ends), SIMPLIFIED,
+              Measured(of.body_lateral, (None, 6.0), outer_end, outwards=1), SIMPLIFIED,
               "lateral acceleration of the body, safety"),
     Criterion("body_z_safety", "vertical body acceleration, 0.4 to 4 Hz", "m/s2", SAFETY, "safety",
               Measured(of.body_vertical, (0.4, 4.0), both_ends), SIMPLIFIED,
               "vertical acceleration of the body, safety"),
     Criterion("frame_y", "lateral bogie frame acceleration, 10 Hz", "m/s2", SAFETY, "safety",
-              Measured(of.frame_lateral, (None, 10.0), ends), SIMPLIFIED,
+              Measured(of.frame_lateral, (None, 10.0), outer_end, outwards=1), SIMPLIFIED,
               "lateral acceleration of the bogie frame, by its mass"),
     Criterion("frame_instability", "rms of bogie frame acceleration, 100 m", "m/s2", SAFETY,
               "largest", Instability(of.frame_lateral), SIMPLIFIED,
               "instability: half of the limit of the acceleration of the bogie frame"),
     Criterion("body_y", "lateral body acceleration", "m/s2", RIDE, "ride",
-              Measured(of.body_lateral, RIDE_BAND, both_ends_outside), BOTH,
+              Measured(of.body_lateral, RIDE_BAND, both_ends, outwards=1), BOTH,
               "lateral acceleration of the body, ride"),
     Criterion("body_z", "vertical body acceleration", "m/s2", RIDE, "ride",
               Measured(of.body_vertical, RIDE_BAND, both_ends), BOTH,
@@ -274,7 +260,7 @@ _ROWS = (
               Measured(of.body_vertical, RIDE_BAND, rms), BOTH,
               "vertical acceleration of the body, ride, rms"),
     Criterion("body_y_qst", "lateral body acceleration, quasi-static", "m/s2", RIDE, "quasi_static",
-              Measured(of.body_lateral, FORCES, middle_outside, curves=True), BOTH,
+              Measured(of.body_lateral, FORCES, middle, curves=True, outwards=1), BOTH,
               "quasi-static lateral acceleration of the body in curves"),
     Criterion("Q_low", "smallest wheel load, 0.15 %", "kN", INFORMATION, "smallest",
               Measured(of.wheel_load, FORCES, low, wheels=ALL)),
@@ -289,7 +275,7 @@ _ROWS = (
     Criterion("T_qst", "quasi-static wear number", "N", INFORMATION, "quasi_static",
               Measured(of.wear_number, None, middle, curves=True)),
     Criterion("overturning", "overturning coefficient, 1.5 Hz", "-", INFORMATION, "safety",
-              Measured(of.load_transfer, (None, 1.5), transferred)),
+              Measured(of.load_transfer, (None, 1.5), transferred, outwards=1)),
     Criterion("steering", "steering index", "-", INFORMATION, "quasi_static", steering, BOTH),
 )  # fmt: skip
 CRITERIA = {criterion.name: criterion for criterion in _ROWS}

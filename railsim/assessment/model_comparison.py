@@ -8,16 +8,11 @@ from typing import Any
 import numpy as np
 
 from railsim.arrays import Floats
-from railsim.assessment.criteria import FORCES, RIDE_BAND, both_ends, ends, middle, rms
+from railsim.assessment.criteria import FORCES, RIDE_BAND, both_ends, high, middle, outer_end, rms
 from railsim.assessment.signals import Band
 from railsim.assessment.verdict import FAIL, INCOMPLETE, PASS
 from railsim.errors import nearest
 from railsim.table import Amount, Column, Table
-
-
-def _outwards(x: Floats, turn: int) -> list[float]:
-    """Percentile to the outside of the curve, both on straight track; values are signed so."""
-    return ends(x, 1 if turn else 0)
 
 
 @dataclass(frozen=True)
@@ -45,10 +40,10 @@ QUANTITIES = {one.name: one for one in (
     Compared("Q_qst", "wheel load, quasi-static", "kN", "Q", FORCES, middle, True),
     Compared("Y_over_Q_qst", "Y/Q, quasi-static", "", "Y_over_Q", FORCES, middle, True),
     Compared("sum_Y_qst", "track shift force, quasi-static", "kN", "sum_Y", FORCES, middle, True),
-    Compared("Y_max", "guiding force", "kN", "Y", FORCES, _outwards),
-    Compared("Q_max", "wheel load", "kN", "Q", FORCES, lambda x, _: ends(x, 1)),
-    Compared("Y_over_Q_max", "Y/Q, 2 m", "", "Y_over_Q", FORCES, _outwards, True, 2.0),
-    Compared("sum_Y_max", "track shift force, 2 m", "kN", "sum_Y", FORCES, _outwards, False, 2.0),
+    Compared("Y_max", "guiding force", "kN", "Y", FORCES, outer_end),
+    Compared("Q_max", "wheel load", "kN", "Q", FORCES, high),
+    Compared("Y_over_Q_max", "Y/Q, 2 m", "", "Y_over_Q", FORCES, outer_end, True, 2.0),
+    Compared("sum_Y_max", "track shift force, 2 m", "kN", "sum_Y", FORCES, outer_end, False, 2.0),
     Compared("body_y_qst", "lateral body acceleration, quasi-static", "m/s2",
              "bodyy", FORCES, middle, True),
     Compared("body_y_max", "lateral body acceleration, 0.4 to 10 Hz", "m/s2",

@@ -274,7 +274,7 @@ def test_values_of_left_hand_curves_are_those_of_their_mirror_images():
         if not isinstance(one.measure, Measured):
             continue
         sign = -1.0 if name in (*turned, "overturning") else 1.0
-        left, right = one.measure.value(sign * x, -1), one.measure.value(x, 1)
+        left, right = one.measure.evaluated(sign * x, -1), one.measure.evaluated(x, 1)
         assert left == pytest.approx(right, rel=1e-9), name
         assert name not in turned or np.all(np.isfinite(left))
 
