@@ -20,7 +20,7 @@ from railsim.mechanisms.outputs import height_of
 class Rest:
     """A position of rest, with dry friction a range of positions [rad or m]."""
 
-    at: float  # value of the driver, the middle of the range
+    at: float  # value of the driver, or height of the output: the middle of the range
     low: float  # ends of the range; equal without friction
     high: float
     stable: bool  # whether the mechanism comes back to it from either side
@@ -38,15 +38,13 @@ class Contact:
     least: float  # the smallest in the whole zone, with friction either way
     curve: Floats  # at all positions, without friction
     bounds: tuple[Floats, Floats]  # the same with friction, rising and falling
-    rests: tuple[Rest, ...]  # where the mechanism rests without a contact force
-    heights: tuple[tuple[float, float], ...]  # lowest and highest of each of these positions [m]
+    rests: tuple[Rest, ...]  # heights at which the output rests without a contact force [m]
     reason: str = ""  # why values are missing
 
     @property
     def equilibria(self) -> tuple[tuple[float, bool], ...]:
         """Heights (the middle of each range) at which it rests, and whether they are stable."""
-        each = zip(self.heights, self.rests, strict=True)
-        return tuple((0.5 * (low + high), rest.stable) for (low, high), rest in each)
+        return tuple((rest.at, rest.stable) for rest in self.rests)
 
 
 Force = Callable[[Motion, int], Any]
@@ -142,8 +140,10 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     def force(positions: Motion, way: int) -> Floats:
         return np.asarray(generalised(positions, way * dense.model.sense) / height_of(positions)[1])
 
-    found = rests(dense, generalised)
-    edges = [height_of(solve(dense.model, [rest.low, rest.high]))[0] for rest in found]
+    found = []
+    for rest in rests(dense, generalised):
+        low, high = sorted(height_of(solve(dense.model, [rest.low, rest.high]))[0].tolist())
+        found.append(Rest(0.5 * (low + high), low, high, rest.stable))
     in_zone = solve(dense.model, list(at_zone.values()))
     ways = (0, 1, -1)
     zone, up, down = (dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in ways)
@@ -153,6 +153,5 @@ def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> C
     least = float(np.min([*up.values(), *down.values(), -max(ends)]))
     missing = not np.all(np.isfinite([*curve, *zone.values()]))
     reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
-    heights = tuple((float(min(y)), float(max(y))) for y in edges)
-    rest = curve, (rising, falling), found, heights, reason
-    return Contact(pressure, zone, up, down, least, *rest)
+    curves = curve, (rising, falling)
+    return Contact(pressure, zone, up, down, least, *curves, tuple(found), reason)

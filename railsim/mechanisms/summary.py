@@ -12,7 +12,7 @@ import numpy as np
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import compare
-from railsim.mechanisms.contact import Contact
+from railsim.mechanisms.contact import Contact, Rest
 from railsim.mechanisms.dynamics import TimedMotion
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.remarks import remarks
@@ -48,10 +48,7 @@ def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
         data |= {"max_force_at": force.most_at, "min_force_at": force.least_at}
         data |= {"peak_force": result.peak_force, "force_zeros": list(result.force_zeros)}
     if result.rests:
-        data["equilibria"] = [
-            {"travel": rest.at, "stable": rest.stable, "from": rest.low, "to": rest.high}
-            for rest in result.rests
-        ]
+        data["equilibria"] = _rests(result.rests, "travel")
     data["min_transmission_angles"] = result.min_angles
     data["published"] = published_data(result)
     data["output"] = {name: _list(array) for name, array in result.output.items()}
@@ -114,13 +111,14 @@ def _contact_data(contact: Contact) -> Data:
     return {
         "pressure": contact.pressure, "force": dict(contact.force),
         "force_rising": dict(contact.rising), "force_falling": dict(contact.falling),
-        "curve": _list(contact.curve),
-        "equilibria": [
-            {"height": y, "stable": stable, "from": low, "to": high}
-            for (y, stable), (low, high) in zip(contact.equilibria, contact.heights, strict=True)
-        ],
+        "curve": _list(contact.curve), "equilibria": _rests(contact.rests, "height"),
         "reason": contact.reason or None,
     }  # fmt: skip
+
+
+def _rests(rests: Sequence[Rest], at: str) -> list[Data]:
+    """Positions of rest as plain numbers, the middle of each under a name."""
+    return [{at: r.at, "stable": r.stable, "from": r.low, "to": r.high} for r in rests]
 
 
 def _motion_data(result: Analysis, timed: TimedMotion, *, courses: bool) -> Data:

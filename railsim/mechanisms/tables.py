@@ -193,9 +193,10 @@ def _contact_sentences(contact: Contact) -> list[str]:
     if contact.rising != contact.falling:
         found[0] += f" (mean); rising {forces(contact.rising)}; falling {forces(contact.falling)}"
     found += [contact.reason] if contact.reason else []
-    for (low, high), rest in zip(contact.heights, contact.rests, strict=True):
+    for rest in contact.rests:
         word = "stable" if rest.stable else "unstable"
-        height = f"{low * 1e3:.1f}" + (f" to {high * 1e3:.1f}" if rest.low < rest.high else "")
+        end = f" to {rest.high * 1e3:.1f}" if rest.low < rest.high else ""
+        height = f"{rest.low * 1e3:.1f}{end}"
         found.append(f"rests at a height of {height} mm without contact, {word}")
     if not contact.rests and not contact.reason:
         found.append("rests nowhere within the travel without contact")

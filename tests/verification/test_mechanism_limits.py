@@ -197,7 +197,7 @@ def test_contact_force_with_friction_is_that_of_a_rising_and_a_falling_head():
     assert plain.force["work"] - rubbed.rising["work"] == pytest.approx(moment / slope, rel=1e-6)
     assert rubbed.falling["work"] - plain.force["work"] == pytest.approx(moment / slope, rel=1e-6)
     # where it rested at one height it now rests between two
-    assert all(low < high for low, high in rubbed.heights)
+    assert all(rest.low < rest.high for rest in rubbed.rests)
 
 
 # --- loops that cannot close ----------------------------------------------------------------------
